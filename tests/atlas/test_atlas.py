@@ -203,7 +203,8 @@ def test_small_atlases_are_refused(size: int) -> None:
 @pytest.mark.samples
 def test_the_scan() -> None:
     """Its eye shells are collapsed; the eight other islands fill most of the map."""
-    from dermis.formats.load import load_mesh
+    from loaded_mesh import load_mesh
+
     from dermis.formats.samples import fetch
 
     sample = SAMPLES["lee_perry_smith"]

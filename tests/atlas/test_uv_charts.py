@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from loaded_mesh import load_mesh
 
 from dermis.atlas.raster import chart_uv_area, find_charts, usable_triangles
-from dermis.formats.load import load_mesh
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 

@@ -1,4 +1,4 @@
-"""Every refusal names its culprit, what is wrong and what to do."""
+"""Error messages of mesh checks: culprit, fault and advice."""
 
 from __future__ import annotations
 

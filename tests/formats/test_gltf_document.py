@@ -1,4 +1,4 @@
-"""Accessors in every form that glTF has, and the parts of a scene in their order."""
+"""Accessors in all forms of glTF, and the order of the parts of a scene."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gltf_file import SQUARE, GltfFile, add_mesh
+from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
 from dermis.formats.gltf.document import read_document
 from dermis.formats.gltf.nodes import read_nodes
 from dermis.formats.gltf.triangles import read_gltf
-from dermis.formats.load import load_mesh
 
 ROWS = np.array([[0, 1, -2], [0, 0, 0], [7, 0, 0], [0, 0, 3]], float)
 
@@ -25,8 +25,8 @@ def test_rows_of_numbers_close_or_with_gaps(tmp_path: Path, gap: int, suffix: st
     file.numbers([1, 2, 3], "<u1")
     index = file.numbers(ROWS, kind, gap=gap)
     document = read_document(file.write(tmp_path / f"a{suffix}"))
-    np.testing.assert_array_equal(document.numbers(index), ROWS)
-    assert document.numbers(index).dtype == np.dtype(kind)
+    np.testing.assert_array_equal(document.read_values(index), ROWS)
+    assert document.read_values(index).dtype == np.dtype(kind)
 
 
 def test_sparse_numbers_over_zeros_and_over_others(tmp_path: Path) -> None:
@@ -35,8 +35,8 @@ def test_sparse_numbers_over_zeros_and_over_others(tmp_path: Path) -> None:
     over = file.sparse(ROWS)
     file.tree["accessors"][over]["bufferView"] = file.tree["accessors"][below]["bufferView"]
     document = read_document(file.write(tmp_path / "a.glb"))
-    np.testing.assert_array_equal(document.numbers(alone), ROWS)
-    np.testing.assert_array_equal(document.numbers(over), [[0, 1, -2], [1, 1, 1], [7, 0, 0], [0, 0, 3]])
+    np.testing.assert_array_equal(document.read_values(alone), ROWS)
+    np.testing.assert_array_equal(document.read_values(over), [[0, 1, -2], [1, 1, 1], [7, 0, 0], [0, 0, 3]])
 
 
 def test_normalised_integers_are_fractions(tmp_path: Path) -> None:
@@ -45,9 +45,9 @@ def test_normalised_integers_are_fractions(tmp_path: Path) -> None:
     share = file.numbers([[255, 0, 51]], "<u1", normalized=True)
     signed = file.numbers([[32767, -32767, 0]], "<i2", normalized=True)
     document = read_document(file.write(tmp_path / "a.glb"))
-    np.testing.assert_array_equal(document.real(plain), [[255, 0, 51]])
-    np.testing.assert_allclose(document.real(share), [[1, 0, 0.2]])
-    np.testing.assert_allclose(document.real(signed), [[1, -1, 0]])
+    np.testing.assert_array_equal(document.read_floats(plain), [[255, 0, 51]])
+    np.testing.assert_allclose(document.read_floats(share), [[1, 0, 0.2]])
+    np.testing.assert_allclose(document.read_floats(signed), [[1, -1, 0]])
 
 
 def test_numbers_beyond_their_buffer_and_from_nowhere_are_refused(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_numbers_beyond_their_buffer_and_from_nowhere_are_refused(tmp_path: Path
     document = read_document(file.write(tmp_path / "a.glb"))
     for one in (index, huge):
         with pytest.raises((ValueError, TypeError)):
-            document.numbers(one)
+            document.read_values(one)
 
 
 def test_strips_and_fans_are_triangles(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_names_of_nodes_are_made_different(tmp_path: Path) -> None:
 
 
 def test_parts_come_as_trimesh_has_them(tmp_path: Path) -> None:
-    """Order and place of each primitive of a tree of nodes, as another reader sees it."""
+    """Order and position of each primitive of a node tree are compared with another reader."""
     import trimesh
 
     rng = np.random.default_rng(5)

@@ -1,4 +1,4 @@
-"""Pictures inside glTF files: what the package writes, what others write, and damage."""
+"""Pictures in glTF files of this package and of others, and damaged ones."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from encoded_glb import encode_glb
+from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
 from dermis.formats.gltf.embedded import embedded_maps
-from dermis.formats.load import load_mesh
 from dermis.images.codecs import encode_png
-from dermis.images.io import Picture, read_image
+from dermis.images.io import EmbeddedPicture, read_image
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.heads import load_head
 
@@ -141,13 +141,13 @@ def test_pictures_by_uri(tmp_path: Path) -> None:
 def test_damage_is_refused(glb: Path, damage: dict[str, Any]) -> None:
     data = glb.read_bytes()
     glb.write_bytes(with_tree(data, tree_of(data) | damage))
-    with pytest.raises(DermisError, match="sound textures"):
+    with pytest.raises(DermisError, match="valid textures"):
         embedded_maps(glb)
 
 
 def test_a_picture_that_is_none_is_refused_by_its_name() -> None:
     with pytest.raises(DermisError, match=r"^skin\.glb, image 3: expected a picture"):
-        read_image(Picture("skin.glb, image 3", b"nothing"))
+        read_image(EmbeddedPicture("skin.glb, image 3", b"nothing"))
 
 
 def test_files_without_pictures(tmp_path: Path) -> None:

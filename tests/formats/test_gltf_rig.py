@@ -1,4 +1,4 @@
-"""Morph targets, skins and rigid parts of glTF files, against formulas of their own in double precision."""
+"""Morph targets, skins and rigid parts of glTF files, against independent formulas in double precision."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import pytest
 from gltf_file import SQUARE, SQUARE_TRIANGLES, GltfFile, add_mesh
 
 from dermis.base.errors import DermisError
-from dermis.formats.load import Rigged, load_rigged
+from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.mesh.rig import Rig
 
 UP = np.tile([0.0, 0.5, 0.0], (4, 1))
 OUT = np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0.25], [0, 0, 0.5]])
 
 
-def loaded(path: Path, **options: object) -> tuple[Rigged, Rig]:
+def loaded(path: Path, **options: object) -> tuple[RiggedMesh, Rig]:
     rigged = load_rigged(path, **{"unit_mm": 100.0, **options})
     assert rigged.rig is not None
     np.testing.assert_array_equal(rigged.rig.positions_mm[rigged.mesh.point], rigged.mesh.positions)
@@ -27,7 +27,7 @@ def moved(rig: Rig, weights: dict[str, float], local: np.ndarray | None = None) 
     given = np.zeros(len(rig.targets.names))
     for name, weight in weights.items():
         given[rig.target_index[name]] = weight
-    return rig.posed(given, rig.skeleton.matrices(local) if rig.skeleton else None)
+    return rig.pose(given, rig.skeleton.matrices(local) if rig.skeleton else None)
 
 
 def turn(axis: int, degrees: float, at: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
@@ -122,7 +122,7 @@ def test_the_rest_has_default_weights(tmp_path: Path) -> None:
 
 
 def _lips(apart: float, seam: float = 0.0) -> tuple[GltfFile, int]:
-    """Two squares that touch along a line, which a target parts; each is split in two by a seam of uv."""
+    """Return two squares that touch along a line and are separated by a target; a uv seam splits each."""
     file = GltfFile()
     upper, lower = SQUARE, SQUARE - [0, 1, 0]
     places = np.vstack([upper, lower, upper - [-1, 0, 0], lower - [-1, 0, 0]])
@@ -161,7 +161,7 @@ POLE_TRIANGLES = np.array(
 
 
 def _arm(file: GltfFile, bind: np.ndarray | None = None, **more: object) -> GltfFile:
-    """A pole on two joints below a node; the mesh's own node is to be ignored."""
+    """Return a pole on two joints below a node; the node of its mesh has no effect."""
     share = np.clip((POLE[:, 1] - 1) / 2, 0, 1)
     joints = np.zeros((10, 4))
     joints[:, :2] = 1, 0
@@ -189,7 +189,7 @@ def _world() -> np.ndarray:
 
 
 def _formula(rest: np.ndarray, bind: np.ndarray, lean: float) -> np.ndarray:
-    """The specification's: morph, then the joints' matrices after their inverse bind matrices."""
+    """Evaluate the specification: morph, then inverse bind matrices, then joint matrices."""
     points = np.column_stack([POLE, np.ones(10)])
     points[:, 2] += lean * POLE[:, 1] / 10
     share = np.clip((POLE[:, 1] - 1) / 2, 0, 1)[:, None, None]
@@ -197,7 +197,7 @@ def _formula(rest: np.ndarray, bind: np.ndarray, lean: float) -> np.ndarray:
     return np.einsum("vij,vj->vi", matrices, points)[:, :3]
 
 
-def _by_vertex(rigged: Rigged, points: np.ndarray) -> np.ndarray:
+def _by_vertex(rigged: RiggedMesh, points: np.ndarray) -> np.ndarray:
     return points[rigged.mesh.point]
 
 
@@ -243,8 +243,8 @@ def test_eight_influences_become_the_four_largest(tmp_path: Path) -> None:
         best = np.argsort(-weights[vertex])[:4]
         expected = dict(zip([names[joints[vertex, k]] for k in best], weights[vertex, best], strict=True))
         bones = [rig.skeleton.names[k] for k in rig.skeleton.bone[point]]
-        came = dict(zip(bones, rig.skeleton.weight[point].tolist(), strict=True))
-        assert came == pytest.approx({k: v / sum(expected.values()) for k, v in expected.items()}, abs=1e-4)
+        actual = dict(zip(bones, rig.skeleton.weight[point].tolist(), strict=True))
+        assert actual == pytest.approx({k: v / sum(expected.values()) for k, v in expected.items()}, abs=1e-4)
 
 
 def _clip(file: GltfFile, node: int, path: str = "rotation") -> None:
@@ -255,7 +255,7 @@ def _clip(file: GltfFile, node: int, path: str = "rotation") -> None:
 
 
 def test_rigid_meshes_follow_the_bone_above_them(tmp_path: Path) -> None:
-    """An eye below the head's joint, a hat below a node that a clip moves, and a wall that nothing moves."""
+    """The meshes are an eye below a joint, a hat below an animated node, and a static wall."""
     file = _arm(GltfFile(), np.linalg.inv(_world()))
     small = [add_mesh(file, 0.1 * SQUARE + [0, 0, k]) for k in (1, 2, 3)]
     eye, hat, wall = (file.add("nodes", mesh=mesh, name=f"mesh {mesh}") for mesh in small)
@@ -341,7 +341,7 @@ def test_a_bone_without_extent_is_refused_where_points_follow_it(tmp_path: Path,
     given["WEIGHTS_0"] = file.numbers(np.tile([share, 1 - share, 0, 0], (10, 1)))
     path = file.write(tmp_path / "a.gltf", 0)
     if share:
-        with pytest.raises(DermisError, match=r"a\.gltf: .*bones with an extent, but 'head' is scaled"):
+        with pytest.raises(DermisError, match=r"a\.gltf: .*bones with a scale above 0, but 'head' has"):
             load_rigged(path, unit_mm=100)
     else:
         _, rig = loaded(path)

@@ -1,4 +1,4 @@
-"""Heads written as glTF with all that moves them: sound files that read back as they were."""
+"""Heads written as glTF with their rigs: valid files that are read back unchanged."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 from rigged_head import write_rigged_head
 
+from dermis.formats.deformable_mesh import DeformableMesh, influences
 from dermis.formats.gltf.write import encode_head
-from dermis.formats.moved_points import MovedPoints, influences
 from dermis.human.person import Human
 from dermis.images.colour import decode_srgb_levels
-from dermis.images.io import Picture, read_image
+from dermis.images.io import EmbeddedPicture, read_image
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -46,7 +46,7 @@ def written(head: Head, path: Path, **more: Any) -> Path:
 
 
 def posed_mm(head: Head, pose: Pose) -> np.ndarray:
-    """(v, 3) the vertices in a pose."""
+    """Return the posed vertices, (v, 3)."""
     rig = head.control
     return np.asarray(rig.points_mm(pose.motion(rig))[head.mesh.point])
 
@@ -65,7 +65,7 @@ def test_the_same_head_is_the_same_file(rigged: Head) -> None:
 
 
 def test_targets_rest_where_they_are_told(rigged: Head, tmp_path: Path) -> None:
-    """And a head that rests so is written from its neutral shape again."""
+    """A head with default weights is written from its neutral shape."""
     resting = load_head(written(rigged, tmp_path / "resting.glb", weights={"jawOpen": 0.5}), subdivide=0)
     half = Pose({"jawOpen": 0.5})
     assert np.abs(resting.mesh.positions - posed_mm(rigged, half)).max() < SAME_MM
@@ -125,17 +125,17 @@ def test_normals_turn_with_targets(rigged: Head, tmp_path: Path) -> None:
     document = check_rules(written(rigged, tmp_path / "face.glb"))
     (primitive,) = document.tree["meshes"][0]["primitives"]
     target = primitive["targets"][rigged.targets.index("jawOpen")]
-    normals = document.real(primitive["attributes"]["NORMAL"]) + document.real(target["NORMAL"])
+    normals = document.read_floats(primitive["attributes"]["NORMAL"]) + document.read_floats(target["NORMAL"])
     moved = posed_mm(rigged, Pose({"jawOpen": 1.0})).astype(np.float32)
     meant = vertex_normals(moved, rigged.mesh.point, rigged.mesh.triangles)
     assert np.abs(normals - meant).max() < 0.003
-    assert np.abs(document.real(target["NORMAL"])).max() > 0.2
+    assert np.abs(document.read_floats(target["NORMAL"])).max() > 0.2
 
 
 def test_four_bones_are_those_that_miss_least() -> None:
-    """Beside the strongest four of a point, by the sum of squares over a few turns."""
-    points = MovedPoints(Human().head())
-    rig, finer = points.rig, points.finer
+    """Chosen bones are compared with the four largest weights, by squared distance over a few rotations."""
+    points = DeformableMesh(Human().head())
+    rig, finer = points.rig, points.refinement
     assert finer is not None and rig.skeleton is not None
     bone, share = influences(rig, finer)
     assert share.min() >= 0 and np.abs(share.sum(axis=1) - 1).max() < 1e-12
@@ -179,7 +179,7 @@ def test_maps_read_back(tmp_path: Path) -> None:
 
 
 def test_other_programs_get_plain_materials(tmp_path: Path) -> None:
-    """Roughness is perceptual in the green of its picture; slopes are a normal map with green up."""
+    """Roughness is perceptual in the green channel; slopes become a normal map with green up."""
     slopes = np.zeros((SIDE, SIDE, 2), np.float32)
     slopes[..., 1] = 0.5
     maps = Maps(height=np.ones((SIDE, SIDE), np.float32), roughness=np.full((SIDE, SIDE), 0.25, np.float32))
@@ -189,7 +189,7 @@ def test_other_programs_get_plain_materials(tmp_path: Path) -> None:
 
     def texel(texture: dict[str, int]) -> list[int]:
         image = document.tree["images"][document.tree["textures"][texture["index"]]["source"]]
-        picture = Picture(image["name"], bytes(document.view(image["bufferView"])))
+        picture = EmbeddedPicture(image["name"], bytes(document.read_view(image["bufferView"])))
         return list(map(int, read_image(picture)[3, 3]))
 
     assert texel(material["pbrMetallicRoughness"]["metallicRoughnessTexture"]) == [0, 128, 0]

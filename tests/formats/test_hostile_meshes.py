@@ -1,4 +1,4 @@
-"""Mesh files that ask for more than any head has, or for other files: refused, soon and by name."""
+"""Mesh files that are too large or reference other files are refused quickly, by name."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_file import GltfFile, add_mesh
+from loaded_mesh import load_mesh
 from small_head import obj_text
 
 from dermis.base.errors import DermisError
 from dermis.formats.gltf.animations import read_clip
 from dermis.formats.gltf.embedded import embedded_maps
-from dermis.formats.load import load_mesh, load_rigged
+from dermis.formats.load import load_rigged
 from dermis.formats.motion.sequence import FrameReader
 from dermis.formats.obj import obj_maps, read_materials
 from dermis.images.codecs import encode_png
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.timeout(60)  # what takes more than linear time takes m
 
 
 def refused(read: Callable[[Path], object], path: Path) -> str:
-    """What is said of a file, which is named."""
+    """Return the error message for a file after checking that it names the file."""
     with pytest.raises(DermisError) as caught:
         read(path)
     assert path.name in str(caught.value)
@@ -117,8 +118,8 @@ PLY += "end_header\n"
     [
         (PLY.format(3, "property float x\n" * 100_000, 1), "does not begin or end"),
         (PLY.format(3, "property float x\n" * 1000, 1), "at most 256 properties"),
-        (PLY.format(4_000_000_000, "property float x\n", 1), "elements called 'vertex'"),
-        (PLY.format(3, "property float x\n", 10**9), "elements called 'face'"),
+        (PLY.format(4_000_000_000, "property float x\n", 1), "elements named 'vertex'"),
+        (PLY.format(3, "property float x\n", 10**9), "elements named 'face'"),
         (PLY.format("many", "property float x\n", 1), "a name and a number"),
     ],
 )
@@ -165,7 +166,7 @@ def _sparse(file: GltfFile, node: int) -> list[int]:
 
 
 def _again_and_again(file: GltfFile, node: int) -> list[int]:
-    """Four hundred times the same target of a hundred thousand vertices, which the file has not."""
+    """Return four hundred uses of one target of a hundred thousand vertices without data."""
     zeros = {"componentType": 5126, "count": 100_000, "type": "VEC3"}
     file.tree["accessors"] += [zeros]
     one = len(file.tree["accessors"]) - 1
@@ -218,7 +219,7 @@ def test_numbers_of_things_that_there_are_not(tmp_path: Path, index: object) -> 
 def test_a_relief_that_is_no_length_is_refused(tmp_path: Path, relief: object) -> None:
     file, node = square()
     file.tree["materials"] = [{"extras": {"dermis": {"height_mm": relief}}}]
-    assert "sound textures" in refused(embedded_maps, file.write(tmp_path / "a.gltf", node))
+    assert "valid textures" in refused(embedded_maps, file.write(tmp_path / "a.gltf", node))
 
 
 @pytest.mark.parametrize(
@@ -253,7 +254,7 @@ def test_nothing_outside_of_its_folder_is_read_for_a_gltf_file(tmp_path: Path, u
 
 def test_no_pipe_and_no_endless_name_is_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    for uri, words in (("pipe", "no regular file"), ("a" * 5000, "own folder|cannot be read")):
+    for uri, words in (("pipe", "not a regular file"), ("a" * 5000, "own folder|cannot be read")):
         file, node = square()
         path = file.write(tmp_path / "a.gltf", node)
         path.write_text(json.dumps(json.loads(path.read_text()) | {"buffers": [{"uri": uri}]}))

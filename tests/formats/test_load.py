@@ -1,4 +1,4 @@
-"""Tiny files written here and read back: OBJ, PLY, and what is no mesh at all; glTF has its own tests."""
+"""Tiny OBJ and PLY files that are written and read back, and files that are not meshes."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
-from dermis.formats.load import load_mesh
 from dermis.formats.mesh_checks import check_head_height
 from dermis.scene.heads import load_head
 

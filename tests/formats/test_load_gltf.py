@@ -1,4 +1,4 @@
-"""glTF: transforms, units, uv in every encoding, and what is refused rather than misread."""
+"""Loading of glTF: transforms, units, uv in all encodings, and refused files."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
-from dermis.formats.load import load_mesh
 
 
 def _glb(path: Path, *, material: str | None = "Skin", mirror: bool = False, drop_uv: bool = False) -> Path:
-    """A triangle with uv, shifted by its node, as trimesh writes it."""
+    """Write a triangle with uv, translated by its node, with trimesh."""
     import trimesh
 
     skin = trimesh.visual.material.PBRMaterial(name=material or "x", baseColorFactor=[255, 51, 0, 255])
@@ -38,7 +38,7 @@ def _glb(path: Path, *, material: str | None = "Skin", mirror: bool = False, dro
 
 
 def _by_height(mesh):
-    """uv of the lowest and of the highest vertices."""
+    """Return uv of the lowest and of the highest vertices."""
     y = mesh.positions[:, 1]
     return mesh.uv[y.argmin()], mesh.uv[y.argmax()]
 
@@ -74,7 +74,7 @@ def test_glb_without_material_keeps_its_uv(tmp_path: Path) -> None:
 
 
 def test_a_group_without_a_name_is_called_after_the_file(tmp_path: Path) -> None:
-    """Also when a copy of the file was read before under another name."""
+    """The name is correct also if a copy of the file was read before under another name."""
     nameless = _glb(tmp_path / "first.glb", material=None).read_bytes().replace(b'"face"', b'""    ')
     for name in ("first", "second"):
         path = tmp_path / f"{name}.glb"
@@ -83,7 +83,7 @@ def test_a_group_without_a_name_is_called_after_the_file(tmp_path: Path) -> None
 
 
 def _gltf(path: Path, **changes: object) -> Path:
-    """A .gltf with 16-bit integer uv, its numbers in a .bin beside it."""
+    """Write a .gltf with 16-bit integer uv, and its buffer in a .bin file."""
     numbers = np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], dtype="<f4").tobytes()
     numbers += np.array([[0, 13107], [65535, 13107], [0, 65535]], dtype="<u2").tobytes()
     path.with_suffix(".bin").write_bytes(numbers)

@@ -1,4 +1,4 @@
-"""What each map file becomes, and which files are refused by name."""
+"""Maps from picture files, and files that are refused by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.formats import maps as map_pixels
 from dermis.formats.maps import load_maps
-from dermis.images.filters import mip_chain, without_steps
+from dermis.images.filters import mip_chain, smooth_quantisation
 from dermis.images.io import read_image, write_exr, write_png
 from dermis.mesh.maps import Maps
 
@@ -57,7 +57,7 @@ def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
     for path in (deep, tmp_path / "h.exr"):
         np.testing.assert_allclose(load_maps(height=path, height_mm=0.025).height, relief, atol=1e-6)
     eight = load_maps(height=_png(tmp_path / "8.png", levels), height_mm=0.025).height
-    np.testing.assert_allclose(eight, without_steps(relief), atol=1e-6)
+    np.testing.assert_allclose(eight, smooth_quantisation(relief), atol=1e-6)
 
 
 def test_a_large_file_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,8 +107,8 @@ def test_a_large_file_of_another_kind_is_refused_each_time(tmp_path: Path) -> No
 def test_steps_of_8_bits_go_and_slopes_stay() -> None:
     ramp = np.arange(64)[None, :] * 0.13 + np.arange(48)[:, None] * 0.07
     inside = (slice(4, -4), slice(4, -4))
-    np.testing.assert_allclose(without_steps(ramp)[inside], ramp[inside], atol=1e-5)
-    across = np.diff(without_steps(np.round(ramp))[inside], axis=1)
+    np.testing.assert_allclose(smooth_quantisation(ramp)[inside], ramp[inside], atol=1e-5)
+    across = np.diff(smooth_quantisation(np.round(ramp))[inside], axis=1)
     assert across.std() < np.diff(np.round(ramp)[inside], axis=1).std() / 3
 
 
@@ -148,7 +148,7 @@ def test_grey_maps_are_plain_numbers(tmp_path: Path) -> None:
 
 
 def _refused(folder: Path) -> dict[str, tuple[str, np.ndarray, str]]:
-    """By file name: role, pixels, what the message must say."""
+    """Return role, pixels and expected message by file name."""
     rng = np.random.default_rng(1)
     colour = rng.integers(0, 256, (*SHAPE, 3)).astype(np.uint8)
     skin = np.broadcast_to(np.array([193, 153, 140], np.uint8), (*SHAPE, 3)).copy()
@@ -220,7 +220,7 @@ def test_head_scan_has_no_other_normal_map() -> None:
 
 @pytest.mark.parametrize("side", [16, 100, 2048])
 def test_mean_colour_is_that_of_painted_texels(side: int) -> None:
-    """Of small maps too; asked for in every frame, it is worked out once."""
+    """It is correct for small maps, too, and computed once."""
     colour = np.random.default_rng(4).uniform(0.1, 0.9, (side, side, 3)).astype(np.float32)
     colour[:, side // 2 :] = 0.0
     maps = Maps(colour=colour)

@@ -1,4 +1,4 @@
-"""Pictures that the materials of an OBJ file name, and placeholders of a few texels."""
+"""Pictures referenced by OBJ materials, and placeholders of a few texels."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_the_skin_has_the_map_and_not_the_eyes(tmp_path: Path) -> None:
 def test_maps_of_a_few_texels_are_drawn(
     shape: tuple[int, int], tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Uniform ones of any size give the picture of one texel."""
+    """Uniform maps of any size result in the picture of a map with one texel."""
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     mtl = "map_Kd c.png\nmap_Ks s.png\nmap_Pr s.png\nbump s.png"
     grey = np.full(shape, 100, np.uint8)

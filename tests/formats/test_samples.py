@@ -1,4 +1,4 @@
-"""The registry is well formed, and fetching trusts nothing but the hash."""
+"""Registry of samples, and downloads that are verified by hash."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.formats import samples
-from dermis.formats.samples import SAMPLES, Sample, SampleFile, cached, fetch
+from dermis.formats.samples import SAMPLES, Sample, SampleFile, fetch, is_available
 
 CONTENT = b"a small environment"
 
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache, and no DERMIS_DATA."""
+    """Return an empty cache folder, without DERMIS_DATA."""
     monkeypatch.delenv("DERMIS_DATA", raising=False)
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "cache" / "dermis"))
     return tmp_path / "cache" / "dermis" / "samples"
@@ -31,7 +31,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A DERMIS_DATA folder whose lebombo is another file."""
+    """Return a DERMIS_DATA folder in which lebombo is another file."""
     (tmp_path / "env").mkdir()
     (tmp_path / "env" / "lebombo_1k.hdr").write_bytes(b"#?RADIANCE but not that one")
     monkeypatch.setenv("DERMIS_DATA", str(tmp_path))
@@ -49,7 +49,7 @@ def _register(monkeypatch: pytest.MonkeyPatch, sample: Sample) -> None:
 
 @pytest.fixture
 def home(tmp_path: Path) -> Iterator[str]:
-    """The address of a server on this machine that has tiny.hdr."""
+    """Yield the address of a local server with tiny.hdr."""
 
     class Quiet(SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
@@ -93,21 +93,21 @@ def test_registry_cannot_be_changed() -> None:
 
 
 def test_unknown_sample_is_refused_with_the_known_ones() -> None:
-    for ask in (fetch, cached):
+    for ask in (fetch, is_available):
         with pytest.raises(DermisError, match=r"'mine'.*lee_perry_smith, royal_esplanade, lebombo"):
             ask("mine")
 
 
 @pytest.mark.usefixtures("data")
 def test_other_file_in_the_data_folder_is_refused() -> None:
-    assert not cached("lebombo")
+    assert not is_available("lebombo")
     with pytest.raises(DermisError, match=r"lebombo_1k\.hdr.*differs"):
         fetch("lebombo")
 
 
 @pytest.mark.usefixtures("data")
 def test_missing_file_in_the_data_folder_is_refused() -> None:
-    assert not cached("royal_esplanade")
+    assert not is_available("royal_esplanade")
     with pytest.raises(DermisError, match=r"royal_esplanade_1k\.hdr.*not there"):
         fetch("royal_esplanade")
 
@@ -120,7 +120,7 @@ def test_offline_says_how_to_get_the_files(cache: Path, monkeypatch: pytest.Monk
         raise requests.exceptions.ConnectionError("no route to host")
 
     monkeypatch.setattr(pooch.HTTPDownloader, "__call__", no_network)
-    assert not cached("lee_perry_smith")
+    assert not is_available("lee_perry_smith")
     with pytest.raises(DermisError) as caught:
         fetch("lee_perry_smith")
     message = str(caught.value)
@@ -143,7 +143,7 @@ def test_download_is_kept(
     assert "tiny.hdr" in shown.err
     assert shown.out == ""
     monkeypatch.delattr(pooch, "retrieve")  # from here on, no network
-    assert cached("tiny")
+    assert is_available("tiny")
     assert fetch("tiny") == paths
 
 
@@ -160,7 +160,7 @@ def test_damaged_file_in_the_cache_is_fetched_again(
         os.mkfifo(file)
     else:
         file.symlink_to("nowhere")
-    assert not cached("tiny")
+    assert not is_available("tiny")
     assert fetch("tiny")["environment"].read_bytes() == CONTENT
 
 
@@ -180,5 +180,5 @@ def test_file_gone_from_home_is_refused(cache: Path, home: str, monkeypatch: pyt
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 @pytest.mark.parametrize("name", SAMPLES)
 def test_data_folder_has_every_sample(name: str) -> None:
-    assert cached(name)
+    assert is_available(name)
     assert all(path.is_file() for path in fetch(name).values())

@@ -1,11 +1,11 @@
-"""Mips keep the mean, and smoothing has its weights."""
+"""Mip levels preserve the mean, and smoothing has binomial weights."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from dermis.images.filters import mip_chain, without_steps
+from dermis.images.filters import mip_chain, smooth_quantisation
 
 
 @pytest.mark.parametrize("shape", [(16, 16, 3), (17, 31, 3), (5, 64, 1), (1, 7, 2), (33, 33), (1, 1, 4)])
@@ -38,4 +38,4 @@ def test_steps_are_smoothed_by_binomial_weights(shape: tuple[int, int]) -> None:
     want = np.pad(height, 3, "edge")
     for axis in (0, 1):
         want = np.apply_along_axis(np.convolve, axis, want, weights, "valid")
-    np.testing.assert_allclose(without_steps(height), want, atol=1e-6)
+    np.testing.assert_allclose(smooth_quantisation(height), want, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Pictures that ask for more than they hold: refused by their headers, or decoded in little memory."""
+"""Pictures with misleading headers are refused, or decoded in little memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def radiance(width: int, height: int, rows: bytes) -> bytes:
 
 
 def jpeg(scans: int) -> bytes:
-    """Twice as high as wide, with as many scans, all but the first ones empty."""
+    """Return a JPEG twice as high as wide with so many scans, all but the first empty."""
     import PIL.Image
 
     stream = io.BytesIO()
@@ -45,7 +45,7 @@ def jpeg(scans: int) -> bytes:
 
 
 def exr(folder: Path, width: int, height: int, layers: int = 0) -> bytes:
-    """A small file whose header tells another size."""
+    """Return a small EXR file whose header has another size."""
     more = {f"layer {k}": np.ones((4, 4), np.float32) for k in range(layers)}
     write_exr(folder / "small.exr", np.ones((4, 4, 3), np.float32), more)
     data = (folder / "small.exr").read_bytes()
@@ -62,7 +62,7 @@ def test_more_pixels_than_any_picture_has_are_refused_by_the_header(tmp_path: Pa
         "wide.exr": exr(tmp_path, 1 << 28, 1),
     }
     (tmp_path / name).write_bytes(files[name])
-    with pytest.raises(DermisError, match=rf"{name}: expected a picture of as many pixels as 8192 x 8192"):
+    with pytest.raises(DermisError, match=rf"{name}: expected a picture of at most 8192 x 8192 pixels"):
         read_image(tmp_path / name)
 
 
@@ -72,7 +72,7 @@ def test_more_pixels_than_any_picture_has_are_refused_by_the_header(tmp_path: Pa
         ("none.hdr", radiance(0, 0, b""), "0 x 0"),
         ("lit.hdr", b"#?RADIANCE\nEXPOSURE=0" + radiance(8, 1, bytes(32))[10:], "EXPOSURE"),
         ("dark.hdr", b"#?RADIANCE\nEXPOSURE=nan" + radiance(8, 1, bytes(32))[10:], "EXPOSURE"),
-        ("empty.hdr", radiance(8, 1, b"\2\2\0\10" + b"\0" * 64), "run is empty|ends in the middle"),
+        ("empty.hdr", radiance(8, 1, b"\2\2\0\10" + b"\0" * 64), "run is empty|is truncated"),
         ("scans.jpg", jpeg(100), "scans"),
     ],
 )
@@ -83,14 +83,14 @@ def test_headers_that_mean_nothing_are_refused(tmp_path: Path, name: str, data: 
 
 
 def test_layers_of_an_exr_file_count(tmp_path: Path) -> None:
-    """The library decodes all of them, whichever are wanted."""
+    """The library decodes all layers, including unused ones."""
     (tmp_path / "a.exr").write_bytes(exr(tmp_path, 2048, 1024, layers=94))
     with pytest.raises(DermisError, match=r"a\.exr: .*all its channels have 203 million numbers"):
         read_image(tmp_path / "a.exr")
 
 
 def peak_of(path: Path, call: str) -> float:
-    """By how many times the result's bytes the memory grew at its highest while a child made it."""
+    """Return the peak memory of a child process that makes a call, relative to the size of its result."""
     code = f"""
 import resource, sys
 from dermis.images import codecs, colour, hdr
@@ -121,7 +121,7 @@ def test_little_more_than_what_is_kept_is_in_memory(tmp_path: Path, kind: int, r
 
 
 def test_coded_radiance_takes_one_call_a_run(tmp_path: Path) -> None:
-    """Runs of two pixels alternate with two that are listed."""
+    """Runs of two pixels alternate with two literal pixels."""
     width, height = 4096, 32
     row = b"\2\2" + struct.pack(">H", width) + b"\x82\x82\2\1\3" * width
     (tmp_path / "a.hdr").write_bytes(radiance(width, height, row * height))

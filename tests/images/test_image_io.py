@@ -1,4 +1,4 @@
-"""Picture files come back bit for bit, bad ones are named, and nothing half-written stays."""
+"""Picture files are read back bit for bit, errors name the file, and no partial files remain."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_exr_layers_carry_their_names(tmp_path: Path) -> None:
 
 
 def _radiance(rgbe: np.ndarray, exposure: str = "") -> bytes:
-    """Scanlines coded with one run and one dump for each channel, so that both are read."""
+    """Return scanlines with one run and one literal sequence per channel."""
     height, width = rgbe.shape[:2]
     rows = [f"#?RADIANCE\n{exposure}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode()]
     for row in rgbe:

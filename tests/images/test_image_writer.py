@@ -1,4 +1,4 @@
-"""Pictures written by threads are the pictures, and what goes wrong is told."""
+"""Pictures written on other threads, and errors of writing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_many_pictures_are_all_written(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_tried_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trial makes a file and removes it, which takes longer than a frame."""
+    """Checking a folder creates and deletes a file, which takes longer than a frame."""
     tried: list[Path] = []
     check = writing.check_output
     monkeypatch.setattr(writing, "check_output", lambda path: tried.append(path) or check(path))

@@ -1,4 +1,4 @@
-"""Movies have the frames that went in, at their exact times, in known colours; or there is none."""
+"""Movies have all frames, at exact times and in known colours, or there is no file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.images.movie import MovieWriter, check_movie, exact_rate
+from dermis.images.movie import MovieWriter, check_movie, parse_frame_rate
 
 SIZE = (64, 48)
 COLOURS = np.random.default_rng(3).integers(0, 256, (30, 3))
@@ -31,7 +31,7 @@ def _write(path: Path, rate: Any = 30, crf: int = 18) -> Path:
 
 @pytest.mark.parametrize("rate", [30, "24000/1001", 12.5, 59.94])
 def test_frame_k_lies_at_k_over_the_rate(tmp_path: Path, rate: Any) -> None:
-    exact = exact_rate(rate)
+    exact = parse_frame_rate(rate)
     with av.open(str(_write(tmp_path / "a.mp4", rate))) as file:
         stream = file.streams.video[0]
         times = [frame.pts * frame.time_base for frame in file.decode(stream)]
@@ -73,13 +73,13 @@ def test_a_lower_factor_makes_a_better_movie(tmp_path: Path) -> None:
     ],
 )
 def test_rates_are_ratios(given: Any, exact: Fraction) -> None:
-    assert exact_rate(given) == exact
+    assert parse_frame_rate(given) == exact
 
 
 @pytest.mark.parametrize("given", ["", "0", "-30", "nan", "inf", "fast", "30/0", "1e9"])
 def test_what_is_no_rate(given: str) -> None:
     with pytest.raises(DermisError, match=r"^--fps: expected frames a second .*24000/1001"):
-        exact_rate(given, "--fps")
+        parse_frame_rate(given, "--fps")
 
 
 def test_an_error_leaves_what_was_there(tmp_path: Path) -> None:
@@ -98,16 +98,16 @@ def test_a_disk_that_fills_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(MovieWriter, "_encode", full)
-    with pytest.raises(DermisError, match=r"a\.mp4: expected a place .*No space left"):
+    with pytest.raises(DermisError, match=r"a\.mp4: expected a writable path.*No space left"):
         _write(tmp_path / "a.mp4")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_cannot_be_a_movie_is_told_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.mp4"
-    with pytest.raises(DermisError, match=r"--size: expected even sides.*63x48 came\. Take 64x48"):
+    with pytest.raises(DermisError, match=r"--size: expected even width and height.*got 63x48\. Use 64x48"):
         check_movie(path, (63, 48))
-    with pytest.raises(DermisError, match=r"--crf: expected a whole number from 0 to 51 .*, but 52 came"):
+    with pytest.raises(DermisError, match=r"--crf: expected a whole number from 0 to 51 .*, but got 52"):
         check_movie(path, SIZE, 52)
     with pytest.raises(DermisError, match=r"ends in \.mp4"):
         check_movie(tmp_path / "a.avi", SIZE)

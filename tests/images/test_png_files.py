@@ -1,4 +1,4 @@
-"""PNG files of rows that are differences from the one above, against other decoders."""
+"""PNG files with the up filter, against other decoders."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from png_bytes import png
 
-from dermis.base.extras import needed
-from dermis.images.codecs import decode_rows, encode_png
+from dermis.base.extras import import_extra
+from dermis.images.codecs import decode_up_filtered_png, encode_png
 from dermis.images.sizes import TooLargeError
 
 UP, PAETH = 2, 4
@@ -20,38 +20,38 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
-@pytest.mark.parametrize("quick", [False, True])
+@pytest.mark.parametrize("use_isal", [False, True])
 @pytest.mark.parametrize("channels", [1, 3, 4])
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_what_was_written_comes_back(
-    rng: np.random.Generator, kind: type, channels: int, quick: bool
+    rng: np.random.Generator, kind: type, channels: int, use_isal: bool
 ) -> None:
     levels = rng.integers(0, np.iinfo(kind).max + 1, (7, 5, channels)).astype(kind)
-    found = decode_rows(encode_png(levels, 1, quick))
+    found = decode_up_filtered_png(encode_png(levels, 1, use_isal))
     assert found is not None and found.dtype == kind
     np.testing.assert_array_equal(found, levels)
 
 
 def test_another_decoder_sees_the_same_16_bits(rng: np.random.Generator) -> None:
     levels = rng.integers(0, 65536, (6, 9, 3)).astype(np.uint16)
-    data = encode_png(levels, quick=True)
-    with needed("av", "a test").open(io.BytesIO(data), format="png_pipe") as container:
+    data = encode_png(levels, use_isal=True)
+    with import_extra("av", "a test").open(io.BytesIO(data), format="png_pipe") as container:
         other = next(container.decode(video=0)).to_ndarray(format="rgb48le")
     np.testing.assert_array_equal(other, levels)
-    np.testing.assert_array_equal(decode_rows(data), levels)
+    np.testing.assert_array_equal(decode_up_filtered_png(data), levels)
 
 
 def test_another_decoder_sees_the_same_8_bits(rng: np.random.Generator) -> None:
     from PIL import Image
 
     levels = rng.integers(0, 256, (6, 9, 4)).astype(np.uint8)
-    data = encode_png(levels, quick=True)
+    data = encode_png(levels, use_isal=True)
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(data))), levels)
 
 
 def test_the_quick_way_makes_noise_no_larger_than_the_usual_one_does() -> None:
     noise = np.random.default_rng(3).normal(30000, 300, (64, 64, 3)).astype(np.uint16)
-    assert len(encode_png(noise, quick=True)) < len(encode_png(noise, 1))
+    assert len(encode_png(noise, use_isal=True)) < len(encode_png(noise, 1))
 
 
 @pytest.mark.parametrize(
@@ -65,15 +65,15 @@ def test_the_quick_way_makes_noise_no_larger_than_the_usual_one_does() -> None:
     ids=["other filter", "palette", "colour that is clear", "JPEG"],
 )
 def test_other_forms_are_left_to_others(data: bytes) -> None:
-    assert decode_rows(data) is None
+    assert decode_up_filtered_png(data) is None
 
 
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (png(2, 2, 8, 2, bytes(13)), "cut off"),
+        (png(2, 2, 8, 2, bytes(13)), "truncated"),
         (png(2, 2, 8, 2, bytes(15)), "more than it says"),
-        (png(2, 2, 8, 2, bytes(14))[:-12], "cut off"),
+        (png(2, 2, 8, 2, bytes(14))[:-12], "truncated"),
         (png(2, 2, 8, 2, bytes(14)).replace(b"IDAT", b"IDAS"), "damaged"),
         (png(9000, 9000, 8, 2, b""), "9000 x 9000"),
         (png(0, 1, 8, 2, b""), "0 x 1"),
@@ -81,4 +81,4 @@ def test_other_forms_are_left_to_others(data: bytes) -> None:
 )
 def test_damaged_ones_are_refused(data: bytes, said: str) -> None:
     with pytest.raises((ValueError, TooLargeError), match=said):
-        decode_rows(data)
+        decode_up_filtered_png(data)

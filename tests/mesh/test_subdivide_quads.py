@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded_mesh import load_mesh
 from scipy.interpolate import BSpline
 
-from dermis.atlas.raster import chart_uv_area, charts
-from dermis.formats.load import load_mesh
+from dermis.atlas.raster import chart_uv_area, find_charts
 from dermis.formats.mesh_checks import check_mesh
-from dermis.mesh.geometry import edges, halves, triangle_areas
+from dermis.mesh.geometry import edges, split_quads, triangle_areas
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import uv_sphere
 from dermis.mesh.subdivide import polygons, subdivide
@@ -24,7 +24,7 @@ CUBE = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 
 
 
 def _quad_mesh(positions: np.ndarray, quads: np.ndarray, uv: np.ndarray | None = None) -> Mesh:
-    triangles, uv = halves(np.asarray(quads)), np.zeros((len(positions), 2)) if uv is None else uv
+    triangles, uv = split_quads(np.asarray(quads)), np.zeros((len(positions), 2)) if uv is None else uv
     pairs = np.arange(len(triangles)).reshape(-1, 2)
     return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN, quads=pairs)
 
@@ -141,7 +141,7 @@ def test_uv_is_bilinear_and_its_seams_stay() -> None:
     corners_at = np.bincount(finer.point)
     assert (corners_at == 4).sum() == 1 and (corners_at == 2).sum() == 2 * (32 + 16) - 2
     np.testing.assert_allclose(
-        chart_uv_area(torus, charts(torus)), chart_uv_area(finer, charts(finer)), rtol=1e-5
+        chart_uv_area(torus, find_charts(torus)), chart_uv_area(finer, find_charts(finer)), rtol=1e-5
     )
     uneven = _quad_mesh(CORNERS[:4], [[0, 2, 3, 1]], np.array([[0, 0], [0.1, 0.5], [0.6, 0.2], [1, 1]]))
     np.testing.assert_allclose(
@@ -153,7 +153,7 @@ def test_triangles_among_quads_become_three_quads() -> None:
     # a cube whose lid is a pyramid
     positions = np.vstack((CORNERS, [[0, 0, 2]]))
     triangles = [[1, 5, 8], [5, 7, 8], [7, 3, 8], [3, 1, 8]]
-    corner = np.vstack((halves(CUBE[:5]), triangles))
+    corner = np.vstack((split_quads(CUBE[:5]), triangles))
     two = (*SKIN, Material("hat", "opaque"))
     mesh = build_mesh(
         positions, np.zeros((9, 2)), corner, [0] * 10 + [1] * 4, two, quads=np.arange(10).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Light that Monte Carlo counted, for the tests of fits."""
+"""Monte Carlo results as targets of fits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.optics.fits.targets import RingTarget
 
 @pytest.fixture(scope="session")
 def counted(sample_folder: Path) -> Callable[[str], RingTarget]:
-    """Rings of a case such as "dj3/g0.8" in three channels, per incident power."""
+    """Return a function from a case such as "dj3/g0.8" to its rings in three channels, per incident power."""
     stored = np.load(sample_folder / "reference" / "data" / "mc_profiles.npz")
 
     def rings(case: str) -> RingTarget:
@@ -29,5 +29,5 @@ def counted(sample_folder: Path) -> Callable[[str], RingTarget]:
 
 @pytest.fixture(scope="session")
 def counted_skin(counted: Callable[[str], RingTarget]) -> RingTarget:
-    """The medium skin1 with isotropic scattering."""
+    """Return the rings of skin1 with isotropic scattering."""
     return counted("skin1/g0")

@@ -1,4 +1,4 @@
-"""Media that several tests use, and the supplied truth about them."""
+"""Media that several tests use, and their supplied reference results."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ TWO_LAYER = Medium(
 
 
 def slab(alpha_prime: float, thickness_mm: float = np.inf, eta: float = 1.4) -> Medium:
-    """A homogeneous slab with a mean free path of 1 mm."""
+    """Return a homogeneous slab with a mean free path of 1 mm."""
     layer = Layer(np.array([1.0 - alpha_prime]), np.array([alpha_prime]), thickness_mm)
     return Medium(f"slab {alpha_prime:g}", (layer,), eta)
 
 
 def case(name: str) -> Medium:
-    """The medium of a row of the reference tables, one channel."""
+    """Return the one-channel medium of a row of the reference tables."""
     if name.startswith("two_layer"):
         return TWO_LAYER
     medium = media()[name[:-2]]
@@ -30,12 +30,12 @@ def case(name: str) -> Medium:
 
 
 def table(folder: Path, name: str) -> Any:
-    """A CSV of the reference folder by column."""
+    """Return a CSV file of the reference folder by column."""
     path = folder / "reference" / "data" / name
     return np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
 
 
 def ring_means(edges_mm: Floats, energy: Floats) -> Floats:
-    """Mean of R(r) over each ring [1/mm2]."""
+    """Return the mean of R(r) over each ring [1/mm2]."""
     area = np.pi * np.diff(edges_mm**2)
     return np.asarray(energy / area[:, None])

@@ -1,4 +1,4 @@
-"""Slabs by adding and doubling: energy, photons one by one, the exact half-space."""
+"""Slabs by adding and doubling: energy, a photon simulation, and the exact half-space."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ PHOTONS = 40_000
 
 
 def straight_down(cosine: np.ndarray, share: np.ndarray) -> float:
-    """The nodes stop short of it."""
+    """Extrapolate from the nodes to normal incidence."""
     return float(np.polyval(np.polyfit(cosine[-4:], share[-4:], 3), 1.0))
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_photons_leave_slabs_as_often(eta: float) -> None:
-    """From straight above, what leaves scattered on either side."""
+    """Scattered light on both sides is compared at normal incidence."""
     for depth in (0.5, 2.0, 6.0):
         made = solve_slabs(0.9, depth, eta)
         ends = made.cosine[-4:]  # the nodes stop short of straight down

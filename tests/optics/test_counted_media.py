@@ -1,4 +1,4 @@
-"""Profiles of homogeneous media by tables of photons, against photons of now and against exact totals."""
+"""Profiles from tables of photon counts, against new photon counts and exact totals."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_files_tell_it_too(tmp_path: Path, model: str, counted: bool) -> None:
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 @pytest.mark.parametrize("name", ["skin1", "skin2"])
 def test_flesh_of_such_a_profile_is_its_medium(name: str, eta: float) -> None:
-    """Told from diffusion's widths, it would be up to two thirds denser."""
+    """With the widths of diffusion, the medium would be up to two thirds denser."""
     tissue = of(name, eta)
     profile, layer = fit_profile(tissue, name), tissue.medium.layers[0]
     found = equivalent_medium(profile, profile.albedo, eta).layers[0]

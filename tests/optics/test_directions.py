@@ -1,4 +1,4 @@
-"""The half-space by directions, against H-functions found another way and photons under a surface."""
+"""Angular response of half-spaces, against independent H functions and photon simulations."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_what_scattered_once_is_even_in_the_mean(eta: float) -> None:
 
 
 def test_law_is_nearer_to_the_exact_one_than_a_diffuse_surface() -> None:
-    """Radiance of an index-matched half-space of red skin, all pairs of directions."""
+    """Radiance of an index-matched half-space of red skin is compared for all pairs of directions."""
     albedo = 0.9585
     above = float(half_space.directional_albedo(1.0, albedo))
     law = angular_response([above], 1.0)
@@ -85,7 +85,7 @@ def test_black_skin_has_a_law_of_its_own() -> None:
 
 
 def test_photons_leave_a_refracting_half_space_as_told() -> None:
-    """Light that enters at 81 degrees, by quarters of the squared cosine outside."""
+    """Light enters at 81 degrees; radiance is by quarters of the squared exit cosine."""
     albedo, cosine = 0.68, 0.15
     _, _, walked = returned(cosine, albedo, 1.4, 400_000)
     law = angular_response([float(directional_reflectance(1.0, albedo, 1.4))], 1.4)

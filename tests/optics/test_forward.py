@@ -1,4 +1,4 @@
-"""Media that scatter forward, against photons of the same phase function; alike in all directions at 0."""
+"""Anisotropic media against photons with the same phase function; isotropic for g = 0."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ PHOTONS = 60_000
 
 
 def single(reduced: float, g: float = G) -> float:
-    """Albedo of single scattering of a medium by its reduced one."""
+    """Return the single-scattering albedo of a medium from its reduced albedo."""
     return reduced / (reduced + (1.0 - g) * (1.0 - reduced))
 
 
 def from_above(cosine: np.ndarray, share: np.ndarray) -> float:
-    """The nodes stop short of straight down."""
+    """Extrapolate from the nodes to normal incidence."""
     return float(np.polyval(np.polyfit(cosine[-4:], share[-4:], 3), 1.0))
 
 
@@ -47,7 +47,7 @@ def law_of(reduced: float, eta: float) -> AngularResponse:
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 @pytest.mark.parametrize("reduced", [0.9585, 0.678])
 def test_photons_leave_slabs_as_often(reduced: float, eta: float) -> None:
-    """From straight above, for depths that real skin has from 0.4 to 10 mm."""
+    """Light is at normal incidence; depths correspond to 0.4 to 10 mm of skin."""
     for depth in (0.5, 2.0, 10.0):
         body = ScatteringLayer(1.0 - reduced, reduced / (1.0 - G), depth, G, eta)
         run = trace_slab([body], PHOTONS).per_entering
@@ -98,7 +98,7 @@ def test_a_mean_cosine_of_0_is_the_medium_of_before() -> None:
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 @pytest.mark.parametrize("reduced", [0.9585, 0.678])
 def test_light_at_a_slant_comes_back_as_photons_do(reduced: float, eta: float) -> None:
-    """From 60 and 81 degrees, over light from above."""
+    """Reflectance at 60 and 81 degrees is relative to normal incidence."""
     law = law_of(reduced, eta)
     above, _, _ = returned(1.0, single(reduced), eta, 100_000, g=G)
     for cosine in (0.5, 0.15):
@@ -116,7 +116,7 @@ def test_light_at_a_slant_comes_back_as_photons_do(reduced: float, eta: float) -
 
 
 def test_photons_leave_a_refracting_half_space_as_told() -> None:
-    """Light that enters at 81 degrees, by quarters of the squared cosine outside."""
+    """Light enters at 81 degrees; radiance is by quarters of the squared exit cosine."""
     reduced, cosine, eta = 0.68, 0.15, 1.4
     _, _, walked = returned(cosine, single(reduced), eta, 400_000, g=G)
     square = (np.arange(400) + 0.5) / 400
@@ -144,7 +144,7 @@ def test_photons_leave_a_refracting_half_space_as_told() -> None:
 @pytest.mark.parametrize(("eta", "most"), [(1.0, 0.2), (1.4, 0.02)])
 @pytest.mark.parametrize("reduced", [0.9585, 0.838, 0.678])
 def test_all_pairs_of_directions(reduced: float, eta: float, most: float) -> None:
-    """Radiance below the surface over all pairs, weighed by light that is alike from everywhere."""
+    """Radiance below the surface is weighted by uniform light."""
     a, share, exact = half_space_radiance(reduced, eta, NODES, G)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     slant, weight = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta), np.outer(share, share)
@@ -162,7 +162,7 @@ def test_all_pairs_of_directions(reduced: float, eta: float, most: float) -> Non
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_amounts_of_thin_parts_are_those_of_slabs_cut_one_by_one(eta: float) -> None:
-    """Found with twice as many cosines, and for each thickness; far more than of isotropic media."""
+    """Expected values use twice as many cosines, and one solution per thickness."""
     body, reach, variance = media()["skin1"].with_eta(eta), 12.0, np.array([0.05, 0.5, 5.0, 20.0])
     made, even = solve_thin_parts(body, variance, reach, G), solve_thin_parts(body, variance, reach)
     depth, layer = reach * np.linspace(0.0, 1.0, len(made.directionality))[1:] ** 2, body.layers[0]

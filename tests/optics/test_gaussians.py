@@ -26,7 +26,7 @@ def gaussians(variance: list[float], weight: list[list[float]]) -> GaussianSum:
 
 @st.composite
 def sums(draw: st.DrawFn, most: int = 4) -> GaussianSum:
-    """Sums of a few Gaussians, 1e-4 to 100 mm2 wide, in two channels."""
+    """Draw sums of a few Gaussians, 1e-4 to 100 mm2 wide, in two channels."""
     log_variance = draw(st.lists(st.integers(-40, 20), min_size=1, max_size=most, unique=True))
     weight = st.floats(0.0, 1.0, allow_subnormal=False)
     rows = [[draw(weight), draw(weight)] for _ in log_variance]
@@ -35,7 +35,7 @@ def sums(draw: st.DrawFn, most: int = 4) -> GaussianSum:
 
 
 def test_published_weights_sum_to_one() -> None:
-    """They are printed to three digits, and white light stays white."""
+    """Weights are printed to three digits, and white light stays white."""
     assert np.allclose(load_profile("gpu-gems-3").albedo, 1.0, atol=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""Tables between those at evenly spaced numbers."""
+"""Interpolation between cached tables."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_beyond_the_ends_are_the_ends() -> None:
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_half_spaces_between_steps(eta: float) -> None:
-    """Beside those solved for their own albedo; darker than 0.05 no skin is."""
+    """Interpolated half-spaces are compared with solved ones, for reflectances of skin from 0.05."""
     cosine = np.linspace(0.1, 1.0, 10)
     for albedo in (0.4, 0.73, 0.91, 0.984, 0.9991):
         above = float(directional_reflectance(1.0, albedo, eta))

@@ -1,4 +1,4 @@
-"""Media: named ones, files, and what is refused."""
+"""Media: presets, files, and refused input."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_every_medium_has_a_profile(name: str) -> None:
 
 
 def test_quantities_of_a_layer() -> None:
-    """Of marble, as the notebook of [dEonLuebke2007] has them."""
+    """Expected values are those of marble in the notebook of [dEonLuebke2007]."""
     layer = media()["marble"].channel(1).layers[0]
     assert layer.mean_free_path_mm[0] == pytest.approx(0.38108304, abs=1e-8)
     assert layer.D[0] == pytest.approx(layer.mean_free_path_mm[0] / 3.0)
@@ -115,7 +115,7 @@ def test_warnings_name_the_reason() -> None:
 
 
 def test_absorption_is_told_where_the_beam_meets_it() -> None:
-    """Under a thin clear layer, and not below the first mean free path."""
+    """An absorbing layer is reported below a thin clear layer, but not below the first mean free path."""
     clear, dark = Layer(0.01 * ONE, 2.0 * ONE, 0.05), Layer(2.0 * ONE, 2.0 * ONE)
     for top, told in ((0.05, True), (2.0, False)):
         medium = Medium("skin", (Layer(clear.sigma_a, clear.sigma_s_prime, top), dark))

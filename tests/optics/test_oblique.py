@@ -1,4 +1,4 @@
-"""Where light lies that entered at a slant, against walks of photons."""
+"""Lateral offset of obliquely incident light, against photon simulations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PHOTONS, _MOST_STEPS, _LEAST = 100_000, 3000, 0.05
 
 
 def left(albedo: float, angle: float) -> tuple[Floats, Floats]:
-    """Where photons leave a half-space that entered at 0 along +x, and their weights [mean free path]."""
+    """Return exit positions of photons that entered a half-space at 0 along +x, and their weights."""
     rng = np.random.default_rng(1)
     x, z, weight = np.zeros(_PHOTONS), np.zeros(_PHOTONS), np.ones(_PHOTONS)
     along, down = np.full(_PHOTONS, np.sin(angle)), np.full(_PHOTONS, np.cos(angle))
@@ -36,7 +36,7 @@ def left(albedo: float, angle: float) -> tuple[Floats, Floats]:
 
 
 def middle(places: Floats, weights: Floats, beyond: float) -> float:
-    """The place from which as much light lies farther than `beyond` on one side as on the other."""
+    """Return the position with equal amounts of light farther than `beyond` on both sides."""
 
     def more_ahead(at: float) -> float:
         return float(weights[places > at + beyond].sum() - weights[places < at - beyond].sum())
@@ -46,7 +46,7 @@ def middle(places: Floats, weights: Floats, beyond: float) -> float:
 
 @pytest.mark.parametrize("albedo", [0.96, 0.9, 0.84])
 def test_light_lies_where_photons_do(albedo: float) -> None:
-    """Between the middles of what leaves farther than one and than two mean free paths."""
+    """The offset is between the centres of light farther than one and than two mean free paths."""
     angle = np.radians(60.0)
     leaving = left(albedo, angle)
     near, far = (middle(*leaving, beyond) / np.sin(angle) for beyond in (1.0, 2.0))

@@ -23,7 +23,7 @@ WORST, WORST_LIVING = 0.004, 0.0015
 
 
 def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floats:
-    """Colours without a table, one skin at a time."""
+    """Return colours computed without a table, one skin at a time."""
     media = [
         spectral_medium("dj2006", replace(parameters, melanin=m, blood=b))
         for m, b in zip(melanin, blood, strict=True)
@@ -33,7 +33,7 @@ def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floa
 
 
 def test_layers_of_many_shares_are_those_of_each_skin() -> None:
-    """To the bit."""
+    """Layers are equal bit for bit."""
     shares = np.array([0.0, 0.01, 0.3, 1.0])
     mixed = mixed_layers(FACE, shares)
     for row, share in enumerate(shares):

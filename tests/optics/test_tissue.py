@@ -1,4 +1,4 @@
-"""Tissue by name and file, and the Gaussians that the renderer gets for it."""
+"""Tissue by name and file, and its Gaussians."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Van de Hulst's formula, which renderers find albedos from colours by, against closed forms."""
+"""Van de Hulst's formula for the albedo of a colour, against closed forms."""
 
 from __future__ import annotations
 

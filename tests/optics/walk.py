@@ -1,4 +1,4 @@
-"""Photons in a half-space under a smooth surface, entering at an angle."""
+"""Photon simulation of a half-space below a smooth surface, with oblique incidence."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _LEAST_WEIGHT = 0.01
 def returned(
     cosine: float, albedo: float, eta: float, photons: int, rings: int = 4, seed: int = 1, g: float = 0.0
 ) -> tuple[float, float, Floats]:
-    """Share of the light entering at a cosine that leaves, its standard error, and that share by direction.
+    """Return the reflectance at an incident cosine, its standard error, and radiance by exit angle.
 
-    The last is (rings,) by the square of the cosine of leaving, in which light off a diffuse surface is even.
+    The last is (rings,) by the squared exit cosine, in which a diffuse surface is uniform.
 
     g : mean cosine of scattering
     """
@@ -41,7 +41,7 @@ def returned(
 
 
 def deflected(down: Floats, g: float, rng: np.random.Generator) -> Floats:
-    """Cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
+    """Return the cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
     chance = rng.random(len(down))
     if g == 0.0:
         return np.asarray(2.0 * chance - 1.0)
@@ -52,7 +52,7 @@ def deflected(down: Floats, g: float, rng: np.random.Generator) -> Floats:
 
 
 def fresnel(cosine: Floats, eta: float) -> Floats:
-    """Reflectance of unpolarised light from inside, 1 where none leaves."""
+    """Return the reflectance of unpolarised light from inside, 1 for total reflection."""
     sine2 = eta**2 * (1.0 - cosine**2)
     outside = np.sqrt(np.clip(1.0 - sine2, 0.0, None))
     across = (eta * cosine - outside) / (eta * cosine + outside)

@@ -1,4 +1,4 @@
-"""Live Link Face and MediaPipe: what their lines say comes out, and broken lines are named."""
+"""Captures of Live Link Face and MediaPipe: their values, and errors that name invalid lines."""
 
 from __future__ import annotations
 
@@ -109,14 +109,14 @@ def test_midnight_is_no_step_back(tmp_path: Path) -> None:
     ("rows", "words"),
     [
         ((), r"a\.csv: .*only its header"),
-        ((ROWS[0], ROWS[1][:-6]), r"a\.csv, line 3: expected 11 cells, but 9 came"),
-        ((ROWS[0], ROWS[1] + ",7"), r"a\.csv, line 3: expected 11 cells, but 12 came"),
+        ((ROWS[0], ROWS[1][:-6]), r"a\.csv, line 3: expected 11 cells, but got 9"),
+        ((ROWS[0], ROWS[1] + ",7"), r"a\.csv, line 3: expected 11 cells, but got 12"),
         ((ROWS[0], "", ROWS[1].replace("0.4", "much")), r"a\.csv, line 4: .*JawOpen is 'much'"),
         ((ROWS[0], ROWS[1].replace("0.3", "nan")), r"a\.csv, line 3: .*EyeBlinkLeft is nan"),
         ((ROWS[0], ROWS[1].replace("0.3", "inf")), r"line 3: .*EyeBlinkLeft is inf"),
         ((ROWS[0], ROWS[1].replace("0.3", "")), r"line 3: .*EyeBlinkLeft is ''"),
-        ((ROWS[1], ROWS[0]), r"a\.csv, line 3: .*Timecode that goes on, .* 0\.017 s before"),
-        (("noon" + ROWS[0],), r"a\.csv, line 2: .*HH:MM:SS:FF\.fff, but 'noon10"),
+        ((ROWS[1], ROWS[0]), r"a\.csv, line 3: .*increasing Timecodes, .* 0\.017 s before"),
+        (("noon" + ROWS[0],), r"a\.csv, line 2: .*HH:MM:SS:FF\.fff, but got 'noon10"),
     ],
 )
 def test_broken_lines_are_named(tmp_path: Path, rows: tuple[str, ...], words: str) -> None:
@@ -129,10 +129,10 @@ def test_broken_lines_are_named(tmp_path: Path, rows: tuple[str, ...], words: st
     [
         ("Time,JawOpen", r"a\.csv, line 1: expected a column Timecode, but the columns are Time, JawOpen"),
         ("Timecode,BlendShapeCount", r"line 1: expected columns of blend shapes"),
-        ("Timecode,JawOpen,jawopen", r"line 1: expected each column once, but JawOpen comes twice"),
+        ("Timecode,JawOpen,jawopen", r"line 1: expected each column once, but JawOpen occurs twice"),
         (
             "Timecode,Leg",
-            r"a\.csv: expected names of which the head has some, but it has Leg and the head jawOpen",
+            r"a\.csv: expected names of targets or bones of the head, but it has Leg and the head jawOpen",
         ),
     ],
 )
@@ -211,9 +211,9 @@ GOOD = {"time": 0.0, "blendshapes": {"jawOpen": 0.1}}
     ("row", "words"),
     [
         ('{"time": 0.1, "blend', r"a\.jsonl, line 2: expected an object in JSON, but .*Unterminated string"),
-        ("[1, 2]", r"line 2: expected an object in JSON, but \[1, 2\] came"),
+        ("[1, 2]", r"line 2: expected an object in JSON, but got \[1, 2\]"),
         ({"time": 0.1}, r"line 2: expected blendshapes, but it has time"),
-        ({"time": "soon", "blendshapes": {}}, r"line 2: time: expected a number .*'soon' came"),
+        ({"time": "soon", "blendshapes": {}}, r"line 2: time: expected a number .*got 'soon'"),
         ({"time": 0.1, "blendshapes": 7}, r"line 2: expected blendshapes by name"),
         (
             {"time": 0.1, "blendshapes": {"jawOpen": "x"}},
@@ -223,10 +223,10 @@ GOOD = {"time": 0.0, "blendshapes": {"jawOpen": 0.1}}
         ({"time": 0.1, "blendshapes": [{"score": 1}]}, r"line 2: expected a categoryName"),
         (
             {"time": -0.1, "blendshapes": {"jawOpen": 0}},
-            r"line 2: expected times that go on, but -0\.1 s comes",
+            r"line 2: expected increasing times, but -0\.1 s comes",
         ),
         (GOOD | {"matrix": [1, 2]}, r"line 2: matrix: expected 16 numbers"),
-        (GOOD | {"matrix": np.zeros((4, 4)).tolist()}, r"line 2: expected a matrix that turns"),
+        (GOOD | {"matrix": np.zeros((4, 4)).tolist()}, r"line 2: expected an invertible matrix"),
     ],
 )
 def test_broken_json_is_named_by_its_line(tmp_path: Path, row: object, words: str) -> None:

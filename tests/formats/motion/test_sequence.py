@@ -1,4 +1,4 @@
-"""Sequences of mesh files on a head of their topology."""
+"""Sequences of mesh files on a head with the same topology."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.mesh.primitives import uv_sphere
 
 
 def _scaled(text: str, factor: float) -> str:
-    """The places of an OBJ file times a factor."""
+    """Return an OBJ file with scaled positions."""
     lines = []
     for line in text.splitlines():
         kind, *numbers = line.split()
@@ -81,7 +81,7 @@ def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
     places = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
     np.testing.assert_allclose(places, 1.1 * head.positions_mm, rtol=1e-4, atol=1e-2)
     with pytest.raises(
-        DermisError, match=r"face_8\.obj: .*about as large as the head, but it is 0\.01 times"
+        DermisError, match=r"face_8\.obj: .*of about the size of the head, but it is 0\.01 times"
     ):
         dermis.load_motion(small, head, up="z")
 
@@ -130,9 +130,9 @@ def _other_uv(text: str) -> str:
     [
         (
             _without_last_face,
-            r"face_10\.obj: expected the head's topology, \d+ vertices .* it has \d+ and \d+ tri",
+            r"face_10\.obj: expected the topology of the head, \d+ vertices .* it has \d+ and \d+ tri",
         ),
-        (_other_face, r"face_10\.obj: expected the head's topology"),
+        (_other_face, r"face_10\.obj: expected the topology of the head"),
         (
             _other_uv,
             r"face_10\.obj: expected frames of one topology, but its faces or uv differ from .*face_8\.obj",
@@ -157,7 +157,7 @@ def test_a_frame_that_breaks_later_names_its_file(folder: Path) -> None:
 
 def test_a_sequence_of_another_head_is_refused(folder: Path) -> None:
     other = Head("ball", uv_sphere(100.0, 8, 6), Maps())
-    with pytest.raises(DermisError, match=r"face_8\.obj: expected the head's topology"):
+    with pytest.raises(DermisError, match=r"face_8\.obj: expected the topology of the head"):
         dermis.load_motion(folder, other)
 
 
@@ -169,7 +169,7 @@ def test_a_subdivided_head_moves_by_its_control_points(folder: Path) -> None:
 
 
 def test_places_that_part_are_refused(tmp_path: Path) -> None:
-    """Lips that touch in the head's own frame and open in another: one point cannot be at two places."""
+    """Lips that touch in the head's frame are one point and cannot open in another frame."""
     folder = _frames(tmp_path / "take", (1.0, 1.0))
     twin = "v 0 300 0\nv 20 300 0\nv 0 320 0\nv 0 300 0\nv 20 300 0\nv 0 280 0\n"
     count = obj_text().count("\nv ") + 1
@@ -180,7 +180,7 @@ def test_places_that_part_are_refused(tmp_path: Path) -> None:
     head = _head(folder)
     file = folder / "face_9.obj"
     file.write_text(file.read_text()[::-1].replace("v 0 300 0"[::-1], "v 0 295 0"[::-1], 1)[::-1])
-    with pytest.raises(DermisError, match=r"face_9\.obj: .*stay together, but \d+ part by up to 5 mm"):
+    with pytest.raises(DermisError, match=r"face_9\.obj: .*stay together, but \d+ separate by up to 5 mm"):
         dermis.load_motion(folder, head)
 
 

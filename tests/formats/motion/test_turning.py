@@ -1,4 +1,4 @@
-"""Which bones turn head and eyes, by the names that programs give them."""
+"""Bones that rotate head and eyes, by names that programs use."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ import pytest
 from random_rig import random_rig
 from scipy.spatial.transform import Rotation
 
-from dermis.formats.motion.captures import head_turns, matched, matrix_turns, turning_bones
+from dermis.formats.motion.captures import (
+    find_rotation_bones,
+    head_bone_angles,
+    match_targets,
+    rotation_quaternions,
+)
 from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Rig
 
@@ -41,7 +46,7 @@ def _named(*names: str):
     ],
 )
 def test_heads_and_necks(names: tuple[str, ...], shares: dict[str, float]) -> None:
-    assert turning_bones(_named(*names)).head == shares
+    assert find_rotation_bones(_named(*names)).head == shares
 
 
 @pytest.mark.parametrize(
@@ -49,19 +54,22 @@ def test_heads_and_necks(names: tuple[str, ...], shares: dict[str, float]) -> No
     [("LeftEye", "RightEye"), ("eye.L", "eye.R"), ("CC_Base_L_Eye", "CC_Base_R_Eye"), ("Eye_l", "Eye_r")],
 )
 def test_eyes(pair: tuple[str, str]) -> None:
-    assert turning_bones(_named("Eyelid_L", "LeftEyeBrow", *pair)).eyes == {"left": pair[0], "right": pair[1]}
+    assert find_rotation_bones(_named("Eyelid_L", "LeftEyeBrow", *pair)).eyes == {
+        "left": pair[0],
+        "right": pair[1],
+    }
 
 
 def test_no_bones_turn_nothing() -> None:
-    assert turning_bones(None).head == {} and turning_bones(None).eyes == {}
+    assert find_rotation_bones(None).head == {} and find_rotation_bones(None).eyes == {}
 
 
 @pytest.mark.parametrize("names", [("root", "neck", "head", "jaw"), ("neck1", "neck2", "head", "jaw")])
 def test_the_shares_make_the_whole_turn(names: tuple[str, ...]) -> None:
-    """Neck and head together turn the head as the capture says; places differ, the way it looks does not."""
+    """Neck and head together rotate the head as captured; positions may differ."""
     skeleton = _named(*names)
     turns = Rotation.from_euler("zxy", [[10, 20, 60], [0, -30, 5]], degrees=True)
-    angles = head_turns(turning_bones(skeleton), turns.as_quat())
+    angles = head_bone_angles(find_rotation_bones(skeleton), turns.as_quat())
     for frame, turn in enumerate(turns):
         pose = Pose(bones={name: rows[frame] for name, rows in angles.items()})
         matrices = pose.motion(Rig(random_rig().positions_mm, skeleton=skeleton)).matrices
@@ -73,7 +81,7 @@ def test_turns_of_matrices_leave_scale_aside() -> None:
     matrices = np.tile(np.eye(4), (5, 1, 1))
     matrices[:, :3, :3] = 1.7 * turns.as_matrix()
     matrices[:, :3, 3] = 40
-    found = Rotation.from_quat(matrix_turns(list(matrices)))
+    found = Rotation.from_quat(rotation_quaternions(list(matrices)))
     np.testing.assert_allclose((found.inv() * turns).magnitude(), 0, atol=1e-6)
 
 
@@ -88,7 +96,7 @@ def test_names_in_other_letters() -> None:
         "tongueOut",
         "BrowInnerUp",
     )
-    assert matched(names, targets) == {
+    assert match_targets(names, targets) == {
         "EyeBlinkLeft": "eyeBlinkLeft",
         "jawopen": "jawOpen",
         "JAWOPEN": "JAWOPEN",

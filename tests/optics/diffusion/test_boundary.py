@@ -1,4 +1,4 @@
-"""The surface: Fresnel against the supplied table, moments, and the mismatch factor."""
+"""Smooth surface: Fresnel reflectance against a supplied table, moments, and the boundary mismatch."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_reflectance_ends() -> None:
 
 
 def test_light_goes_both_ways_alike() -> None:
-    """The same share is reflected along one path from either side."""
+    """Reflectance along a path is equal from both sides."""
     outside = np.linspace(0.05, 1.0, 20)
     inside = np.sqrt(1.0 - (1.0 - outside**2) / 1.4**2)
     assert np.allclose(fresnel(outside, 1.4), fresnel(inside, 1.0 / 1.4), rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Dipoles: published intermediates, supplied profiles, totals, and how far they are known to be off."""
+"""Dipoles: published intermediate results, supplied profiles, totals, and known errors."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_white_medium_gives_all_back() -> None:
     ("alpha_prime", "exact"), [(0.8, 0.1575), (0.9, 0.2579), (0.95, 0.3696), (0.98, 0.5162), (0.99, 0.6210)]
 )
 def test_better_dipole_nears_the_exact_total_with_single_scattering(alpha_prime: float, exact: float) -> None:
-    """Exact by adding and doubling. Light scattered once, which this model leaves out, is added here."""
+    """Exact totals are by adding and doubling; single scattering, which the model omits, is added."""
     medium = slab(alpha_prime)
     multiple = diffusion_profile(medium, "better-dipole").total[0]
     once = alpha_prime * _leaves_after_one_event(1.4)
@@ -83,7 +83,7 @@ def test_better_dipole_nears_the_exact_total_with_single_scattering(alpha_prime:
 
 
 def _leaves_after_one_event(eta: float) -> float:
-    """Share of light, scattered once in a half-space, that then meets no other event and gets out."""
+    """Return the fraction of light that leaves a half-space after exactly one scattering event."""
     from dermis.optics.diffusion.boundary import fresnel
 
     mu = (np.arange(20_000) + 0.5) / 20_000

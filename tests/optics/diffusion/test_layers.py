@@ -1,4 +1,4 @@
-"""Stacks: the supplied totals and profiles, cutting one medium in two, and layered diffusion."""
+"""Layered media: supplied totals and profiles, a medium divided into two layers, and layered diffusion."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_profiles_of_the_table(sample_folder: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_beam_profile_in_the_rings_of_the_table(sample_folder: Path, name: str) -> None:
-    """Looser than elsewhere: the table's own inversion wavers where the profile grows towards its centre."""
+    """The tolerance is larger because the inversion of the table oscillates near its centre."""
     rows = table(sample_folder, "profiles_mc_vs_diffusion.csv")
     own = rows[rows["case"] == f"{name}_g0"]
     own = own[(own["r_lo_mm"] > 0.003) & (own["r_hi_mm"] < 8.0)]
@@ -65,7 +65,7 @@ def test_beam_profile_in_the_rings_of_the_table(sample_folder: Path, name: str) 
 
 @pytest.mark.parametrize("r", [1e-3, 0.05, 1.0])
 def test_beam_profile_by_another_quadrature(r: float) -> None:
-    """Between the zeros of the Bessel function, with the alternating sums averaged again and again."""
+    """Integrals between zeros of the Bessel function, with repeated averaging of the alternating sums."""
     medium = media()["dj3"].channel(1)
 
     def part(low: float, high: float) -> float:
@@ -153,7 +153,7 @@ def test_point_in_a_thin_slab_is_inside_it() -> None:
 
 @pytest.mark.parametrize("thickness", [0.2, 5.0])
 def test_point_of_a_slab_thinner_than_a_mean_free_path_lies_in_its_middle(thickness: float) -> None:
-    """So that as much of its light leaves above as below, when both faces are alike."""
+    """With equal faces, the same light leaves on both sides."""
     thin = Medium("thin", (Layer(np.zeros(1), np.array([0.01]), thickness),))
     R, T = layered_diffusion.solve(hankel.ZERO_FREQUENCY, thin, A, "point")
     assert R[0, 0] == pytest.approx(T[0, 0], rel=1e-6)

@@ -1,4 +1,4 @@
-"""Slabs: the supplied tables, the series against its closed sum, limits, and thin layers."""
+"""Multipole: supplied tables, the series against its closed form, limits, and thin layers."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_printed_source_leaves_a_thin_slab_and_the_clamped_one_does_not() -> Non
 
 @pytest.mark.parametrize("thickness", [2.0, 5.0, 10.0])
 def test_slabs_of_monte_carlo(sample_folder: Path, thickness: float) -> None:
-    """Known bias: the diffuse part is right to 10 % at a reduced albedo of 0.98 and two mean free paths."""
+    """The known error of the diffuse part is 10 % at a reduced albedo of 0.98 and two mean free paths."""
     runs = table(sample_folder, "mc_totals.csv")
     run = runs[runs["case"] == f"slab_a0.98_d{thickness:.1f}_n1.4_g0"][0]
     one = of(slab(0.98, thickness))

@@ -1,4 +1,4 @@
-"""Light through a thickness: algebra of the Gaussians, and slabs against Monte Carlo."""
+"""Transmittance: algebra of the Gaussians, and slabs against Monte Carlo."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ THICK_MM = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 
 
 def test_gaussians_through_a_thickness_are_their_integral() -> None:
-    """Over the far side, lit evenly, at the distance sqrt(r^2 + d^2) of each of its points."""
+    """The integral is over the uniformly lit far side, at distances sqrt(r^2 + d^2)."""
     profile = load_profile("gpu-gems-3")
     r = np.linspace(0.0, 40.0, 40_001)
     for d in (0.0, 0.5, 2.0):
@@ -47,7 +47,7 @@ def test_all_light_comes_through_next_to_nothing() -> None:
 
 @pytest.mark.parametrize("alpha_prime", [0.9, 0.98])
 def test_slabs_of_monte_carlo(sample_folder: Path, alpha_prime: float) -> None:
-    """Known bias: within 7 %, and within 3 % for two mean free paths of a medium that absorbs little."""
+    """Known errors are 7 %, and 3 % for two mean free paths of a medium with little absorption."""
     runs = table(sample_folder, "mc_totals.csv")
     for thickness in (0.5, 1.0, 2.0, 5.0):
         run = runs[runs["case"] == f"slab_a{alpha_prime:g}_d{thickness:.1f}_n1.4_g0"][0]

@@ -1,4 +1,4 @@
-"""The profile of two exponentials: closed forms, its fit to counted light, and the engines' parameters."""
+"""Burley's profile: closed forms, fits to photon counts, and parameters of engines."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_radius_of_a_share_holds_that_share(share: float) -> None:
 
 
 def test_published_scaling_laws() -> None:
-    """The factors at round albedos, by hand."""
+    """Expected factors are computed by hand."""
     assert np.allclose(shape_factor([0.0, 0.3, 0.8, 1.0]), [5.434, 2.425, 1.05, 0.906])
     assert np.allclose(shape_factor_diffuse([0.33, 0.83, 1.33]), [3.5, 9.75, 103.5])
 
@@ -91,7 +91,7 @@ def test_unity_shows_the_radius_of_the_widest_channel() -> None:
 
 @pytest.mark.parametrize("size", [1.0, 0.05])
 def test_unreal_makes_the_same_shape_of_its_parameters(size: float) -> None:
-    """The engine's two steps: mean free path to diffuse mean free path, and that to s."""
+    """The engine converts the mean free path to the diffuse mean free path, and that to s."""
     profile = BurleyProfile(PROFILE.albedo, PROFILE.shape / size)
     unreal = unreal_parameters(profile)
     assert unreal.mean_free_path_distance_cm >= 0.1
@@ -104,9 +104,9 @@ def test_unreal_makes_the_same_shape_of_its_parameters(size: float) -> None:
 
 
 def test_unreal_parameters_of_counted_skin_come_near_the_engines_own_preset(counted_skin: RingTarget) -> None:
-    """Its Skin1 is 0.1295 cm times (1, 0.735, 0.518): 1 / sigma_t' of the same medium.
+    """The engine's Skin1 is 0.1295 cm times (1, 0.735, 0.518), 1 / sigma_t' of the same medium.
 
-    Blue, with an albedo of 0.11, is beyond what the law was made for.
+    Blue, with an albedo of 0.11, is outside the range of the law.
     """
     unreal = unreal_parameters(fit_burley(counted_skin).profile)
     ours = unreal.mean_free_path_distance_cm * np.array(unreal.mean_free_path_colour)

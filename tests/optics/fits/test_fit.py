@@ -1,4 +1,4 @@
-"""Fits of Gaussians: published errors, the best known ones, energy, warm starts, and bad input."""
+"""Fits of Gaussians: published and best known errors, energy, warm starts, and invalid input."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ MARBLE = {
 
 
 def marble() -> PointTarget:
-    """R(r) of green marble's classical dipole."""
+    """Return R(r) of the classical dipole of green marble."""
     sigma_a, sigma_s, eta = 0.0041, 2.62, 1.5
     sigma_t = sigma_a + sigma_s
     F_dr = -1.4399 / eta**2 + 0.7099 / eta + 0.6681 + 0.0636 * eta
@@ -62,7 +62,7 @@ def marble() -> PointTarget:
 
 
 def best_known(folder: Path) -> list[tuple[PointTarget, int, Floats]]:
-    """Targets, terms and the errors that other code reached."""
+    """Return targets, numbers of terms and errors of other code."""
     data = folder / "reference" / "data"
     stored: dict[str, Floats] = {}
     groups: dict[tuple[str, int], dict[str, float]] = defaultdict(dict)
@@ -93,7 +93,7 @@ def stored_rgb(folder: Path, name: str) -> PointTarget:
 
 
 def made_of(profile: GaussianSum, kind: str) -> PointTarget | RingTarget:
-    """The target that a sum of Gaussians is."""
+    """Return a sum of Gaussians as a target."""
     if kind == "pointwise":
         r = np.geomspace(1e-4, 60.0, 400)
         return PointTarget(r, profile.radiant_exitance(r), profile.albedo)
@@ -222,7 +222,7 @@ def test_a_near_fit_of_another_size_is_left_aside(sample_folder: Path) -> None:
 
 
 def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A slider needs it; benchmarks/profiles.py measures the time."""
+    """Interactive sliders need fast fits; benchmarks/profiles.py measures the time."""
     target, steps, project = stored_rgb(sample_folder, "dj3"), [0], variable_projection._project
 
     def counted(*given: Any) -> variable_projection.Fit:
@@ -248,7 +248,7 @@ def test_size_and_strength_scale_out() -> None:
 
 @pytest.mark.parametrize("kind", ["pointwise", "annulus"])
 def test_light_below_zero_is_fitted_around(kind: str) -> None:
-    """A multipole whose source lies below its slab can turn negative."""
+    """A multipole whose source is below its slab can be negative."""
     clean = made_of(three(), kind)
     r = clean.radius_mm if isinstance(clean, PointTarget) else clean.edges_mm[1:]
     dent = 0.05 * np.exp(-((np.log(r / 3.0)) ** 2))[:, None]
@@ -274,8 +274,8 @@ RADII = np.array([0.1, 1.0, 2.0])
         (lambda: PointTarget(RADII, GOOD * np.nan, np.ones(1)), "finite"),
         (lambda: PointTarget(RADII[::-1], GOOD, np.ones(1)), "increase"),
         (lambda: PointTarget(np.array([0.0, 1.0, 2.0]), GOOD, np.ones(1)), "above 0"),
-        (lambda: PointTarget(RADII, np.stack([RADII, 0 * RADII], 1), np.ones(2)), "channel 1 holds 0"),
-        (lambda: PointTarget(RADII, GOOD, np.array([-0.2])), "-0.2 in all"),
+        (lambda: PointTarget(RADII, np.stack([RADII, 0 * RADII], 1), np.ones(2)), "channel 1 has a maximum of 0"),
+        (lambda: PointTarget(RADII, GOOD, np.array([-0.2])), "a sum of -0.2"),
         (lambda: RingTarget(np.array([0.5, 0.2, 1.0, 2.0]), GOOD, np.ones(1)), "increase from 0"),
     ],
 )

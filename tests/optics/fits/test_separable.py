@@ -1,4 +1,4 @@
-"""Separable kernels: where their light goes, where they are exact, and one number beside the others."""
+"""Separable kernels: light by sectors, exact cases, and their errors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_all_light_goes_somewhere_alike_in_x_and_y() -> None:
 
 
 def test_cells_are_the_integral_of_the_kernel() -> None:
-    """A quarter disc, by the light of each column under its arc."""
+    """The integral over a quarter disc is by columns."""
     radius = 1.3
 
     def column(x: float) -> float:
@@ -52,7 +52,7 @@ def test_cells_are_the_integral_of_the_kernel() -> None:
 
 
 def test_sectors_near_the_axes_get_the_light_of_the_cross() -> None:
-    """Directions 2.8 degrees from an axis against 42: by the kernel itself on a thin ring."""
+    """A thin ring at 2.8 degrees from an axis is compared with 42 degrees."""
     ring = np.array([1.99, 2.01])
     cells = CROSS.sector_energy(ring)[0, :, 0]
     theta = (np.arange(SECTORS) + 0.5) * np.pi / 2 / SECTORS

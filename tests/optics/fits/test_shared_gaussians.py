@@ -1,4 +1,4 @@
-"""Profiles on one set of Gaussians keep their totals and stay near what they were."""
+"""Fits of several profiles with shared Gaussians."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one Gaussian nearest to a profile."""
+"""Fits of one Gaussian."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dermis.optics.profiles import load_profile
 
 
 def misfit(one: GaussianSum, profile: GaussianSum) -> float:
-    """Sum over channels of the integral of r (R - S)^2, by quadrature [1/mm2]."""
+    """Return the sum over channels of the integral of r (R - S)^2, by quadrature [1/mm2]."""
     r = np.linspace(0, 30, 60_001)
     squared = (one.radiant_exitance(r) - profile.radiant_exitance(r)) ** 2
     return float(np.trapezoid(r[:, None] * squared, r, axis=0).sum())

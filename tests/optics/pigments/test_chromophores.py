@@ -1,4 +1,4 @@
-"""Chromophores and scattering laws: published tables and spot values, isosbestic points, range."""
+"""Chromophores and scattering laws: published tables and values, isosbestic points, and ranges."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def reference(sample_folder: Path) -> np.ndarray:
 
 
 def crossings(values: Floats) -> Floats:
-    """Wavelengths where values on the visible nanometres change sign."""
+    """Return wavelengths at which values on the visible nanometres change sign."""
     i = np.flatnonzero(np.diff(np.sign(values)))
     return VISIBLE_NM[i] + values[i] / (values[i] - values[i + 1])
 
@@ -50,7 +50,7 @@ def test_haemoglobin_is_the_published_table(sample_folder: Path) -> None:
 def test_haemoglobin_at_its_bands(
     extinction: Callable[[ArrayLike], Floats], wavelength: float, published: float
 ) -> None:
-    """Values that another tabulation prints, to four digits."""
+    """Expected values are from another tabulation, to four digits."""
     assert extinction(wavelength) == pytest.approx(published, rel=2e-4)
 
 
@@ -68,14 +68,14 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
 
 
 def test_blood_of_an_independent_computation(sample_folder: Path) -> None:
-    """That one has 2.303 for ln 10."""
+    """The independent computation uses 2.303 for ln 10."""
     table = reference(sample_folder)
     computed = chromophores.blood(table["lambda_nm"], 0.75) * 2.303 / np.log(10.0)
     assert np.allclose(computed, table["mua_blood_S075_mm1"], rtol=PUBLISHED, atol=0.0)
 
 
 def test_isosbestic_points() -> None:
-    """Oxygen changes the colour of blood, but not at the five wavelengths that textbooks name."""
+    """Oxygenation does not change absorption at the five wavelengths given in textbooks."""
     difference = chromophores.oxyhaemoglobin(VISIBLE_NM) - chromophores.deoxyhaemoglobin(VISIBLE_NM)
     found = crossings(difference)
     for published in (500.0, 529.0, 545.0, 570.0, 584.0):
@@ -94,14 +94,14 @@ def test_melanin_of_both_kinds() -> None:
 
 
 def test_water_as_measured() -> None:
-    """At 700 nm 0.0060 per cm; and little beside the tissue that it is part of."""
+    """Absorption is 0.0060 per cm at 700 nm, and small compared with tissue."""
     assert chromophores.water(700.0) == pytest.approx(6.0e-4, rel=5e-3)
     up_to_700 = VISIBLE_NM[VISIBLE_NM <= 700.0]
     assert (chromophores.water(up_to_700) < 0.03 * chromophores.baseline(up_to_700)).all()
 
 
 def test_scattering_in_the_reading_per_millimetre() -> None:
-    """6.08 per mm at 550 nm; the dermis, half of it, is the law that others give for skin."""
+    """It is 6.08 per mm at 550 nm; half of it is the law published for the dermis."""
     assert chromophores.donner_jensen_2006(550.0) == pytest.approx(6.08, abs=0.005)
     others_per_cm = 73.7 * VISIBLE_NM**-0.22 + 1.1e12 * VISIBLE_NM**-4.0
     dermis = chromophores.DERMIS_SCATTERING_RATIO * chromophores.donner_jensen_2006(VISIBLE_NM)

@@ -1,4 +1,4 @@
-"""Skin: its layers by hand, what each parameter does to the colour, examples, and bad parameters."""
+"""Skin: its layers computed by hand, effects of parameters on colour, presets, and invalid parameters."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SKIN = SkinParameters(melanin=0.02, eumelanin=0.6, blood=0.01, oxygen=0.8, epide
 
 
 def colour(layer: Layer) -> Floats:
-    """Linear Rec. 709 of a half-space of the layer's tissue, by the dipole's total [Jensen2001]."""
+    """Return the linear Rec. 709 colour of a half-space of a layer's tissue, by the dipole [Jensen2001]."""
     q = np.sqrt(3.0 * (1.0 - layer.alpha_prime))
     A = boundary_mismatch(1.4)
     total = 0.5 * layer.alpha_prime * (1.0 + np.exp(-4.0 / 3.0 * A * q)) * np.exp(-q)
@@ -72,7 +72,7 @@ def test_dj2006_by_hand_at_550_nm() -> None:
 
 
 def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
-    """As an optical depth, so that its nominal thickness does not matter."""
+    """The optical depth of the sheet does not depend on its nominal thickness."""
     sheet = layer("donner2008", "melanin sheet", SKIN)
     above = SKIN.melanin * melanosome(WAVELENGTHS_NM, SKIN.eumelanin) * SKIN.epidermis_mm
     assert np.allclose(sheet.sigma_a * sheet.thickness_mm, LEAKED_MELANIN * above)

@@ -1,4 +1,4 @@
-"""Spectra to colour: the observer's table, white, an independent computation, gamut, and bad grids."""
+"""Spectra to colours: the observer's table, white, an independent computation, gamut, and invalid grids."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COLOUR = 3e-5
 
 
 def skins(sample_folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Reflectance spectra by 5 nm, (63, 81), and the colours that an independent computation gave them."""
+    """Return reflectance spectra in steps of 5 nm, (63, 81), and their independently computed colours."""
     folder = sample_folder / "reference" / "data"
     spectra = np.load(folder / "spectral_diffusion.npz")["R"].reshape(63, 81)
     table = np.genfromtxt(
@@ -59,7 +59,7 @@ def test_the_coarse_grid_is_enough(sample_folder: Path) -> None:
 
 
 def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_folder: Path) -> None:
-    """Its skins: eumelanin alone, 0.06 mm, and scattering after Jacques in both layers."""
+    """The other program has only eumelanin, 0.06 mm, and scattering after Jacques in both layers."""
     table = np.genfromtxt(
         sample_folder / "reference" / "data" / "spectral_srgb_diffusion.csv",
         delimiter=",",
@@ -77,7 +77,7 @@ def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_fold
 
 
 def test_weights_are_those_of_the_srgb_standard() -> None:
-    """Its printed matrix, of four digits and so 0.0002 off white, on the XYZ of five spectra."""
+    """The printed matrix of four digits, 0.0002 off white, is applied to XYZ of five spectra."""
     printed = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
     observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", FINE_NM) for axis in "xyz"])
     light = observer * interpolate_spectrum("cie-1931-d65", "d65", FINE_NM)
