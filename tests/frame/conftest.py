@@ -1,4 +1,4 @@
-"""One renderer for all tests of the frame: compiling its shaders takes seconds."""
+"""One renderer for all tests of the frame, as compiling its shaders takes seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def renderer() -> Renderer:
 
 @pytest.fixture(scope="session")
 def close(device: Device) -> float:
-    """How close light is to its twin after the blurs, of its scale."""
+    """Return the tolerance of light after blurs against its reference, relative."""
     return TWIN if level_format(device) == FLOATS else HALVES
 
 
@@ -32,5 +32,5 @@ def device(renderer: Renderer) -> Device:
 
 @pytest.fixture(scope="session")
 def seen(renderer: Renderer) -> dict[str, Observation]:
-    """People with labels and landmarks."""
+    """Return observations of people with labels and landmarks."""
     return observed(renderer)

@@ -1,23 +1,23 @@
-"""The curvature passes in float64."""
+"""Reference implementation of the curvature passes in float64."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import edges, sum_at, triangle_areas
+from dermis.mesh.geometry import edges, sum_by_index, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 
 
 def curvature_twin(mesh: Mesh, steps: int) -> Floats:
-    """(v,) root mean square of the two principal curvatures after some steps of smoothing [1/mm]."""
+    """Return the (v,) root mean square of both principal curvatures after smoothing steps [1/mm]."""
     corners = mesh.point[mesh.triangles]
     area = triangle_areas(mesh.positions[mesh.triangles])
     count = int(mesh.point.max()) + 1
     rows = np.concatenate([area[:, None] * bend(mesh).reshape(-1, 9), area[:, None]], axis=1)
-    summed = sum_at(corners.ravel(), np.repeat(rows, 3, axis=0), count)
+    summed = sum_by_index(corners.ravel(), np.repeat(rows, 3, axis=0), count)
     values = np.linalg.norm(summed[:, :9] / np.maximum(summed[:, 9:], 1e-12), axis=1) / np.sqrt(2.0)
     pairs, _, _ = edges(corners)
     both = np.concatenate([pairs, pairs[:, ::-1]])
@@ -29,7 +29,7 @@ def curvature_twin(mesh: Mesh, steps: int) -> Floats:
 
 
 def bend(mesh: Mesh) -> Floats:
-    """(f, 3, 3) change of the normal with position along each triangle [1/mm]; 0 for those without area."""
+    """Return the (f, 3, 3) derivative of the normal by position in each triangle, 0 without area [1/mm]."""
     p, n = (a[mesh.triangles].astype(np.float64) for a in (mesh.positions, mesh.normals))
     sides, turns = p[:, 1:] - p[:, :1], n[:, 1:] - n[:, :1]
     across = np.cross(sides[:, 0], sides[:, 1])

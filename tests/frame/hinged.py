@@ -1,4 +1,4 @@
-"""A floor and a wall that turns about its foot, and how much of the sky the floor sees."""
+"""A floor and a wall that rotates about its foot, and the visibility of the sky from the floor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEIGHT_MM = 40.0
 
 
 def upright(mesh: Mesh, face: float) -> Mesh:
-    """A plane turned to stand along y, facing +x (1) or -x (-1)."""
+    """Return a plane rotated to be parallel to y, facing +x (1) or -x (-1)."""
     turned = {
         name: np.ascontiguousarray(getattr(mesh, name)[:, [2, 1, 0]] * [face, 1, -face], dtype=np.float32)
         for name in ("positions", "normals")
@@ -27,11 +27,11 @@ def upright(mesh: Mesh, face: float) -> Mesh:
 
 
 def corner(**maps: Floats) -> Head:
-    """A floor 200 x 200 at z = 0 and a wall 40 high that rises at x = -100, over all of its length.
+    """Return a floor 200 x 200 at z = 0 with a wall 40 high at x = -100, over its whole length.
 
     They share no points, so that each has normals of its own.
 
-    maps : as of `head_of`
+    maps : as for `head_of`
     """
     wall = upright(plane(200.0, 20), 1.0)
     low = replace(wall, positions=(wall.positions * [1, 1, 0.2]).astype(np.float32))
@@ -40,7 +40,7 @@ def corner(**maps: Floats) -> Head:
 
 
 def hinged(head: Head, degrees: float) -> NDArray[np.float32]:
-    """The points of the corner with its wall turned to an angle from the floor: 90 leaves it where it is."""
+    """Return the points of the corner with its wall at an angle to the floor, 90 degrees at rest."""
     points = head.positions_mm.copy()
     wall, angle = points[:, 2] > 0, np.radians(degrees)
     height = points[wall, 2]
@@ -49,7 +49,7 @@ def hinged(head: Head, degrees: float) -> NDArray[np.float32]:
 
 
 def open_beside(d_mm: Floats, degrees: float = 90.0) -> Floats:
-    """Open share of the sky, weighted by the cosine, of a floor at distances from the foot of a long wall."""
+    """Return the cosine-weighted visibility of the sky at distances from the foot of a long wall."""
     angle = np.radians(degrees)
     across, above = d_mm - HEIGHT_MM * np.cos(angle), HEIGHT_MM * np.sin(angle)
     return np.asarray(0.5 + 0.5 * across / np.hypot(across, above))

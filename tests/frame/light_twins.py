@@ -1,4 +1,4 @@
-"""Environments, lights of some size, soft shadows, bloom and tone curves once more in numpy float64."""
+"""Reference implementations of environments, area lights, soft shadows, bloom and tone curves in float64."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def unit(v: Floats) -> Floats:
 
 
 def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
-    """(..., 3) of a panorama's layer (h, w, 3), bilinear, turned and exposed."""
+    """Return (..., 3) of a panorama's layer (h, w, 3), bilinear, rotated and exposed."""
     cosine, sine = environment["turn"].astype(float)
     x, y, z = np.moveaxis(direction, -1, 0)
     turned = cosine * x - sine * z, sine * x + cosine * z
@@ -42,7 +42,7 @@ def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
 
 
 def reflection(layers: Floats, environment: Any, direction: Floats, m: Floats) -> Floats:
-    """(..., 3) mean radiance under round lobes, between the layers of two roughnesses."""
+    """Return the (..., 3) mean radiance under isotropic lobes, between two layers of roughness."""
     place = (LEVELS - 1) * np.clip(np.log(m / 0.018) / RANGE, 0, 1)
     low = np.minimum(place.astype(int), LEVELS - 2)
     read = np.stack([panorama_at(layer, environment, direction) for layer in layers[1:]])
@@ -52,7 +52,7 @@ def reflection(layers: Floats, environment: Any, direction: Floats, m: Floats) -
 
 
 def ambient(layers: Floats, environment: Any, normal: Floats, open_: Floats, albedo: Floats) -> Floats:
-    """(..., 3) irradiance of a partly open surface, brightened by light between its walls [Jimenez2016]."""
+    """Return the (..., 3) irradiance of a partly occluded surface with interreflection [Jimenez2016]."""
     a, b, c = 2.0404 * albedo - 0.3324, -4.7951 * albedo + 0.6417, 2.7552 * albedo + 0.6903
     x = open_[..., None]
     return panorama_at(layers[0], environment, normal) * np.maximum(x, ((x * a + b) * x + c) * x)
@@ -61,7 +61,7 @@ def ambient(layers: Floats, environment: Any, normal: Floats, open_: Floats, alb
 def mirrored(
     layers: Floats, environment: Any, smooth: Floats, normal: Floats, view: Floats, m: Floats, open_: Floats
 ) -> Floats:
-    """(..., 3) radiance that the surface's lobe sees."""
+    """Return the (..., 3) radiance that the surface's lobe reflects."""
     cosine = np.clip(dot(normal, view), 0, 1)
     x, y = np.sqrt(cosine) * (VIEWS - 1), np.clip(np.log(m / 0.05) / MIRROR_RANGE, 0, 1) * (ROUGH - 1)
     j, i = np.minimum(x.astype(int), VIEWS - 2), np.minimum(y.astype(int), ROUGH - 2)
@@ -86,7 +86,7 @@ def mirrored(
 
 
 def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
-    """(..., 3) direction to a part of a rectangle or sphere, and irradiance on a surface that faces it.
+    """Return (..., 3) directions to a part of a rectangle or sphere, and the irradiance that faces it.
 
     light : the shader's record
     """
@@ -120,7 +120,7 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
 
 
 def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) -> Floats:
-    """(n,) share that points see of what rises of a light, by lines through its map of depths (s, s).
+    """Return the (n,) visible fraction of a light above the horizon, by rays through its depth map (s, s).
 
     light : the shader's record, points and normals : (n, 3)
     """
@@ -171,12 +171,12 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
 
 
 def _share(blocked: Any, among: Any) -> Floats:
-    """Share of lines blocked among some, by point."""
+    """Return the fraction of blocked rays, by point."""
     return np.asarray((blocked & among).sum(axis=0) / np.maximum(among.sum(axis=0), 1))
 
 
 def halved(picture: Floats) -> Floats:
-    """A picture at half the size under 1 3 3 1 along both axes."""
+    """Return a picture at half the size, filtered by 1 3 3 1 along both axes."""
     height, width = picture.shape[:2]
     y, x = 2 * np.arange(max(1, height // 2)), 2 * np.arange(max(1, width // 2))
     taps = ((-1, 1), (0, 3), (1, 3), (2, 1))
@@ -189,7 +189,7 @@ def halved(picture: Floats) -> Floats:
 
 
 def widened(picture: Floats, size: tuple[int, int]) -> Floats:
-    """A picture at a larger size (height, width), bilinear."""
+    """Return a picture at a larger size (height, width), bilinear."""
     y, x = ((np.arange(n) + 0.5) / n * m - 0.5 for n, m in zip(size, picture.shape[:2], strict=True))
     rows, columns = np.floor(y).astype(int), np.floor(x).astype(int)
     total = np.zeros((*size, picture.shape[2]))
@@ -204,7 +204,7 @@ def widened(picture: Floats, size: tuple[int, int]) -> Floats:
 
 
 def bloomed(picture: Floats, share: float, count: int) -> Floats:
-    """A picture with a share of its light scattered over `count` halvings."""
+    """Return a picture with a fraction of its light scattered over `count` halvings."""
     levels = [halved(picture)]
     for _ in range(count - 1):
         levels.append(halved(levels[-1]))
@@ -216,7 +216,7 @@ def bloomed(picture: Floats, share: float, count: int) -> Floats:
 
 
 def filmic(linear: Floats) -> Floats:
-    """Film's curve as [Hable2010] prints it, white at 11.2."""
+    """Return the filmic curve as printed in [Hable2010], white at 11.2."""
 
     def curve(x: Floats | float) -> Any:
         shoulder, slope, angle, toe, a, b = 0.15, 0.50, 0.10, 0.20, 0.02, 0.30
@@ -227,7 +227,7 @@ def filmic(linear: Floats) -> Floats:
 
 
 def neutral(linear: Floats) -> Floats:
-    """The neutral tone mapper as its specification prints it [Khronos2024]."""
+    """Return the neutral tone mapping of its specification [Khronos2024]."""
     start, desaturation = 0.8 - 0.04, 0.15
     x = linear.min(axis=-1, keepdims=True)
     colour = linear - np.where(x < 0.08, x - 6.25 * x * x, 0.04)

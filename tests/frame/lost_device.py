@@ -1,7 +1,7 @@
-"""Loses the device at each stage of a frame, in a process of its own, as the library may end it.
+"""Lose the device at each stage of a frame, in a separate process, as the library may end it.
 
-python lost_device.py ADAPTER FOLDER: a line for each stage with "same" where the picture is the same to the
-bit, else what came. FOLDER is for files.
+python lost_device.py ADAPTER FOLDER prints a line per stage: "same" if the picture is identical, else the
+error. FOLDER is for files.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def scene(mix: float = 0.5) -> Scene:
 
 @contextmanager
 def losing(target: Any, name: str, calls: int = 1) -> Iterator[None]:
-    """Within it the device is lost as a function of that name is called for that time, before it runs."""
+    """Lose the device when a function is called for the given time, before it runs."""
     usual, left = getattr(target, name), [calls]
 
     def call(*given: Any, **named: Any) -> Any:
@@ -96,7 +96,7 @@ def waiting(renderer: Renderer) -> Any:
 
 
 def reading(renderer: Renderer) -> Any:
-    """Each way of reading, one after the other."""
+    """Read by each method, one after the other."""
     rendered = renderer.draw(scene(), DRAWN)
     ways = (lambda: rendered.exposure, rendered.clipped, rendered.srgb8)
     known = [read() for read in ways]
@@ -107,7 +107,7 @@ def reading(renderer: Renderer) -> Any:
 
 
 def begun_to_read(renderer: Renderer) -> Any:
-    """The copy is mapped or about to be."""
+    """Lose the device while the copy is mapped or about to be."""
     rendered = renderer.draw(scene(), DRAWN)
     known = rendered.srgb8()
     with losing(readback.Readback, "image"):
@@ -116,7 +116,7 @@ def begun_to_read(renderer: Renderer) -> Any:
 
 
 def painting(renderer: Renderer) -> Any:
-    """A person, whose skin the device paints."""
+    """Render a person, whose skin the device paints."""
     person, small = Scene(Human().head()), settings_of(size=(32, 32), atlas=256)
     with losing(paint, "draw"):
         found = renderer.draw(person, small).linear()
@@ -126,7 +126,7 @@ def painting(renderer: Renderer) -> Any:
 
 
 def many(renderer: Renderer) -> Any:
-    """Some frames are in flight when the device goes, wherever that is."""
+    """Lose the device with several frames in flight."""
     mixes, drawn = np.linspace(0.0, 1.0, MANY), DRAWN.model_dump()
     known = list(renderer.render_many(map(scene, mixes), **drawn))
     for target, name, calls in ((CommandList, "submit", 4), (readback.Readback, "image", 2)):
@@ -137,7 +137,7 @@ def many(renderer: Renderer) -> Any:
 
 
 def beside_frames(renderer: Renderer) -> Any:
-    """What else works on the renderer's device, as comparisons do."""
+    """Use the renderer's device for other work, as comparisons do."""
     known = surface_points(renderer, scene(), DRAWN)
     with losing(CommandList, "submit"):
         found = surface_points(renderer, scene(), DRAWN)
@@ -146,7 +146,7 @@ def beside_frames(renderer: Renderer) -> Any:
 
 
 def observing(renderer: Renderer) -> Any:
-    """Outputs, read one by one and with pictures in flight."""
+    """Read outputs one by one, and with pictures in flight."""
     names, scenes = ("depth", "motion"), [scene(), scene(0.3), scene(0.6), scene(0.9)]
     rendered = renderer.draw(scenes[0], DRAWN, outputs=names)
     depth = rendered.output("depth")
@@ -179,7 +179,7 @@ STAGES: tuple[Stage, ...] = (
 
 
 def commands(folder: Path, adapter: str) -> Iterator[tuple[str, str]]:
-    """The command line, whose device is lost in the second frame of a movie, and then always."""
+    """Run the command line, which loses the device in the second frame of a movie, and then always."""
     os.chdir(folder)
     write_moving_head(Path("face.glb"))
     words = ["animate", "face.glb", *SMALL, "--adapter", adapter, "-o"]

@@ -1,4 +1,4 @@
-"""People observed with labels and landmarks, and what is measured on them."""
+"""People observed with labels and landmarks, and measurements on them."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def labelled(one: Observation, *names: str) -> Mask:
 
 
 def from_edge(mask: Mask, place: NDArray[np.float64]) -> float:
-    """Distance to the nearest border between a pixel of a mask and one beside it [pixel]."""
+    """Return the distance to the nearest border of a mask [pixels]."""
     beside, below = np.argwhere(mask[:, 1:] != mask[:, :-1]), np.argwhere(mask[1:] != mask[:-1])
     both = np.concatenate((np.add(beside, [0, 0.5]), np.add(below, [0.5, 0])))
     return float(np.linalg.norm(both[:, ::-1] - place, axis=1).min())
 
 
 def people() -> dict[str, Scene]:
-    """One person at rest, with a shut eye and an open mouth, from the side and turned; and another."""
+    """Return a person at rest, with one eye closed, from the side and turned; and another one."""
     mean, drawn = bare(Human(sex=0.5).head()), bare(Human.drawn(4).head())
     shut = Pose({"eyeBlinkLeft": 1.0, "jawOpen": 0.6})
     return {
@@ -70,7 +70,7 @@ def people() -> dict[str, Scene]:
 
 
 def observed(renderer: Renderer) -> dict[str, Observation]:
-    """What is seen of each of them."""
+    """Return an observation of each person."""
     scenes = people()
     outputs = "label", "label_face_synthetics", "triangle", "depth"
     found = renderer.observe(scenes.values(), SETTINGS, outputs=outputs, landmarks=SETS)

@@ -1,6 +1,6 @@
-"""Small scenes for the tests of the frame, and ways to run a part of it.
+"""Small scenes for the tests of the frame, and helpers that run a part of a frame.
 
-Places are given in the mesh's own coordinates; a scene wants them from the head's centre.
+Positions are in the coordinates of the mesh; scenes need them relative to the centre of the head.
 """
 
 from __future__ import annotations
@@ -37,48 +37,48 @@ AnyLight = PointLight | SpotLight | DirectionalLight
 
 
 def entered_light(renderer: Renderer, inputs: FrameInputs) -> NDArray[np.float64]:
-    """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
+    """Return (n, n, 4) light that entered the skin, with 1 as alpha on the surface; half floats on GPUs."""
     made = download(renderer.device, inputs.resources.diffusion.levels.stacks[0]).astype(float)
     return made / [*(3 * [inputs.blurs[0].scale]), 1.0]
 
 
 def head_of(mesh: Mesh, **maps: Any) -> Head:
-    """A mesh with the given maps as a head."""
+    """Return a head of a mesh with the given maps."""
     return Head("test", mesh, Maps(**{role: np.asarray(m, np.float32) for role, m in maps.items()}))
 
 
 def place(head: Head, point: ArrayLike) -> Any:
-    """A point of the mesh's coordinates as scenes want it."""
+    """Return a point of the mesh relative to the centre of the head."""
     return tuple(float(c) for c in np.asarray(point, float) - head.centre_mm)
 
 
 def front_camera(head: Head, centre: ArrayLike = (0, 0, 0), frame_mm: float = 80.0) -> Camera:
-    """300 mm before `centre`, looking along -Z."""
+    """Return a camera 300 mm before `centre` that looks along -Z."""
     eye = np.add(centre, (0, 0, 300.0))
     return Camera(position=place(head, eye), target=place(head, centre), frame_mm=frame_mm)
 
 
 def scene_of(head: Head, *lights: AnyLight, camera: Camera | None = None, **skin: Any) -> Scene:
-    """A scene with Lambertian skin, unless `skin` says otherwise: what it returns has closed forms."""
+    """Return a scene with Lambertian skin, unless `skin` has a direction: its exitance has a closed form."""
     chosen = Skin(**{"direction": "lambertian", **skin})
     return Scene(head, lights=lights, camera=camera or front_camera(head), skin=chosen)
 
 
 def frontal(irradiance: float = 3.0, *, shadows: bool = False) -> DirectionalLight:
-    """Light along -Z."""
+    """Return light along -Z."""
     return DirectionalLight(direction=(0, 0, -1), irradiance=(irradiance,) * 3, shadows=shadows)
 
 
 def settings_of(**given: Any) -> Settings:
-    """Small sizes unless told otherwise, and an atlas laid out as the mesh's maps are."""
+    """Return settings with small sizes, and an atlas with the layout of the mesh, unless given otherwise."""
     small = {"size": (48, 48), "atlas": 64, "samples": 1, "shadow_size": 64, "seams": "alpha"}
     return Settings(**(small | given))
 
 
 def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) -> AtlasTextures:
-    """An atlas stretched as its arrays say, where no mesh says it.
+    """Return the textures of an atlas with the stretch of its arrays.
 
-    more : what its textures have otherwise
+    more : further fields of the textures
     """
     made = replace(upload_atlas(device, atlas, stretch), **more)
     metric = np.dstack([atlas.stretch, atlas.shear * (stretch == "full"), np.zeros_like(atlas.shear)])
@@ -90,7 +90,7 @@ def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) ->
 
 
 def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> FrameInputs:
-    """A whole frame; what its passes made can be downloaded from the result."""
+    """Render a frame, and return its inputs, from which results of passes can be downloaded."""
     inputs, graph = renderer.prepare(scene, settings_of(**given)), renderer.graph
     graph.begin()
     draw_frame(graph, inputs, TECHNIQUES[inputs.settings.technique])
@@ -110,7 +110,7 @@ def probe(
 
     constants : names and values of the shader's `override`s
 
-    A keyword whose value is a dict is taken as the members of the shader's struct of that name.
+    Keyword arguments are bindings; a dict gives the members of the shader's struct of that name.
     """
     path = Path(__file__).parent / f"{name}.wgsl"
     program = ComputeProgram(device, path, shader_folders(), dict(constants))
@@ -125,7 +125,7 @@ def probe(
 
 
 def bent_plane(size_mm: float, uv: Sequence[Sequence[float]], segments: int = 1) -> Mesh:
-    """A plane whose uv is mapped through the (2, 3) affine matrix `uv`."""
+    """Return a plane whose uv is mapped by the (2, 3) affine matrix `uv`."""
     flat = plane(size_mm, segments)
     matrix = np.asarray(uv, float)
     return build_mesh(
@@ -134,9 +134,9 @@ def bent_plane(size_mm: float, uv: Sequence[Sequence[float]], segments: int = 1)
 
 
 def joined(*parts: tuple[Mesh, ArrayLike, tuple[float, float, float]], kinds: Sequence[str] = ()) -> Mesh:
-    """Meshes in one: each moved in space [mm], its uv put into the square (left, top, side).
+    """Join meshes into one: each is moved [mm], and its uv is mapped to the square (left, top, side).
 
-    kinds : material kind of each part, skin when left out
+    kinds : material kind of each part, skin by default
     """
     first = np.cumsum([0, *(len(mesh.positions) for mesh, _, _ in parts[:-1])])
     kind = list(kinds) or ["skin"] * len(parts)

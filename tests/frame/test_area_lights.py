@@ -1,4 +1,4 @@
-"""Rectangles, spheres, suns and stripes: how much light they give, and shadows that harden at contact."""
+"""Rectangles, spheres, suns and stripes: irradiance, and shadows that are sharp at contact."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ PLATE = head_of(
 
 
 def above(head: Any, height: float, **given: Any) -> dict[str, Any]:
-    """A light over the origin that faces it."""
+    """Return the fields of a light above the origin that faces it."""
     return {"position": place(head, (0, 0, height)), "target": place(head, (0, 0, 0)), **given}
 
 
 def polygon_irradiance(corners: Floats, normal: Floats) -> float:
-    """Irradiance from a uniform polygon of radiance 1 on a surface at the origin that sees all of it [-].
+    """Return the irradiance from a uniform polygon of radiance 1 on a surface at the origin [-].
 
-    Source: Lambert's formula, as in [Baum1989].
+    The polygon is above the horizon. Source: Lambert's formula, as in [Baum1989].
     """
     unit = corners / np.linalg.norm(corners, axis=1, keepdims=True)
     after = np.roll(unit, -1, axis=0)
@@ -52,7 +52,7 @@ def polygon_irradiance(corners: Floats, normal: Floats) -> float:
 
 
 def from_rectangle(size: tuple[float, float], place: Floats) -> float:
-    """The same from a rectangle at (0, 0, 0) that faces +z, at a place on a floor that faces it."""
+    """Return the irradiance from a rectangle at (0, 0, 0) that faces +z, at a point of a facing floor."""
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [0.5 * size[0], 0.5 * size[1], 0.0]
     return polygon_irradiance(corners - place, np.array([0.0, 0.0, 1.0]))
 
@@ -77,7 +77,7 @@ def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
 
 
 def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats]:
-    """Irradiance of each texel, and their places."""
+    """Return the irradiance of each texel, and the positions of the texels."""
     inputs = run_frame(renderer, scene_of(head, light, rho_s=0.0, mix=0.0), atlas=64)
     made = entered_light(renderer, inputs)[..., :3]
     return made, surface(cached_atlas(head.mesh, 64), head)[0]
@@ -85,7 +85,7 @@ def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats
 
 @pytest.mark.parametrize("size", [(30, 30), (240, 60), (400, 400)])
 def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]) -> None:
-    """On a floor below it, up to 100 mm aside, from a height of 300 mm."""
+    """Compare a floor below the light, from a height of 300 mm and up to 100 mm off its axis."""
     given = {"width_mm": size[0], "height_mm": size[1], "irradiance": (1.0, 2.0, 3.0), "shadows": False}
     made, points = entered(renderer, FLOOR, RectangleLight(**above(FLOOR, 300.0, **given)))
     radiance = np.array([1.0, 2.0, 3.0]) / facing_irradiance(*size, 300.0)
@@ -96,7 +96,7 @@ def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]
 
 @pytest.mark.parametrize("radius", [5.0, 80.0, 200.0])
 def test_irradiance_of_a_sphere(renderer: Renderer, radius: float) -> None:
-    """pi (r / d)^2 times the cosine, while all of it stands above the horizon."""
+    """Compare with pi (r / d)^2 times the cosine, for spheres above the horizon."""
     made, points = entered(
         renderer, FLOOR, SphereLight(**above(FLOOR, 300.0, radius_mm=radius, shadows=False))
     )
@@ -130,14 +130,16 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
         **textures,
         part={"index": part},
     )
-    direction, irradiance = light_twins.part_of(inputs.bindings["lights"]["light"][0], points.astype(float), part)
+    direction, irradiance = light_twins.part_of(
+        inputs.bindings["lights"]["light"][0], points.astype(float), part
+    )
     assert np.abs(towards[..., :3] - direction).max() < TWIN
     assert np.abs(arriving[..., :3] - irradiance).max() < TWIN * irradiance.max()
     assert (towards[..., 3] == 1).all()
 
 
 def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
-    """1/e^2 of the middle at half its width, nothing beyond its ends; averaged over texels."""
+    """Expect 1/e^2 of the centre at half the width, and nothing beyond the ends, averaged over texels."""
     light = StripeLight(
         direction=(0, 0, -1),
         position=place(FLOOR, (10, 0, 0)),
@@ -155,7 +157,7 @@ def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
 
 
 def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:
-    """Along the floor's middle: places on x, and how much of the light each sees (one part after another)."""
+    """Return positions along the middle of the floor on x, and the visibility of the light at each."""
     scene = scene_of(head, light)
     views = light_views(scene, scene.head.mesh.outline, size)
     inputs = run_frame(renderer, scene, shadow_size=size)
@@ -186,7 +188,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
 
 @pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
 def test_a_shadow_fades_as_the_light_is_wide(renderer: Renderer, kind: str) -> None:
-    """A plate from x = -30 to 0 at 12 mm, a light 60 mm wide 300 mm up: a penumbra of 2.5 mm."""
+    """A plate from x = -30 to 0 at 12 mm under a light 60 mm wide at 300 mm has a penumbra of 2.5 mm."""
     wide = 60.0 * 12.0 / (300.0 - 12.0)
     light: Light = {
         "rectangle": RectangleLight(**above(PLATE, 300.0, width_mm=60, height_mm=60, softness_mm=0.1)),
@@ -206,7 +208,7 @@ def test_a_shadow_fades_as_the_light_is_wide(renderer: Renderer, kind: str) -> N
 
 @pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
 def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
-    """Points in and above the plate's shadow with normals of their own; at texels' edges rounding decides."""
+    """Points in and above the shadow of a plate have their own normals; rounding decides at texel edges."""
     light: Light = {
         "rectangle": RectangleLight(**above(PLATE, 300.0, width_mm=70, height_mm=40)),
         "sphere": SphereLight(**above(PLATE, 300.0, radius_mm=30)),
@@ -242,7 +244,7 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
 
 
 def test_shadows_harden_towards_what_casts_them(renderer: Renderer) -> None:
-    """The same light over plates at 4 and at 24 mm: the penumbra grows with the height."""
+    """The same light over plates at 4 and 24 mm: the penumbra grows with the height."""
     widths = []
     for height in (4.0, 24.0):
         head = head_of(
@@ -258,7 +260,7 @@ def test_shadows_harden_towards_what_casts_them(renderer: Renderer) -> None:
 
 
 def test_a_wide_rectangle_is_seen_part_by_part(renderer: Renderer) -> None:
-    """A light as wide as its distance: the shadow's profile is the share of the light that is hidden."""
+    """For a light as wide as its distance, the shadow's profile is the occluded fraction of the light."""
     light = RectangleLight(**above(PLATE, 300.0, width_mm=300, height_mm=40, softness_mm=0.1))
     x, seen = visibility(renderer, PLATE, light)
     # places u on the light that the plate hides from x: the line crosses z = 12 between -30 and 0
@@ -290,7 +292,7 @@ def test_a_ball_does_not_shade_itself(renderer: Renderer, kind: str) -> None:
 
 
 def test_a_sphere_around_the_head_is_refused(renderer: Renderer) -> None:
-    """It shines outwards: within it there is no light."""
+    """A sphere radiates outwards: inside it there is no light."""
     light = SphereLight(position=(0, 0, 900), target=(0, 0, -5000), radius_mm=1000, shadows=False)
     with pytest.raises(DermisError, match=r"light 2: expected a head outside the sphere of 1000 mm"):
         renderer.draw(scene_of(FLOOR, DirectionalLight(direction=(0, 0, -1)), light), settings_of())
@@ -310,7 +312,7 @@ def test_too_many_parts_are_refused(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("samples", [1, 4, 5, 16, 64])
 def test_strips_hold_no_more_samples_than_drivers_go_round_loops(renderer: Renderer, samples: int) -> None:
-    """Under three rectangles of 500 mm, with 16 samples, 4 % of a face stayed black where they held 256."""
+    """Under three rectangles of 500 mm with 16 samples, strips of 256 samples left 4 % of a face black."""
     usual = dict(device_constants(renderer.device)).get("STRIP", 1)
     strip = (dict(strip_constants(renderer.device, samples)) or {"STRIP": usual})["STRIP"]
     assert 1 <= strip <= usual and strip * samples <= 64

@@ -1,4 +1,4 @@
-"""Curvature on the device: surfaces whose curvature is known, a twin in float64, and heads that move."""
+"""Curvature on the device: closed forms, a float64 reference, and heads in motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SIDE = 64  # of the atlas, which curvature does not depend on
 
 
 def found(device: Device, mesh: Mesh, positions_mm: NDArray[np.float32] | None = None) -> Floats:
-    """(v,) the curvature of a mesh, or of one that its points were moved to [1/mm]."""
+    """Return the (v,) curvature of a mesh, or of the mesh with moved points [1/mm]."""
     head = head_of(mesh)
     points = head.positions_mm if positions_mm is None else positions_mm
     shape = evaluate_rest_shape(device, shape_tables(device, head), points)
@@ -37,7 +37,7 @@ def found(device: Device, mesh: Mesh, positions_mm: NDArray[np.float32] | None =
 
 
 def half_pipe(radius_mm: float, segments: int = 48) -> Mesh:
-    """A plane bent about the vertical by half a turn, with the normals of the cylinder."""
+    """Return a plane bent about the vertical by half a turn, with the normals of the cylinder."""
     flat = plane(np.pi * radius_mm, segments)
     angle = flat.positions[:, 0] / radius_mm
     normals = np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
@@ -47,7 +47,7 @@ def half_pipe(radius_mm: float, segments: int = 48) -> Mesh:
 
 @pytest.mark.parametrize("radius_mm", [5.0, 20.0, 100.0])
 def test_sphere(device: Device, radius_mm: float) -> None:
-    """1/r at every corner, poles and seam included."""
+    """Expect 1/r at every corner, poles and seam included."""
     assert np.allclose(found(device, uv_sphere(radius_mm, 64, 32)), 1 / radius_mm, rtol=0.01)
 
 
@@ -56,7 +56,7 @@ def test_plane(device: Device) -> None:
 
 
 def test_cylinder(device: Device) -> None:
-    """Curved along one of two directions: the root mean square is 1/r over the root of 2."""
+    """The root mean square of curvatures 1/r and 0 is 1/r over the square root of 2."""
     assert np.allclose(found(device, half_pipe(20.0)), np.sqrt(0.5) / 20.0, rtol=0.01)
 
 
@@ -72,7 +72,7 @@ def test_triangles_without_area_do_no_harm(device: Device) -> None:
 
 @pytest.mark.parametrize("radius_mm", [9.0, 30.0])  # an even and an odd number of steps
 def test_as_in_float64(device: Device, radius_mm: float) -> None:
-    """On a dented ball, whose seams cut across what is curved."""
+    """Compare on a dented ball, whose seams cross curved regions."""
     mesh = dented(radius_mm)
     steps = make_curvature(device, mesh).steps
     assert np.allclose(found(device, mesh), curvature_twin(mesh, steps), rtol=1e-4, atol=1e-6)
@@ -89,7 +89,7 @@ def test_it_moves_with_the_surface(device: Device) -> None:
 
 
 def dented(radius_mm: float) -> Mesh:
-    """A ball with bumps and hollows."""
+    """Return a ball with bumps and hollows."""
     ball = cut_sphere(radius_mm, 16)
     x, y, z = ball.positions.T / radius_mm
     bumps = 1 + 0.1 * np.sin(5 * x + 1) * np.cos(4 * y) * np.cos(3 * z)

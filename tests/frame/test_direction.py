@@ -1,4 +1,4 @@
-"""Skin that returns light by its directions, against the closed form of its law and against conservation."""
+"""Skin with a directional response, against closed forms and energy conservation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LIGHT = DirectionalLight(direction=(1.0, 0.5, -0.6), irradiance=(3.0, 2.0, 1.0),
 
 @pytest.fixture(scope="module")
 def profile(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A file of a profile with a colour of its own."""
+    """Return a file of a profile with a colour."""
     path = tmp_path_factory.mktemp("profile") / "own.toml"
     weight = np.outer([0.4, 0.6], COLOUR)
     write_profile(path, GaussianSum("own", np.array([0.005, 0.4]), weight), {})
@@ -47,7 +47,7 @@ def profile(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def seen_from(degrees: float) -> Camera:
-    """Far off the plane's middle, so that all of the picture is seen from one direction."""
+    """Return a camera far away, so that the whole picture is seen from one direction."""
     angle = np.radians(degrees)
     eye = 3e4 * np.array([np.sin(angle), 0.0, np.cos(angle)])
     return Camera(position=place(FLAT, eye), target=place(FLAT, (0, 0, 0)), frame_mm=4.0)
@@ -59,7 +59,7 @@ def middle(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
 
 
 def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR) -> Floats:
-    """What leaves in a direction over the same from and to straight above on the mean."""
+    """Return the response between two directions over the mean response at normal incidence."""
     told = angular_response(colour, eta)
     rows = np.linspace(0.0, 1.0, DIRECTION_ROWS)
     back = np.array([np.interp(np.sqrt(cosine_in), rows, told.relative_reflectance[:, c]) for c in range(3)])
@@ -71,7 +71,7 @@ def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR
 
 @pytest.mark.parametrize("surface", [DRY, {}], ids=["matched", "refracting"])
 def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
-    """Finite where light comes in along the surface and leaves along it."""
+    """The response is finite for grazing entry and exit."""
     eta = 1.0 if surface else 1.4
     cosines = np.concatenate([[0.0, 1e-7, 1e-4, 3e-3], np.linspace(0.01, 1.0, 12)])
     pairs = np.stack([*np.meshgrid(cosines, cosines), *np.zeros((2, 16, 16))], axis=-1)
@@ -106,7 +106,7 @@ def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
 def test_even_light_on_a_plane(
     renderer: Renderer, close: float, profile: str, surface: Any, technique: str
 ) -> None:
-    """Seen and lit aslant, without the lobe's own light."""
+    """Compare at oblique view and light, without specular reflection."""
     scene = scene_of(FLAT, LIGHT, camera=seen_from(ASLANT), profile=profile, albedo="profile", **surface)
     turned = replace(scene, skin=scene.skin.model_copy(update={"direction": "half-space"}))
     made, plain = (middle(renderer, one, technique=technique, parts="diffuse") for one in (turned, scene))
@@ -117,7 +117,7 @@ def test_even_light_on_a_plane(
 
 
 def test_a_colour_map_counts_by_its_mean(renderer: Renderer) -> None:
-    """Texels that nobody painted are black, and do not count."""
+    """Texels outside charts are black, and do not count."""
     colour = np.zeros((64, 64, 3))
     colour[:48] = [0.5, 0.25, 0.75]
     scene = scene_of(head_of(plane(100.0), colour=colour), LIGHT, camera=seen_from(ASLANT))
@@ -130,7 +130,7 @@ def test_a_colour_map_counts_by_its_mean(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("technique", ["none", "texture-space", "pre-integrated"])
 def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str) -> None:
-    """A matched half-space under even light sends out what enters it from there."""
+    """A matched half-space under uniform light returns the light that enters it."""
     room, told = Environment(name="uniform"), angular_response(COLOUR, 1.0)
     for degrees in (10.0, 80.0):
         scene = scene_of(
@@ -176,7 +176,7 @@ def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Rend
 def test_light_from_around_is_not_multiplied_by_what_scattered_once(
     renderer: Renderer, profile: str, technique: str
 ) -> None:
-    """Bumps lit along their surface and seen along it have little below but what came from around."""
+    """Bumps with grazing light and view have little light below except from the surface around them."""
     bumps = np.random.default_rng(1).normal(0.0, 0.5, (256, 256, 2))
     rough = head_of(uv_sphere(30.0, 128, 64), normal=bumps)
     light = DirectionalLight(direction=(-1.0, 0.0, 0.1), irradiance=(3.0,) * 3, shadows=False)
@@ -198,9 +198,9 @@ def test_light_from_around_is_not_multiplied_by_what_scattered_once(
 
 
 def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, profile: str) -> None:
-    """In a shadow nothing scattered only once: no direction is darkened below nothing, nor an edge drawn.
+    """In a shadow there is no single scattering: no direction becomes negative, and no edge appears.
 
-    Lambertian skin is as bright there, or a pixel nearer to the light: so far aside light comes back.
+    Lambertian skin is as bright there, or a pixel nearer to the light, by the oblique offset.
     """
     ball = scene_of(
         BALL,
@@ -225,7 +225,7 @@ def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, p
 
 
 def test_white_skin_is_not_made_brighter(renderer: Renderer) -> None:
-    """Whatever white skin does not take, it returns already."""
+    """White skin returns all light that enters it."""
     scene = scene_of(FLAT, LIGHT, camera=seen_from(0.0), albedo="profile", direction="half-space", **DRY)
     bright = angular_response(np.ones(3), 1.0)
     np.testing.assert_allclose(bright.relative_reflectance, 1.0, atol=1e-3)

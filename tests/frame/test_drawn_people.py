@@ -1,4 +1,4 @@
-"""Many people drawn in turn: one topology, and pictures that do not tell who was drawn before."""
+"""Many people in turn: one topology, and pictures that do not depend on the people before."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_picture_does_not_tell_who_was_drawn_before(renderer: Renderer, scenes
 
 
 class Made:
-    """Bytes of the storage that a device makes and fills."""
+    """Sizes of the buffers that a device creates and fills [bytes]."""
 
     def __init__(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
         self.sizes, make = list[int](), device.buffer
@@ -71,7 +71,7 @@ class Made:
 def test_a_new_person_takes_what_is_new_to_the_device(
     renderer: Renderer, scenes: dict[int, Scene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The hairs, and nothing else of the size of the mesh: no atlas, no triangles, no targets."""
+    """Only hairs are uploaded: no atlas, no triangles, no morph targets."""
     list(renderer.render_many([scenes[0]], **SETTINGS))  # type: ignore[call-overload]
     made = Made(renderer.device, monkeypatch)
     second = scenes[1].replace(skin=scenes[0].skin)

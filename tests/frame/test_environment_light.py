@@ -1,4 +1,4 @@
-"""Light from all around in the frame: shader against numpy, against plain sums, and white furnaces."""
+"""Environment light in the frame: against NumPy, against plain sums, and white furnaces."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WHITE = head_of(BALL, colour=np.ones((4, 4, 3)))
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A panorama with a coloured side, a window and a bright lamp that becomes a sun."""
+    """Return a panorama with a coloured side, a window and a bright lamp that becomes a sun."""
     towards = directions(64, 128)
     radiance = 0.5 + 0.4 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.85] += [2.0, 2.5, 3.0]
@@ -51,19 +51,19 @@ def around(head: Any, environment: Environment, **skin: Any) -> Scene:
 
 
 def exposed(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
-    """(h, w, 4) picture and coverage."""
+    """Return the (h, w, 4) picture and coverage."""
     picture = run_frame(renderer, scene, **settings).resources.post.picture
     return download(renderer.device, picture.exposed).astype(float)
 
 
 def hemisphere(seed: int) -> Floats:
-    """(n, n, 3) unit vectors in all directions, float32 values."""
+    """Return (n, n, 3) unit vectors in all directions, as float32 values."""
     v = np.random.default_rng(seed).normal(size=(SIZE, SIZE, 3))
     return twins.unit(v).astype(np.float32).astype(float)
 
 
 def facing(normal: Floats, seed: int) -> Floats:
-    """Unit vectors on the normal's side."""
+    """Return unit vectors on the side of the normal."""
     v = hemisphere(seed)
     return np.where(twins.dot(v, normal)[..., None] > 0, v, -v)
 
@@ -97,7 +97,7 @@ def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
 
 @pytest.mark.parametrize("rotation", [0.0, 90.0])
 def test_what_enters_is_the_sum_over_all_directions(renderer: Renderer, room: str, rotation: float) -> None:
-    """Each texel of a ball: the panorama's texels times their cosines; the sun shines as a light."""
+    """Compare each texel of a ball with the sum of panorama texels times cosines; the sun is a light."""
     scene = around(
         head_of(BALL), Environment(name=room, rotation_degrees=rotation, exposure=2.0), rho_s=0.0, mix=0.0
     )
@@ -127,14 +127,14 @@ def _read(path: str) -> Any:
 
 
 def middle(image: Floats) -> Floats:
-    """Pixels wholly on the ball."""
+    """Return the pixels that lie entirely on the ball."""
     return np.asarray(image[..., :3][image[..., 3] == 1])
 
 
 @pytest.mark.parametrize("energy", ["none", "full"])
 @pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])
 def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str) -> None:
-    """As much leaves as arrives; without an energy term the surface's own share comes on top."""
+    """All light leaves again; without an energy term the specular reflection is added on top."""
     scene = around(WHITE, Environment(name="uniform"), rho_s=rho_s, roughness=0.3, energy=energy)
     inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
     seen = middle(download(renderer.device, inputs.resources.post.picture.exposed).astype(float))
@@ -147,7 +147,7 @@ def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str
 
 
 def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
-    """A matte plane under radiance 3 of its colour, at any rotation."""
+    """Render a matte plane under radiance 3 times its colour, at any rotation."""
     head = head_of(plane(100.0))
     environment = Environment(name="uniform", exposure=3.0, rotation_degrees=33.0)
     scene = around(head, environment, rho_s=0.0)
@@ -157,7 +157,7 @@ def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
 
 
 def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None:
-    """And costs nothing when there is none: its stages are not drawn, its texture is a single texel."""
+    """Without an environment its stages do not run, and its texture is a single texel."""
     head = head_of(plane(100.0))
     both = replace(scene_of(head, frontal()), environment=Environment(name="uniform"))
     one, other, sum_ = (
@@ -182,7 +182,7 @@ def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> 
 
 
 def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str, close: float) -> None:
-    """Also far beyond what a light that is written down may give."""
+    """Suns may exceed the limits of lights in files."""
     plain, bright = (
         download(
             renderer.device,
@@ -206,7 +206,7 @@ SEEN = {"background": "environment", "background_blur": SMOOTHEST}
 
 @pytest.mark.parametrize("rotation", [60.0, -150.0])
 def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: float) -> None:
-    """Where each pixel's ray goes; turned by 60 degrees the window is in the picture's right."""
+    """Compare along the ray of each pixel; rotated by 60 degrees, the window is on the right."""
     environment = Environment(name=room, rotation_degrees=rotation, exposure=0.5)
     camera = front_camera(WHITE, frame_mm=600.0)
     scene = replace(scene_of(WHITE, camera=camera), environment=environment)
@@ -214,7 +214,9 @@ def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: flo
     image = download(renderer.device, inputs.resources.post.picture.exposed).astype(float)
     y, x = np.mgrid[:48, :48]
     ray = twins.unit(np.dstack([x - 23.5, 23.5 - y, np.full(x.shape, -24.0)]))  # 45 degrees to each side
-    exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.bindings["environment"], ray)
+    exact = 2 * twins.panorama_at(
+        prefilter(room).layers[1].astype(float), inputs.bindings["environment"], ray
+    )
     free = image[..., 3] == 0
     assert free.sum() > 1000
     assert np.abs(image[..., :3] - exact)[free].max() < PANORAMA * exact.max()
@@ -231,7 +233,7 @@ def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str)
 
 
 def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
-    """Half of the sky is bright: across the zenith its reflection changes by steps, not by a leap."""
+    """With half of the sky bright, the reflection across the zenith changes gradually."""
     radiance = np.where(directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
     write_exr(tmp_path / "half.exr", radiance.astype(np.float32))
     lit = run_frame(
@@ -253,7 +255,7 @@ def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
 
 
 def test_light_follows_the_rotation(renderer: Renderer, room: str) -> None:
-    """The window is in the picture's right, at the head's left; half a turn brings it to the other side."""
+    """The window is on the right of the picture; half a turn moves it to the other side."""
     left_right = []
     for degrees in (0.0, 180.0):
         scene = around(WHITE, Environment(name=room, rotation_degrees=degrees), rho_s=0.0)

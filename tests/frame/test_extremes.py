@@ -1,4 +1,4 @@
-"""Pictures of scenes with every number at an end of its range are finite."""
+"""Pictures of scenes with each number at an end of its range are finite."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import dermis
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.scene.field_errors import field_bounds, numeric_fields
-from dermis.scene.lights import LIGHTS
 from dermis.scene.frozen_model import FrozenModel
+from dermis.scene.lights import LIGHTS
 
 SMALL: dict[str, Any] = {"size": (24, 24), "atlas": 64, "samples": 1, "shadow_size": 64}
 NEEDED: dict[str, Any] = {"position": (0.0, 0.0, 900.0), "direction": (0.0, 0.0, -1.0)}
@@ -28,7 +28,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> dermis.Head:
 
 
 def ends(model: type[FrozenModel], field: str) -> list[Any]:
-    """The least and the greatest value of a field."""
+    """Return the least and the greatest value of a field."""
     info = model.model_fields[field]
     kind = get_args(info.annotation)
     if field_bounds(info) != (None, None):
@@ -93,6 +93,6 @@ def test_skins(renderer: Renderer, small: dermis.Head, tmp_path: Path) -> None:
 
 
 def test_a_human_far_away(renderer: Renderer) -> None:
-    """Whose triangles are small: products of their corners cancel in single precision."""
+    """Products of corners of small triangles cancel in single precision."""
     camera = dermis.Camera(position=(6e4, 6e4, 6e4), target=(5, 20, 90), frame_mm=30)
     check(renderer, dermis.Scene("human", camera=camera), size=(128, 128))

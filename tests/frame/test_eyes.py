@@ -1,4 +1,4 @@
-"""Eyes of true shape: what is seen through the cornea, where they stand, how lids close over them."""
+"""Modelled eyes: the view through the cornea, their poses, and the lids that close over them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def head() -> Head:
 
 
 def traced(places: Floats, ways: Floats) -> Floats:
-    """(n, 2) where rays through the cornea meet the plane of the iris, by Snell's law with angles [mm]."""
+    """Return (n, 2) hits of rays through the cornea with the plane of the iris, by Snell's law [mm]."""
     found = []
     for p, d in zip(places.reshape(-1, 3), ways.reshape(-1, 3), strict=True):
         n = (p - [0, 0, cornea_centre_mm()]) / CORNEA_MM
@@ -65,7 +65,7 @@ def test_the_iris_is_seen_where_a_traced_ray_meets_it(renderer: Renderer) -> Non
 
 
 def test_the_cornea_magnifies(renderer: Renderer) -> None:
-    """As an iris of 12 mm looks like one of 13 from the front."""
+    """An iris of 12 mm looks like one of 13 mm from the front."""
     p = np.zeros((SIZE, SIZE, 3))
     p[..., 0] = 2.0
     p[..., 2] = cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - 4)
@@ -75,7 +75,7 @@ def test_the_cornea_magnifies(renderer: Renderer) -> None:
 
 
 def test_the_cornea_dims_the_iris(renderer: Renderer) -> None:
-    """A disc in water shows 1/n^2 of what it does in air, and the cornea draws beams together."""
+    """A disc in water has 1/n^2 of its radiance in air, and the cornea focuses the light."""
     off = 0.05
     p = np.zeros((SIZE, SIZE, 3))
     p[..., 0], p[..., 2] = off, cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - off**2)
@@ -86,12 +86,12 @@ def test_the_cornea_dims_the_iris(renderer: Renderer) -> None:
 
 
 def on_iris(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
-    """(n, n, 2) where the shader finds the plane of the iris."""
+    """Return (n, n, 2) hits with the plane of the iris by the shader."""
     return probed(renderer, places, ways)[..., :2]
 
 
 def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
-    """(n, n, 4) what the shader finds."""
+    """Return (n, n, 4) results of the shader."""
     lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).bindings
     bound = {
         name: texture_from_array(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
@@ -102,7 +102,7 @@ def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
 
 
 def axes(head: Head, pose: Pose) -> Floats:
-    """(2, 3) directions that the eyes look in."""
+    """Return (2, 3) directions in which the eyes look."""
     assert head.eyes is not None
     frames = head.eyes.frames(head.control, pose.motion(head.control))
     return np.asarray([frame[2, :3] / np.linalg.norm(frame[2, :3]) for frame in frames])
@@ -129,14 +129,14 @@ def test_frames_have_the_apex_on_their_axis(head: Head) -> None:
     assert head.eyes is not None
     motion = pose.motion(head.control)
     frames = head.eyes.frames(head.control, motion)
-    apexes = head.control.some_posed(head.eyes.apex, motion)
+    apexes = head.control.pose_points(head.eyes.apex, motion)
     for frame, apex in zip(frames, apexes, strict=True):
         np.testing.assert_allclose((frame @ np.append(apex, 1))[:3], [0, 0, apex_mm()], atol=0.1)
 
 
 @pytest.mark.parametrize("place", [(0, 0, 600), (120, 40, 500), (-80, -60, 400)])
 def test_both_eyes_converge(head: Head, place: tuple[float, float, float]) -> None:
-    """Also with the head turned."""
+    """The eyes converge with the head turned too."""
     pose = looking_at(head, place, Pose(bones={"head": (0, 8, 0)}))
     assert head.eyes is not None
     at = np.append(np.add(place, head.centre_mm), 1.0)
@@ -153,7 +153,7 @@ def test_gaze_needs_eyes_and_a_place(head: Head) -> None:
 
 
 def eye_pixels(renderer: Renderer, person: Human, weight: float) -> int:
-    """How many pixels of a picture of the eyes show one."""
+    """Return the number of pixels that show an eye."""
     head = person.head()
     materials = tuple(
         replace(one, colour=(0.0, 1.0, 0.0) if "eye" in one.name else (0.0, 0.0, 0.0))
@@ -178,7 +178,7 @@ def test_closed_lids_leave_no_gap(renderer: Renderer, seed: int | None) -> None:
 
 @pytest.mark.parametrize("white", [False, True])
 def test_in_even_light_nothing_is_brighter_than_it(renderer: Renderer, head: Head, white: bool) -> None:
-    """With eyes, brows and lashes; what white skin passes on through thin parts is another matter."""
+    """In uniform light eyes, brows and lashes are no brighter than it; thin parts are left out."""
     middle = tuple(float(c) for c in -np.array(head.centre_mm))
     skin = Maps(colour=np.ones((4, 4, 3), np.float32)) if white else head.maps
     camera = Camera(position=(middle[0], middle[1], middle[2] + 600), target=middle, frame_mm=120.0)

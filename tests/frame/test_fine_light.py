@@ -1,4 +1,4 @@
-"""Light finer than texels and pixels: its amount, its place, and its width after it has spread."""
+"""Light finer than texels and pixels: its amount, position and width after scattering."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ PROFILE = load_profile("skin1")
 
 
 def stripe(x_mm: float, width_mm: float) -> StripeLight:
-    """Along +Y, straight from above."""
+    """Return a stripe along +Y, from straight above."""
     middle = place(FLAT, (x_mm, 0, 0))
     return StripeLight(direction=(0, 0, -1), position=middle, width_mm=width_mm, shadows=False)
 
 
 def lit(renderer: Renderer, light: StripeLight, atlas: int, **settings: Any) -> Any:
-    """A frame of the plane, in the colour of `PROFILE` and without a surface that reflects."""
+    """Render the plane in the colour of `PROFILE`, without specular reflection."""
     camera = scene_of(FLAT).camera.model_copy(update={"frame_mm": FRAME_MM})
     skin = {"profile": "skin1", "albedo": "profile", "specular": "none", "energy": "none"}
     scene = scene_of(FLAT, light, camera=camera, **skin)
@@ -36,15 +36,15 @@ def lit(renderer: Renderer, light: StripeLight, atlas: int, **settings: Any) -> 
 
 
 def across(renderer: Renderer, light: StripeLight, atlas: int, **settings: Any) -> Floats:
-    """(w, 3) radiance along a row of the picture, away from where triangles meet."""
+    """Return the (w, 3) radiance along a row of the picture, away from edges of triangles."""
     picture = lit(renderer, light, atlas, **settings).resources.post.picture
     return download(renderer.device, picture.radiance)[PIXELS // 2 + 12, :, :3].astype(float)
 
 
 def spread(light: StripeLight, x_mm: float, sub: int, width: float = 1.0) -> Floats:
-    """(w, 3) of the row, analytic, as the mean over `sub` places of each pixel.
+    """Return the analytic (w, 3) radiance of the row, the mean over `sub` points of each pixel.
 
-    width : factor of how far light spreads
+    width : factor of the scattering distance
     """
     x = (np.arange(PIXELS * sub) + 0.5) / sub * FRAME_MM / PIXELS - FRAME_MM / 2 - x_mm
     sigma2 = (light.width_mm / 4) ** 2
@@ -59,14 +59,14 @@ def spread(light: StripeLight, x_mm: float, sub: int, width: float = 1.0) -> Flo
 def test_a_stripe_on_coarse_texels_spreads_as_the_profile_says(
     renderer: Renderer, x_mm: float, atlas: int
 ) -> None:
-    """Texels of 1.5 and 0.75 mm under a stripe of 1.5 mm: without what the picture adds 3 to 64 % off."""
+    """A stripe of 1.5 mm on texels of 1.5 and 0.75 mm is 3 to 64 % off without the picture's correction."""
     made, exact = across(renderer, stripe(x_mm, 1.5), atlas), spread(stripe(x_mm, 1.5), x_mm, 1)
     assert np.sqrt(((made - exact) ** 2).sum() / (exact**2).sum()) < 0.04
 
 
 @pytest.mark.parametrize("samples", [1, 16])
 def test_pixels_average_as_their_samples_would(renderer: Renderer, samples: int) -> None:
-    """All of a stripe of 0.5 mm amid pixels of 0.33 mm: one sample is a point, and has 12 % too much."""
+    """A stripe of 0.5 mm within pixels of 0.33 mm: point samples would have 12 % too much light."""
     middle = FRAME_MM / PIXELS / 2
     light = stripe(middle, 0.5)
     made = across(renderer, light, 64, samples=samples, technique="none").sum(axis=0)
@@ -75,7 +75,7 @@ def test_pixels_average_as_their_samples_would(renderer: Renderer, samples: int)
 
 
 def test_texels_hold_all_light_wherever_it_falls_among_them(renderer: Renderer) -> None:
-    """A stripe half as wide as a texel, moved by parts of one; their centres alone held 0 to 320 %."""
+    """Move a stripe half as wide as a texel by fractions of a texel; point samples hold 0 to 320 %."""
     held = [
         entered_light(renderer, lit(renderer, stripe(x, 0.75), 64))[16:48, :, 0].sum(axis=1).mean()
         for x in (0.0, 0.375, 0.75)

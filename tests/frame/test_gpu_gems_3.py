@@ -1,4 +1,4 @@
-"""The blurs as published, with the faults that are known of them."""
+"""Blurs as published in 2007, with their known flaws."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BLUR = Blur(VARIANCES, np.zeros((4, 3)), (0,) * 5)
 
 @pytest.fixture(scope="module")
 def levels(device: Device) -> list[np.ndarray]:
-    """A lit texel spread over a plane."""
+    """Return a lit texel blurred over a plane."""
     atlas = build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE)
     space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
     light = np.zeros((SIZE, SIZE, 4))
@@ -39,13 +39,13 @@ def levels(device: Device) -> list[np.ndarray]:
 
 
 def test_it_gains_a_thousandth_and_loses_more_to_its_halves(levels: list[np.ndarray]) -> None:
-    """The seven weights sum to 1.001 in each pass; halves are cut off, not rounded, on some adapters."""
+    """The seven weights sum to 1.001 in each pass; some adapters truncate half floats."""
     for k, level in enumerate(levels, start=1):
         assert 0.985 < level.sum() < 1.002 ** (2 * k)
 
 
 def test_it_is_too_wide(levels: list[np.ndarray]) -> None:
-    """By the weights' variance of 1.08, and by reading between texels where steps are under one."""
+    """The weights have a variance of 1.08, and interpolation adds more for steps below one texel."""
     y, x = np.indices((SIZE, SIZE)) - SIZE // 2
     for level, variance in zip(levels, VARIANCES, strict=True):
         wide = (level * (x**2 + y**2)).sum() / (2 * level.sum() * TEXELS_PER_MM**2)
@@ -60,7 +60,7 @@ def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
 
 
 def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
-    """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
+    """Weights of 1.001 must not give coverage above 1, which would subtract the clear colour."""
     space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
     upload(device, space.stacks[0], np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = CommandList(device)

@@ -1,4 +1,4 @@
-"""Cameras as OpenCV has them: points lie where K, R and t say, and crops are parts of pictures."""
+"""OpenCV cameras: points project by K, R and t, and crops are parts of pictures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ K = np.array([[210.0, 0.0, 61.3], [0.0, 260.0, 20.6], [0.0, 0.0, 1.0]])  # fx !=
 
 
 def rotation(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Of a camera that looks along -Z and is turned a little."""
+    """Return the rotation of a camera that looks along -Z and is slightly turned."""
     made = np.diag([1.0, -1.0, -1.0])
     for axis, angle in enumerate(np.radians(degrees)):
         turn = np.eye(3)
@@ -89,7 +89,7 @@ def test_a_usual_camera_has_its_principal_point_in_the_middle() -> None:
 
 @pytest.mark.parametrize("technique", ["none", "screen-space", "texture-space"])
 def test_a_crop_is_a_part_of_the_whole_picture(renderer: Renderer, head: Head, technique: str) -> None:
-    """Hairs, blurs in the picture and the environment behind it know of the principal point."""
+    """Hair, screen-space blurs and the background use the principal point."""
     size, (left, top), part = (96, 96), (20, 9), (48, 40)
     k = np.array([[150.0, 0.0, 47.5], [0.0, 150.0, 47.5], [0.0, 0.0, 1.0]])
     moved = k - [[0, 0, left], [0, 0, top], [0, 0, 0]]

@@ -1,4 +1,4 @@
-"""Light that enters the skin, texel by texel, against numpy."""
+"""Light that enters the skin, texel by texel, against NumPy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LIGHTS: dict[str, AnyLight] = {
 
 
 def entered(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
-    """Layer 0 of the levels: what the irradiance stage wrote."""
+    """Return level 0, the result of the irradiance pass."""
     return entered_light(renderer, run_frame(renderer, scene, atlas=SIZE))
 
 
@@ -51,7 +51,7 @@ def test_lights_on_a_sphere(renderer: Renderer, names: tuple[str, ...], rho_s: f
 
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
 def test_share_of_the_colour_map(renderer: Renderer, mix: float, close: float) -> None:
-    """A map of the atlas' size: its texel centres are the atlas' texel centres."""
+    """The texel centres of a map of the size of the atlas are those of the atlas."""
     v, u = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE
     wave = np.stack([0.5 + 0.3 * np.cos(2 * np.pi * u), 0.4 + 0.2 * np.sin(3 * v), 0.3 + 0 * u], axis=-1)
     wave = wave.astype(np.float16).astype(float)
@@ -72,7 +72,7 @@ def test_profile_colour_uses_no_map(renderer: Renderer, close: float) -> None:
 
 
 def test_specular_map_is_a_factor_with_mean_one(renderer: Renderer) -> None:
-    """An even map changes nothing, whatever its grey."""
+    """A constant map changes nothing, whatever its grey."""
     scenes = [
         scene_of(head, LIGHTS["directional"], rho_s=0.5)
         for head in (PLAIN, head_of(SPHERE, specular=np.full((8, 8), 0.37)))
@@ -83,7 +83,7 @@ def test_specular_map_is_a_factor_with_mean_one(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize(("constant", "same"), [(0.3, 0.5), (0.15, 0.25)])
 def test_the_constant_scales_a_roughness_map(renderer: Renderer, constant: float, same: float) -> None:
-    """And the usual one leaves it as it is."""
+    """The default roughness leaves the map unchanged."""
     rough = head_of(SPHERE, roughness=np.full((8, 8), 0.5))
     mapped = scene_of(rough, LIGHTS["directional"], roughness=constant)
     plain = scene_of(PLAIN, LIGHTS["directional"], roughness=same)

@@ -1,4 +1,4 @@
-"""Levels of less resolution and of halves against whole levels of floats."""
+"""Levels of lower resolution and of half precision, compared with full resolution in 32-bit floats."""
 
 from __future__ import annotations
 
@@ -15,10 +15,16 @@ from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas.textures import AtlasTextures, AtlasMip, _coarser, halve_mip, upload_atlas
+from dermis.frame.features.atlas.textures import AtlasMip, AtlasTextures, _coarser, halve_mip, upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, levels_by_resolution, make_levels, half_precision_scale
+from dermis.frame.features.diffusion.pyramid import (
+    Blur,
+    choose_halvings,
+    half_precision_scale,
+    levels_by_resolution,
+    make_levels,
+)
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
@@ -33,7 +39,7 @@ SPHERE = cut_sphere(12.0, 20)
 
 @pytest.fixture(scope="module")
 def atlas() -> Atlas:
-    """Fine enough for light to be halved twice."""
+    """Return an atlas that is fine enough for light to be halved twice."""
     return build_atlas(SPHERE, 256, "stitched")
 
 
@@ -62,7 +68,7 @@ def test_halvings_are_the_same_from_disk(
 
 @pytest.fixture(scope="module")
 def stripes(atlas: Atlas) -> Floats:
-    """Bands of light with hard ends over the sphere."""
+    """Return bands of light with hard edges over the sphere."""
     y = atlas.interpolate(SPHERE, SPHERE.positions)[..., 1]
     light = (np.sin(y / 1.5) > 0)[..., None] * np.array([1.0, 0.6, 0.3]) + 0.01
     return np.dstack([light, np.ones(y.shape)]) * atlas.lit[..., None]
@@ -71,8 +77,11 @@ def stripes(atlas: Atlas) -> Floats:
 def combined(
     device: Device, texel: str, textures: AtlasTextures, light: Floats, scale: float = 1.0
 ) -> tuple[Floats, tuple[int, ...]]:
-    """The sum of the blurred levels, and how often each was halved."""
-    side, halvings = len(light), choose_halvings(BLURRED, textures.median_texels_per_mm, len(textures.coarser))
+    """Return the sum of the blurred levels, and how often each was halved."""
+    side, halvings = (
+        len(light),
+        choose_halvings(BLURRED, textures.median_texels_per_mm, len(textures.coarser)),
+    )
     blur = Blur(BLURRED, WEIGHT, halvings, scale)
     space = make_levels(device, side, (halvings,), texel)
     into = make_texture(device, (side, side), FLOATS)
@@ -85,7 +94,7 @@ def combined(
 
 
 def error(made: Floats, exact: Floats, own: NDArray[np.bool_]) -> float:
-    """Relative RMSE."""
+    """Return the relative RMSE."""
     return float(np.sqrt(((made - exact)[own] ** 2).mean() / (exact[own] ** 2).mean()))
 
 
@@ -110,9 +119,11 @@ def test_constant_light_stays_constant_at_every_resolution(
 
 
 def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
-    """Texels of 1 mm: the second level widens by 0.4 mm2, halving alone by 1, which the third makes good."""
+    """With texels of 1 mm halving adds more than 0.4 mm2 to the second level; the third compensates."""
     atlas = build_atlas(plane(256.0), 256)
-    coarser = _coarser(device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
+    coarser = _coarser(
+        device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+    )
     textures = resting(device, atlas, coarser=coarser, median_texels_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
     halvings = choose_halvings(variances, 2.0, len(coarser))
@@ -132,17 +143,21 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
 
 
 def test_levels_are_held_at_their_own_resolution_alone() -> None:
-    """And the last finer one before them, halved; of two layouts what either needs."""
+    """Each resolution stores its levels and the last finer one; several layouts share the union of both."""
     assert levels_by_resolution(((0,),)) == (range(1),)
     assert levels_by_resolution(((0, 0, 0, 1, 1, 2),)) == (range(3), range(2, 5), range(4, 6))
-    assert levels_by_resolution(((0, 0, 0, 1, 1, 2), (0, 0, 1, 1, 1, 1))) == (range(3), range(1, 6), range(4, 6))
+    assert levels_by_resolution(((0, 0, 0, 1, 1, 2), (0, 0, 1, 1, 1, 1))) == (
+        range(3),
+        range(1, 6),
+        range(4, 6),
+    )
 
 
 @pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])
 def test_halves_keep_the_light(
     device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, brightest: float
 ) -> None:
-    """In amount and in place, however bright it is; were they cut off, each pass would lose a 4000th."""
+    """Half precision keeps the amount of light and its position, however bright it is."""
     light = stripes * [brightest, brightest, brightest, 1.0]
     floats, _ = combined(device, FLOATS, textures, light)
     halves, _ = combined(device, HALF, textures, light, half_precision_scale(HALF, brightest))
@@ -152,7 +167,7 @@ def test_halves_keep_the_light(
 
 @pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
 def test_scales_are_powers_of_two(brightest: float) -> None:
-    """Those that a shader's float holds, however little light there is."""
+    """Scales are powers of two that a 32-bit float holds, however little light there is."""
     scale = half_precision_scale(HALF, brightest)
     assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
     assert scale < np.finfo(np.float32).max and 1 / scale > np.finfo(np.float32).tiny
@@ -168,7 +183,7 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
 
 
 def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
-    """Stretch of half as many texels, runs of half the length, and gutters that show the same places."""
+    """Stretch and distances to the edge are halved, and gutters copy the same positions."""
     coarse = halve_mip(AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
     own, made = coarse.lit, textures.coarser[0].resources
     metric = download(device, made["stretch_map"]).astype(np.float64)
@@ -186,7 +201,7 @@ def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textur
 
 
 def shown_apart(atlas: Atlas, coarse: AtlasMip) -> Any:
-    """Distance from the source of each halved texel to the mean of those of its four [texel]."""
+    """Return the distance of each halved texel's source from the mean source of its four [texel]."""
     source = np.full((256, 256, 2), np.nan)
     source[atlas.gutter[:, 1], atlas.gutter[:, 0]] = atlas.source
     x, y = 2 * coarse.gutter.astype(int).T

@@ -1,4 +1,4 @@
-"""How several lights see a head at once: each as it does alone."""
+"""Shadow views of several lights equal those of each light alone."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_maps_hold_the_head_tightly(index: int) -> None:
 
 @pytest.mark.parametrize("inside", [(0, 0, 5), (0, 0, 30.4)])
 def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
-    """Or so near that it would have to look to all sides."""
+    """A light inside the bounds, or so near that no map can cover the head, is refused by name."""
     lamp = PointLight(position=place(BALL, inside), target=(100.0, 0.0, 0.0))
     with pytest.raises(DermisError, match=r"light 2.*a place outside the head"):
         light_views(scene_of(BALL, LIGHTS[0], lamp), BALL.mesh.outline, 64)
@@ -52,7 +52,7 @@ def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
 
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_up_counts_however_short(length: float) -> None:
-    """The least that scenes allow, up to the longest; only one along the view is replaced."""
+    """The up vector counts at any allowed length; only one along the view is replaced."""
     tilted = view_axes((0.0, 0.6, -0.8), (0.0, 0.9 * length, 0.2 * length))
     assert np.allclose(tilted, [(1.0, 0.0, 0.0), (0.0, 0.8, 0.6), (0.0, 0.6, -0.8)])
     assert np.allclose(view_axes((0.0, 1.0, 0.0), (0.0, length, 0.0))[2], (0.0, 1.0, 0.0))

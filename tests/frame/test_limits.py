@@ -1,4 +1,4 @@
-"""Every program stays within the limits that WebGPU promises everywhere, whatever this machine offers."""
+"""Every program stays within the default limits of WebGPU, whatever this machine offers."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ WHOLE = {"seams": "multi-uv", "bloom": 0.1, "tone": "filmic"}
 
 
 def _programs() -> list[Path]:
-    """Shaders with an entry point: all that Python compiles."""
+    """Return the shaders with an entry point."""
     entry = re.compile(r"^@(compute|vertex|fragment)\b", re.MULTILINE)
     return [path for path in SHADERS if entry.search(compose(path, FOLDERS).text)]
 
@@ -75,7 +75,7 @@ def test_uniforms_fit_64_kib() -> None:
 
 @pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
 def test_workgroups_fit_any_device(path: Path) -> None:
-    """wgpu's library does not look at the memory that a workgroup's invocations share."""
+    """The wgpu library does not check the shared memory of workgroups."""
     text = re.sub(r"//[^\n]*", "", compose(path, FOLDERS).text)
     structs = set(re.findall(r"struct (\w+)", text))
     held = 0
@@ -89,7 +89,7 @@ def test_workgroups_fit_any_device(path: Path) -> None:
 
 
 def _number(text: str, spelled: str) -> int:
-    """The value of an expression: of what Python gives at most, of the shader's constants, of numbers."""
+    """Return the value of an expression of constants and numbers."""
     if declared := LARGEST.get(spelled):
         return declared
     spelled = spelled.removesuffix(".x")
@@ -103,7 +103,7 @@ def _number(text: str, spelled: str) -> int:
 
 @pytest.fixture(scope="module")
 def bare(renderer: Renderer) -> Renderer:
-    """A renderer on a device without any feature, and with the default limits alone."""
+    """Return a renderer on a device without features and with default limits."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(renderer_module, "open_device", partial(open_device, bare=True))
         return Renderer(renderer.device.adapter.name)

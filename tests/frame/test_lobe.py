@@ -1,4 +1,4 @@
-"""The shader's surface lobes against the exact functions."""
+"""Specular lobes of the shader against the exact functions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COMPUTED = [name for name in MODELS if name != "kelemen"]
 
 
 def directions(seed: int) -> Floats:
-    """(n, n, 3) unit vectors over the hemisphere, float32 values."""
+    """Return (n, n, 3) unit vectors over the hemisphere, as float32 values."""
     rng = np.random.default_rng(seed)
     z, phi = rng.uniform(0.02, 1.0, (SIZE, SIZE)), rng.uniform(0, 2 * np.pi, (SIZE, SIZE))
     r = np.sqrt(1 - z**2)
@@ -39,7 +39,7 @@ def directions(seed: int) -> Floats:
 
 
 def shader(renderer: Renderer, light: Floats, view: Floats, m: float, rho_s: float, **skin: Any) -> Any:
-    """What the lobe's functions give, each (n, n): reflectance, slopes, BRDF; shares that pass."""
+    """Return (n, n) results of the lobe's functions: reflectance, slopes, BRDF and transmitted fractions."""
     scene = scene_of(head_of(plane(50.0)), frontal(), **skin)
     lit = run_frame(renderer, scene).bindings
     flat = np.ones((SIZE, SIZE, 1))
@@ -53,12 +53,12 @@ def shader(renderer: Renderer, light: Floats, view: Floats, m: float, rho_s: flo
 
 
 def worst(made: Floats, exact: Floats) -> float:
-    """Largest error, of the largest value."""
+    """Return the largest error relative to the largest value."""
     return float(np.abs(made - exact).max() / np.abs(exact).max())
 
 
 def near_the_mirror(seed: int) -> tuple[Floats, Floats]:
-    """Light and view where highlights are: half vectors within ten degrees of the normal."""
+    """Return light and view directions whose half vectors are within ten degrees of the normal."""
     light = directions(seed)
     tilt = np.random.default_rng(seed + 1).normal(0, 0.08, (SIZE, SIZE, 2))
     half = np.dstack([tilt, np.ones((SIZE, SIZE))])
@@ -82,7 +82,7 @@ def test_each_model_is_its_twin(renderer: Renderer, model: str, fresnel: str, m:
 
 @pytest.mark.parametrize("m", [0.1, 0.2, 0.3, 0.5, 0.9])
 def test_kelemen_by_table(renderer: Renderer, m: float) -> None:
-    """Against its table read in float64, and against the lobe that the table stands for."""
+    """Compare with the table in float64, and with the lobe that the table approximates."""
     light, view = directions(1), directions(2)
     light[0, 0] = view[0, 0] = Z
     _, slopes, lobe, *_ = shader(renderer, light, view, m, 0.18, specular="kelemen")
@@ -115,13 +115,13 @@ def test_shares_that_pass(renderer: Renderer, model: str, energy: str) -> None:
 
 
 def test_nothing_enters_beyond_all_of_the_light(renderer: Renderer) -> None:
-    """The published albedo passes 1 for fine lobes at grazing light: the share must stop at 0."""
+    """The published albedo exceeds 1 for smooth lobes at grazing light: entering light is clamped at 0."""
     *_, entering, _, leaving = shader(renderer, directions(5), directions(6), 0.06, 1.0, energy="published")
     assert entering.min() == 0.0 and leaving.min() == 0.0
 
 
 def test_relief_that_turns_away_from_the_eye_reflects_as_seen_at_its_horizon(renderer: Renderer) -> None:
-    """Also with the light behind it, where the lobe of a normal that cannot be seen has no bounds."""
+    """Light from behind is included, where the lobe of an invisible normal is unbounded."""
     rng = np.random.default_rng(4)
     view = directions(9)
     to_light = np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05)

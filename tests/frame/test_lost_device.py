@@ -1,4 +1,4 @@
-"""A device that is lost is opened again, once, and the frame drawn anew: the same picture to the bit."""
+"""A lost device is opened again, once, and the frame is rendered again with an identical picture."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TWICE = re.compile(r"dermis: device: expected .+ to last for a frame, but it was
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory: pytest.TempPathFactory) -> subprocess.CompletedProcess[str]:
-    """All stages in one process, as the library may end it."""
+    """Run all stages in one process, as the library may end it."""
     paths = [str(TESTS), str(TESTS / "frame"), os.environ.get("PYTHONPATH", "")]
     command = [sys.executable, str(TESTS / "frame" / "lost_device.py"), ADAPTER]
     return subprocess.run(

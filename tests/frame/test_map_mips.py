@@ -1,4 +1,4 @@
-"""Slopes and mips that the device makes of maps: exact where they can be, and the twins of plain arrays."""
+"""Slopes and mip levels that the device computes, against exact values and NumPy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHAPES = [(16, 16), (70, 45), (17, 31), (3, 200), (1, 9), (5, 1)]
 
 
 def slopes_of(device: Device, height: Floats) -> Floats:
-    texture = map_mips.relief(device, height.astype(np.float32))
+    texture = map_mips.make_relief(device, height.astype(np.float32))
     made = download(device, texture).astype(float)
     np.testing.assert_allclose(made[..., 2:], made[..., :2] ** 2, rtol=2 * HALVES, atol=1e-6)
     return np.asarray(made[..., :2])
@@ -51,14 +51,14 @@ def test_wave_has_its_derivative(device: Device) -> None:
 
 
 def test_rows_and_columns_are_alike(device: Device) -> None:
-    """Each invocation takes many rows of one column."""
+    """Each invocation handles many rows of one column."""
     height = noise((150, 40)).astype(float)
     turned = slopes_of(device, height.T)[..., ::-1].swapaxes(0, 1)
     np.testing.assert_allclose(slopes_of(device, height), turned, atol=HALVES)
 
 
 def test_bands_do_not_show(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Large maps go to the device a few rows at a time."""
+    """Large maps are uploaded a few rows at a time."""
     height = noise((150, 42)).astype(float)
     at_once = slopes_of(device, height)
     monkeypatch.setattr(map_mips, "_BAND_BYTES", 64 * 4 * 44)
@@ -67,7 +67,7 @@ def test_bands_do_not_show(device: Device, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("shape", [(16, 16), (70, 44), (71, 44), (2, 6)])
 def test_mips_of_relief_are_means(device: Device, shape: tuple[int, int]) -> None:
-    made = all_mips(device, map_mips.relief(device, noise(shape)))
+    made = all_mips(device, map_mips.make_relief(device, noise(shape)))
     for level, mean in zip(made, mip_chain(made[0]), strict=True):
         np.testing.assert_allclose(level, mean, atol=HALVES)
 
@@ -75,7 +75,7 @@ def test_mips_of_relief_are_means(device: Device, shape: tuple[int, int]) -> Non
 @pytest.mark.parametrize("shape", SHAPES)
 def test_mips_of_colours_are_their_means(device: Device, shape: tuple[int, int]) -> None:
     image = noise((*shape, 3))
-    made, want = all_mips(device, map_mips.colours(device, image)), mip_chain(image)
+    made, want = all_mips(device, map_mips.upload_colours(device, image)), mip_chain(image)
     assert len(made) == len(want)
     for level, mean in zip(made, want, strict=True):
         np.testing.assert_allclose(level[..., :3], mean, atol=HALVES)
@@ -84,6 +84,6 @@ def test_mips_of_colours_are_their_means(device: Device, shape: tuple[int, int])
 
 def test_mips_of_slopes_are_means_of_them_and_their_squares(device: Device) -> None:
     slopes = noise((33, 48, 2)) - 0.5
-    made = all_mips(device, map_mips.slopes(device, slopes))
+    made = all_mips(device, map_mips.upload_slopes(device, slopes))
     for level, mean in zip(made, mip_chain(np.dstack([slopes, slopes**2])), strict=True):
         np.testing.assert_allclose(level, mean, atol=HALVES)

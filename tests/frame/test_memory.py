@@ -1,4 +1,4 @@
-"""What a renderer holds of the device's memory: no more than its last frame needs, and what was foreseen."""
+"""Device memory of a renderer: no more than its last frame needs, and as much as predicted."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 def bytes_of(texel: str) -> int:
-    """Of a texel in one of wgpu's formats, such as rgba16float."""
+    """Return the size of a texel in a format of wgpu, such as rgba16float."""
     channels, bits = re.fullmatch(r"(r|rg|rgba|depth)(\d+)[a-z-]+", texel).groups()  # type: ignore[union-attr]
     return len(channels.replace("depth", "d")) * int(bits) // 8
 
 
 class Held:
-    """The textures and buffers of a device that are still alive."""
+    """Textures and buffers of a device that are still alive."""
 
     def __init__(self, device: Device, patch: pytest.MonkeyPatch) -> None:
         self._alive: list[tuple[weakref.ref[Any], int]] = []
@@ -75,7 +75,7 @@ def held(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> Held:
 
 
 def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held) -> None:
-    """Whatever came before, as much is held as by a renderer without a past."""
+    """The memory is that of a fresh renderer, whatever was rendered before."""
     alone = {}
     for kind in KINDS:
         renderer.clear_cache()
@@ -88,7 +88,7 @@ def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held
 
 @pytest.mark.parametrize("kind", ["texture-space", "two layouts", "gpu-gems-3", "none"])
 def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind: str) -> None:
-    """The difference of two sizes, so that what has another size does not count; halved levels take less."""
+    """The difference of two sizes cancels resources of other sizes; halved levels take less."""
     if renderer.device.adapter.kind != "CPU":
         pytest.skip("only a software adapter takes main memory, and levels of floats")
     found = {}
@@ -106,6 +106,6 @@ def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind:
 def test_techniques_without_an_atlas_ask_for_none(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Even where no device could hold it."""
+    """Sizes that no device could allocate are accepted."""
     monkeypatch.setattr(renderer.device, "max_texture_size", 2048)
     assert renderer.draw(SCENE, settings_of(technique="none", atlas=16384)).linear().max() > 0.1

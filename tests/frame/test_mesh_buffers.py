@@ -1,4 +1,4 @@
-"""The mesh reads the same from buffers as from textures."""
+"""Meshes read from buffers equal those read from textures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light below a surface that moves: as much as at rest, as wide as the moved surface is, never stale."""
+"""Diffusion on a moving surface: the light of the rest pose, the width of the moved surface, never stale."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from atlas_reading import shown
 from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from setups import head_of, scene_of, settings_of
-from test_shape import anew, bent, words
+from test_shape import bent, rebuilt, words
 from tolerances import FLAT, HARMONIC, POSED
 
 from dermis import Pose
-from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
+from dermis.apps.validation.benchmarks.cases import pose_at_moment, with_test_rig
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas.passes import draw_stretch
@@ -47,7 +47,7 @@ def atlas(head: Head) -> Atlas:
 
 
 def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light: Floats) -> list[Floats]:
-    """The levels of (n, n, 1) light on a head in motion, each at its resolution."""
+    """Return the levels of (n, n, 1) light on a head in motion, each at its resolution."""
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.mips_for("repeated")) - 1
     halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
@@ -68,7 +68,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
 @pytest.mark.parametrize("moment", range(0, 21, 5))
 def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: Atlas, moment: int) -> None:
     moving = with_test_rig(head, 12)
-    motion = test_pose(moving, moment).motion(moving.control)
+    motion = pose_at_moment(moving, moment).motion(moving.control)
     held = MotionBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
     light = np.ones((SIDE, SIDE, 1)) * atlas.lit[..., None]
     for level in spread(device, moving, atlas, held, light):
@@ -80,7 +80,7 @@ def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: 
 def test_light_on_a_scaled_ball_widens_as_on_a_ball_of_that_size(
     device: Device, head: Head, atlas: Atlas, scale: float
 ) -> None:
-    """Of light in proportion to x a Gaussian of variance v leaves exp(-v / r^2)."""
+    """A Gaussian of variance v reduces light that is linear in x by exp(-v / r^2)."""
     light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
     levels = spread(device, head, atlas, MotionBytes(words(scale * head.positions_mm)), light)
     area = atlas.lit[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
@@ -108,7 +108,7 @@ def test_a_posed_head_looks_like_one_loaded_in_that_shape(
 ) -> None:
     points = bent(head.positions_mm.astype(float)).astype(np.float32)
     posed = picture(renderer, head, Pose(positions_mm=points), technique=technique)
-    other = replace(head, mesh=anew(head.mesh, points.astype(float)))
+    other = replace(head, mesh=rebuilt(head.mesh, points.astype(float)))
     vars(other)["centre_mm"] = head.centre_mm
     assert apart(posed, picture(renderer, other, technique=technique)) < POSED
     assert apart(posed, picture(renderer, head, technique=technique)) > 10 * POSED
@@ -123,17 +123,17 @@ def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
     renderer: Renderer, head: Head
 ) -> None:
     moving = with_test_rig(head, 4)
-    first = picture(renderer, moving, test_pose(moving, 1))
-    picture(renderer, moving, test_pose(moving, 2))
+    first = picture(renderer, moving, pose_at_moment(moving, 1))
+    picture(renderer, moving, pose_at_moment(moving, 2))
     ran = set(renderer.graph.executed_stages)
     assert {"shape", "shadows", "stretch", "surface", "irradiance", "visibility", "shade"} <= ran
-    assert np.array_equal(picture(renderer, moving, test_pose(moving, 1)), first)
-    picture(renderer, moving, test_pose(moving, 1))
+    assert np.array_equal(picture(renderer, moving, pose_at_moment(moving, 1)), first)
+    picture(renderer, moving, pose_at_moment(moving, 1))
     assert renderer.graph.executed_stages == []
 
 
 def test_people_in_turn_each_keep_their_gutters(head: Head) -> None:
-    """Their pairs are kept side by side; what they share on the device is written anew for each."""
+    """Pairs of several people are cached, and the gutters that they share are rewritten for each."""
     alone, together = Renderer("cpu"), Renderer("cpu", cache_size=2)
     poses = [
         Pose(positions_mm=head.positions_mm * np.array(by, np.float32)) for by in ((1.2, 1, 1), (1, 0.8, 1))

@@ -1,4 +1,4 @@
-"""Where a device has no room, the message tells what for, how much, and what would fit; and that fits."""
+"""Without enough memory, the message names the resource, its size and settings that fit; and these fit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SAID = re.compile(
 
 
 class Small(Held):
-    """A device with little memory, which says so as drivers do."""
+    """Device with little memory, which reports errors as drivers do."""
 
     def __init__(self, renderer: Renderer, patch: pytest.MonkeyPatch, most: float) -> None:
         renderer.clear_cache()
@@ -45,7 +45,7 @@ class Small(Held):
 
 
 def chosen(text: str, settings: Settings) -> Settings:
-    """Settings with the options of a command line."""
+    """Return settings with the options of a command line."""
     given: dict[str, Any] = {}
     for name, value in re.findall(r"--([\w-]+) (\S+)", text):
         sides = tuple(map(int, value.split("x")))
@@ -97,7 +97,7 @@ def test_buffers_over_the_limit_are_told(renderer: Renderer, monkeypatch: pytest
 
 
 def test_what_a_driver_says_of_a_texture_is_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The largest side that the adapter allows, whose bytes no memory holds: the library's own error."""
+    """A texture of the largest side exceeds any memory: the error of the library is reported."""
     device = renderer.device
     if device.adapter.kind != "CPU":
         pytest.skip("a GPU may have so much")

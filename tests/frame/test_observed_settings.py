@@ -1,4 +1,4 @@
-"""Scenes that are observed one after the other may each have settings of their own."""
+"""Observed scenes can have settings of their own."""
 
 from __future__ import annotations
 

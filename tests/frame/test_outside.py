@@ -1,4 +1,4 @@
-"""A light, a lobe and a technique of another package, taken by files, frames and help as their own."""
+"""A light, a lobe and a technique of another package work in files, frames and help."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from dermis.frame.lights.kind import KINDS
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane
 from dermis.scene.files import load_lights
-from dermis.scene.lights import LIGHTS
 from dermis.scene.frozen_model import field_choices
+from dermis.scene.lights import LIGHTS
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.sources import picture_sources
@@ -57,14 +57,14 @@ def chalk() -> Iterator[None]:
 
 
 def picture(renderer: Renderer, *lights: object, parts: str = "all", **skin: object) -> Floats:
-    """(n, n, 3) radiance of the floor, which does not scatter."""
+    """Return the (n, n, 3) radiance of the floor, which does not scatter."""
     settings = settings_of(size=(SIZE, SIZE), technique="none", parts=parts)
     scene = scene_of(FLOOR, *lights, **skin)  # type: ignore[arg-type]
     return renderer.draw(scene, settings).linear().astype(float)
 
 
 def radius_mm() -> Floats:
-    """(n, n) distance of each pixel's place on the floor from its middle."""
+    """Return the (n, n) distances of the pixels' positions from the middle of the floor."""
     along = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * FRAME_MM
     return np.asarray(np.hypot(*np.meshgrid(along, along)))
 
@@ -81,7 +81,7 @@ def from_file(folder: Path) -> GlowLight:
 @pytest.mark.usefixtures("glow")
 @pytest.mark.parametrize("shadows", [False, True])
 def test_a_light(renderer: Renderer, tmp_path: Path, shadows: bool) -> None:
-    """Against E cos^(power + 3), with E over the middle of a floor that hides nothing."""
+    """Compare with E cos^(power + 3), with E at the middle of an unoccluded floor."""
     light = from_file(tmp_path).model_copy(update={"shadows": shadows})
     made = picture(renderer, light, specular="none")
     cosine = HEIGHT / np.hypot(HEIGHT, radius_mm())
@@ -114,7 +114,7 @@ def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("chalk")
 def test_a_lobe(renderer: Renderer) -> None:
-    """It reflects half of rho_s at every angle; the rest of the light enters, and leaves as it came."""
+    """The lobe reflects half of rho_s at every angle; the rest of the light enters and leaves again."""
     irradiance, rho_s = 3.0, 0.4
     skin = {"specular": "blue-chalk", "rho_s": rho_s}
     light = frontal(irradiance)
@@ -133,7 +133,7 @@ def test_what_else_knows_the_lobe() -> None:
 
 
 def test_a_technique_from_outside(renderer: Renderer) -> None:
-    """It is drawn, cited and offered like the package's own, and not kept from them."""
+    """The technique is rendered, cited and offered like the package's own, with frames of its own."""
 
     def below(technique: str) -> Floats:
         scene = scene_of(FLOOR, frontal(), specular="none")

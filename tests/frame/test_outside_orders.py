@@ -1,4 +1,4 @@
-"""What another package registers is known whatever was imported before it: nothing copies a registry."""
+"""Registered entries are known in any order of imports: nothing copies a registry."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CLI = (
     ids=["nothing", "frame", "export", "reference", "cli", "all"],
 )
 def test_a_light_a_lobe_a_technique_and_an_output(before: tuple[str, ...]) -> None:
-    """Drawn, exported to pbrt with a note, refused by a truth and cited by a command."""
+    """Entries are rendered, exported to pbrt with a note, refused by a truth and cited by a command."""
     path = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
     command = [sys.executable, str(HERE / "outside" / "registered.py"), *before]
     run = subprocess.run(

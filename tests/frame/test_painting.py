@@ -1,4 +1,4 @@
-"""The human's painted skin: colours of pigments, marks, relief, and what expressions change."""
+"""Painted skin of a human: colours of pigments, marks, relief, and changes by expressions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.human.skin.face import MOVEMENTS, movement_weights
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.painted import PaintedMaps, skin_colour_table, mean_colour
+from dermis.human.skin.painted import PaintedMaps, mean_colour, skin_colour_table
 from dermis.human.skin.surface import BORDER_FIELDS, PaintedSurface, painted_surface
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -48,7 +48,7 @@ def painted(device: Device, surface: PaintedSurface, look: SkinLook = BARE, side
 
 
 def covered(head: Head, side: int = SIDE) -> NDArray[np.bool_]:
-    """(side, side) texels on the skin."""
+    """Return the (side, side) mask of texels on the skin."""
     kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
     texel, _ = rasterise(head.mesh, side, np.flatnonzero(kinds))
     found = np.zeros(side * side, bool)
@@ -57,7 +57,7 @@ def covered(head: Head, side: int = SIDE) -> NDArray[np.bool_]:
 
 
 def fields(head: Head, surface: PaintedSurface, name: str, side: int = SIDE) -> Floats:
-    """(side, side) a distance at the texels on the skin, far outside elsewhere [mm]."""
+    """Return the (side, side) distances at texels on the skin, large elsewhere [mm]."""
     kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
     texel, triangle = rasterise(head.mesh, side, np.flatnonzero(kinds))
     values = surface.vertices[:, 8 + BORDER_FIELDS.index(name)]
@@ -78,7 +78,7 @@ def test_the_same_look_is_the_same_paint_to_the_bit(device: Device, surface: Pai
 
 
 def test_colours_are_those_of_the_pigments(device: Device, surface: PaintedSurface, head: Head) -> None:
-    """Every colour of bare skin is one that the table has for some melanin and blood; not within lids."""
+    """Every colour of bare skin is in the table for some melanin and blood, except inside the lids."""
     maps, on = painted(device, surface), covered(head)
     assert maps.colour is not None
     outside = on & (fields(head, surface, "lips") < -6) & (fields(head, surface, "lids") > 0.5)
@@ -156,8 +156,10 @@ def test_given_maps_stay_and_others_are_painted(device: Device, head: Head) -> N
     assert with_painted_maps(device, other, SIDE) is other
 
 
-def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: PaintedSurface, head: Head) -> None:
-    """As many triangles as there can be."""
+def test_the_finest_mesh_is_painted_as_the_coarsest(
+    device: Device, surface: PaintedSurface, head: Head
+) -> None:
+    """The finest mesh has the largest number of triangles."""
     fine = Human().head(subdivide=3)
     finest = painted_surface(fine.mesh, fine.control.stencils)
     assert finest.count == 16 * surface.count
@@ -170,7 +172,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: Pai
 def test_more_triangles_than_have_numbers_are_refused(
     device: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(given, "_MOST_TRIANGLES", surface.count)
+    monkeypatch.setattr(given, "_MAX_TRIANGLES", surface.count)
     with pytest.raises(DermisError, match="Subdivide less"):
         painted(device, surface)
 
@@ -190,7 +192,7 @@ def test_a_face_at_rest_is_the_one_without_a_pose(renderer: Renderer, head: Head
 
 
 def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer, head: Head) -> None:
-    """By the relief that the device holds, texel by texel."""
+    """Compare the relief on the device texel by texel."""
     chosen = settings_of(atlas=512)
     found = []
     for weight in (0.0, 1.0):
@@ -218,8 +220,10 @@ def test_movements_are_those_of_their_targets() -> None:
 
 
 def test_unposed_people_share_the_painted_places() -> None:
-    """Places and fields are those of the average person, whoever is painted."""
-    one, other = (painted_surface(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head()))
+    """Positions and fields are those of the average person for all people."""
+    one, other = (
+        painted_surface(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head())
+    )
     np.testing.assert_allclose(one.vertices[:, 2:5], other.vertices[:, 2:5], atol=1e-4)
     assert np.array_equal(one.triangles, other.triangles)
 

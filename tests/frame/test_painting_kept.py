@@ -1,4 +1,4 @@
-"""Painted maps on disk: the same to the bit, for the same person alone, and of one person to a device."""
+"""Painted maps on disk: identical, for the same person only, and one person per device."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.frame.features.surface.painting import paint as stage
-from dermis.frame.features.surface.painting.paint import PaintInputs, RestMaps, paint_inputs, cached_rest_maps
+from dermis.frame.features.surface.painting.paint import PaintInputs, RestMaps, cached_rest_maps, paint_inputs
 from dermis.gpu import Device, download, open_device
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
@@ -28,7 +28,7 @@ def surface() -> PaintedSurface:
 
 @pytest.fixture
 def new(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Device:
-    """A device that has painted nothing yet, and an empty cache."""
+    """Return a device that has painted nothing yet, with an empty cache."""
     if device.adapter.kind != "CPU":
         pytest.skip("GPUs paint faster than they read back")
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
@@ -40,7 +40,7 @@ def another(device: Device) -> Device:
 
 
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[PaintInputs]:
-    """What is painted from now on."""
+    """Return a list to which the inputs of each painting are appended."""
     log: list[PaintInputs] = []
     paint = stage.paint_rest_maps
 
@@ -52,20 +52,20 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[PaintInputs]:
     return log
 
 
-def bits(device: Device, made: RestMaps, moving: bool) -> list[Any]:
+def bits(device: Device, made: RestMaps, animated: bool) -> list[Any]:
     maps = [download(device, one.texture) for one in (made.colour, made.specular, made.roughness)]
-    moved = [download(device, made.moved, layer=layer) for layer in range(2)] if moving else []
+    moved = [download(device, made.expression_deltas, layer=layer) for layer in range(2)] if animated else []
     return [*maps, np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32), *moved]
 
 
-@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("animated", [False, True])
 def test_what_is_found_is_what_was_painted(
-    new: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch, moving: bool
+    new: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch, animated: bool
 ) -> None:
     log, given = counted(monkeypatch), paint_inputs(surface, LOOK, SIDE)
-    painted = bits(new, cached_rest_maps(new, given, SIDE, moving), moving)
+    painted = bits(new, cached_rest_maps(new, given, SIDE, animated), animated)
     second = another(new)
-    found = bits(second, cached_rest_maps(second, given, SIDE, moving), moving)
+    found = bits(second, cached_rest_maps(second, given, SIDE, animated), animated)
     assert len(log) == 1
     assert [one.any() for one in painted].count(True) == len(painted)
     assert all(a.dtype == b.dtype and np.array_equal(a, b) for a, b in zip(painted, found, strict=True))
@@ -74,7 +74,7 @@ def test_what_is_found_is_what_was_painted(
 def test_all_that_changes_the_paint_is_in_the_key(
     new: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another look, size or surface, what movements add, and a file that is damaged, are painted anew."""
+    """Another look, size or surface, expression deltas, and a damaged file lead to painting again."""
     log, given = counted(monkeypatch), paint_inputs(surface, LOOK, SIDE)
     cached_rest_maps(new, given, SIDE)
     elsewhere = replace(surface, vertices=surface.vertices * np.float32(1.001))
@@ -85,7 +85,7 @@ def test_all_that_changes_the_paint_is_in_the_key(
     ):
         cached_rest_maps(another(new), other, SIDE)
     cached_rest_maps(another(new), paint_inputs(surface, LOOK, 512), 512)
-    cached_rest_maps(another(new), given, SIDE, moving=True)
+    cached_rest_maps(another(new), given, SIDE, animated=True)
     assert len(log) == 6
     cached_rest_maps(another(new), given, SIDE)  # which what movements add lies beside
     assert len(log) == 6

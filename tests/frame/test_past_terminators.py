@@ -1,4 +1,4 @@
-"""Light at a slant comes back from beside where it entered: on a ball, past its terminator."""
+"""Oblique light leaves beside its entry point: on a ball, past the terminator."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def aside() -> float:
 
 
 def expected(normals: Floats, radius: float) -> Floats:
-    """Of a ball whose surface is lit as it is farther towards the light."""
+    """Return the exitance of a ball whose surface is lit as at an offset towards the light."""
     cosine = -normals @ np.array(LIGHT.direction)
     turn = aside() / radius * (-np.array(LIGHT.direction) - cosine[..., None] * normals)
     turned = (normals + turn) / np.linalg.norm(normals + turn, axis=-1, keepdims=True)
@@ -82,7 +82,7 @@ def test_even_light_on_a_plane_stays(renderer: Renderer) -> None:
 
 
 def test_a_chart_of_few_texels_is_lit(renderer: Renderer) -> None:
-    """A chart of two texels and its gutter, at whose corners it is not known how the surface goes on."""
+    """A chart of two texels and its gutter has corners at which the bend of the surface is unknown."""
     head = head_of(replace(FLAT, uv=0.5 + 2.0 / SIZE * FLAT.uv))
     light = DirectionalLight(direction=(-1.0, 0.0, -0.5), irradiance=(1.0, 1.0, 1.0), shadows=False)
     made = entered(renderer, head, light)
@@ -92,7 +92,7 @@ def test_a_chart_of_few_texels_is_lit(renderer: Renderer) -> None:
 
 
 def test_a_stripe_stays_where_it_is(renderer: Renderer) -> None:
-    """Most of so narrow a light comes back from where it entered."""
+    """Most of the light of a narrow stripe leaves where it enters."""
     head = head_of(FLAT)
     light = StripeLight(direction=(-1.0, 0.0, -1.0), position=place(head, (0, 0, 0)), shadows=False)
     made = entered(renderer, head, light)[..., 1]

@@ -1,4 +1,4 @@
-"""Tables of light on spheres and across shadows, and the pictures that read them."""
+"""Tables of light on spheres and across shadow edges, and pictures that use them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.pre_integrated import (
     MAX_CURVATURE,
     half_light_sigma_mm,
-    sphere_table,
     penumbra_width_mm,
-    shadow_edge,
     scattered_cosine,
+    shadow_edge,
+    sphere_table,
 )
 from dermis.gpu import download
 from dermis.mesh.mesh import build_mesh
@@ -37,7 +37,7 @@ CURVATURES = np.linspace(0, MAX_CURVATURE, len(SPHERES))
 
 
 def on_sphere(cosine: float, radius_mm: float, profile: GaussianSum) -> Floats:
-    """Spread light by plain sums over the sphere, about the point that looks: (c,)."""
+    """Return (c,) scattered light at a point by plain sums over the sphere."""
     angle = np.pi * (np.arange(4000) + 0.5) ** 2 / 4000**2  # finer near the point
     width = np.diff(np.pi * np.arange(4001) ** 2 / 4000**2)
     azimuth = np.pi * (np.arange(256) + 0.5) / 256
@@ -51,7 +51,7 @@ def on_sphere(cosine: float, radius_mm: float, profile: GaussianSum) -> Floats:
 
 @pytest.mark.parametrize("radius_mm", [2.0, 8.0, 64.0])
 def test_sphere_by_quadrature(radius_mm: float) -> None:
-    """Gaussian by Gaussian, as each is made to hold its light."""
+    """Each Gaussian is normalised on its own."""
     for cosine in (-0.6, -0.1, 0.0, 0.05, 0.3, 0.9, 1.0):
         for variance in (0.0064, 0.187, 7.41):
             one = GaussianSum("one", np.array([variance]), np.ones((1, 1)))
@@ -64,14 +64,14 @@ def test_flat_skin_is_unspread() -> None:
 
 
 def test_first_curved_row_follows_from_the_flat_one() -> None:
-    """At the terminator it is what a Gaussian sees of a ramp: curvature times sigma / sqrt(2 pi)."""
+    """At the terminator it is a Gaussian average of a ramp: curvature times sigma / sqrt(2 pi)."""
     one = GaussianSum("one", np.array([1.0]), np.ones((1, 1)))
     rows = sphere_table(one)[:4, COSINES == 0.0, 0].ravel()
     assert np.allclose(rows, CURVATURES[:4] / np.sqrt(2 * np.pi), rtol=0.01)
 
 
 def test_energy_of_each_sphere() -> None:
-    """Over a sphere as much leaves as enters: the mean over it, half the integral over N.L, is 1/4."""
+    """The mean over a sphere, half the integral over N.L, is 1/4."""
     mean = 0.5 * np.trapezoid(SPHERES, COSINES, axis=1)
     assert np.abs(mean / 0.25 - 1).max() < 1e-4
 
@@ -85,7 +85,7 @@ def test_more_curved_is_softer() -> None:
 
 @pytest.mark.parametrize("half_width_mm", [0.0, 1.0])
 def test_shadow_edge(half_width_mm: float) -> None:
-    """A step that the profile's line blurs, by plain sums; odd about its middle, from none to all."""
+    """Compare with a step blurred by the line profile: odd about its centre, from 0 to 1."""
     radius = penumbra_width_mm(PROFILE)
     made = shadow_edge(PROFILE, radius, half_width_mm)
     assert made[0].max() < 1e-15 and made[-1].min() == 1
@@ -119,7 +119,7 @@ BALL = head_of(uv_sphere(RADIUS, 96, 48))
 
 
 def table(cosines: Floats, curvature: float) -> Floats:
-    """(..., 3) between the table's entries, as the shader reads it."""
+    """Interpolate the (..., 3) table like the shader."""
     row = curvature / MAX_CURVATURE * (len(SPHERES) - 1)
     low = int(row)
     entries = SPHERES[low] + (row - low) * (SPHERES[low + 1] - SPHERES[low])
@@ -127,7 +127,7 @@ def table(cosines: Floats, curvature: float) -> Floats:
 
 
 def ball_cosines(scene: Scene, size: int, direction: Floats) -> tuple[Floats, Floats]:
-    """N.L over the picture of the ball, and where it is."""
+    """Return N.L over the picture of the ball, and the mask of the ball."""
     y, x = np.mgrid[:size, :size] + 0.5
     frame = scene.camera.frame_mm
     ray = np.stack([(x / size - 0.5) * frame, (0.5 - y / size) * frame, np.full(x.shape, -300.0)], axis=-1)
@@ -141,7 +141,7 @@ def ball_cosines(scene: Scene, size: int, direction: Floats) -> tuple[Floats, Fl
 
 @pytest.mark.parametrize("shadows", [False, True])
 def test_ball_twin(renderer: Renderer, shadows: bool) -> None:
-    """Every pixel of a ball lit from beside is the table's; its own shadow hardly cuts into that."""
+    """Every pixel of a ball lit from the side equals the table; its own shadow hardly changes that."""
     direction = np.array([-2.0, -1.0, -1.0])
     light = DirectionalLight(direction=tuple(direction), irradiance=(3.0, 2.0, 1.0), shadows=shadows)
     scene = scene_of(BALL, light, camera=front_camera(BALL, frame_mm=24.0), rho_s=0.0, energy="none")
@@ -154,7 +154,7 @@ def test_ball_twin(renderer: Renderer, shadows: bool) -> None:
 
 
 def test_unspread_profile_is_dry_skin(renderer: Renderer, tmp_path: Path) -> None:
-    """Without spreading the technique is dry skin, gloss and energy term included."""
+    """Without scattering the technique equals dry skin, gloss and energy term included."""
     path = tmp_path / "narrow.csv"
     path.write_text("variance_mm2,red,green,blue\n0.00001,0.9,0.8,0.7\n")
     light = DirectionalLight(direction=(-2, -1, -1), irradiance=(3.0, 2.0, 1.0), shadows=False)
@@ -174,7 +174,7 @@ def test_flat_skin_under_even_light_is_dry_skin(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("down", [0.0, 1.5])
 def test_straight_shadow(renderer: Renderer, down: float) -> None:
-    """A plate's shadow on a wall: light comes to rest across its edge as the table says, slanting or not."""
+    """The shadow of a plate on a wall has the profile of the table, for normal and oblique light."""
     mesh = joined((plane(60.0), (-30, 0, 20), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)
     light = DirectionalLight(direction=(0.5, -down, -1), irradiance=(3.0,) * 3, softness_mm=1.0)
@@ -197,7 +197,7 @@ def test_straight_shadow(renderer: Renderer, down: float) -> None:
 
 
 def test_long_way_to_the_horizon(renderer: Renderer) -> None:
-    """Skin strongly curved across the light, but hardly along it: nothing comes from beyond the horizon."""
+    """On skin that is curved across the light but hardly along it, no light comes from beyond the horizon."""
     ball = uv_sphere(10.0, 96, 48)
     mesh = build_mesh(
         ball.positions * np.float32([1, 1, 4]), ball.uv, ball.triangles, ball.material, ball.materials
@@ -214,7 +214,7 @@ def test_long_way_to_the_horizon(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("number", [0, 4, 5])
 def test_shadows_hold_where_the_surface_faces_the_light(renderer: Renderer, number: int) -> None:
-    """The cosine of a normal that is the light's direction may come out above 1: no reason for light."""
+    """A cosine that rounds to more than 1 adds no light."""
     n = np.random.default_rng(number).normal(size=3)
     n /= np.linalg.norm(n)
     a = np.cross([0, 1, 0], n) / np.linalg.norm(np.cross([0, 1, 0], n))

@@ -1,4 +1,4 @@
-"""What moves from frame to frame does not have everything else made again, and does not stay behind."""
+"""Cameras and lights do not recreate other resources, and old resources are released."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def scene(**changed: Any) -> Scene:
 
 
 def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Grows whenever resources are made."""
+    """Return a list that grows whenever resources are created."""
     log: list[int] = []
 
     def counted(*given: Any) -> Any:
@@ -38,7 +38,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def moved(k: int) -> Scene:
-    """A frame with lamp and camera at other places."""
+    """Return a scene with the lamp and the camera at other positions."""
     lamp = LAMP.model_copy(update={"position": (10.0 * k, 80.0, 300.0)})
     plain = scene()
     x, y, z = plain.camera.position
@@ -79,7 +79,7 @@ def test_all_else_is_seen(
 
 
 def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
-    """A still scene counts as a round in which nobody asks for anything else."""
+    """A frame of a still scene counts towards the lifetime of unused resources."""
     two = Renderer(renderer.device.adapter.name, cache_size=2)
     settings = settings_of()
     two.prepare(scene(), settings, "left")

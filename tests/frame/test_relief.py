@@ -1,4 +1,4 @@
-"""Normals and roughness from height and normal maps against the slopes that they were made of."""
+"""Normals and roughness from height and normal maps against the slopes of their source."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INNER = slice(3, SIZE - 3)  # the map's border has its own rule for slopes
 
 
 def relief(renderer: Renderer, head: Head, *, texels: float = 1.0, roughness: float = 0.3) -> Any:
-    """Normal (n, n, 3) and roughness (n, n), a sample standing for so many texels of the atlas."""
+    """Return the normals (n, n, 3) and the roughness (n, n), filtered over a number of atlas texels."""
     inputs = run_frame(renderer, scene_of(head, frontal(), roughness=roughness), atlas=SIZE)
     made, _ = probe(
         renderer.device,
@@ -37,14 +37,14 @@ def relief(renderer: Renderer, head: Head, *, texels: float = 1.0, roughness: fl
 
 
 def normal_of(slope_x: Any, slope_y: Any) -> Floats:
-    """Unit normals of a surface z = h(x, y), seen along -Z with y upwards."""
+    """Return the unit normals of a surface z = h(x, y), seen along -Z with y upwards."""
     x, y = np.broadcast_arrays(np.asarray(slope_x, float), np.asarray(slope_y, float))
     n = np.stack([-x, -y, np.ones(x.shape)], axis=-1)
     return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
 
 def xy(size: int, side: float = SIDE) -> tuple[Floats, Floats]:
-    """Places of a map's texel centres on the plane [mm]: columns along +x, rows along -y."""
+    """Return the positions of a map's texel centres on the plane [mm]: columns along +x, rows along -y."""
     along = (np.arange(size) + 0.5) / size
     return np.meshgrid(side * (along - 0.5), side * (0.5 - along))
 
@@ -69,7 +69,7 @@ def test_normal_map_of_a_tilted_plane(renderer: Renderer, tilt: tuple[float, flo
 
 
 def waves(size: int, side: float = SIDE) -> tuple[Floats, Floats, Floats]:
-    """A sine relief [mm] with its slopes along +x and +y."""
+    """Return a sine relief [mm] with its slopes along +x and +y."""
     x, y = xy(size, side)
     k, q = 2 * np.pi * 3 / side, 2 * np.pi * 2 / side
     height = 0.5 * np.sin(k * x) + 0.8 * np.cos(q * y)
@@ -122,7 +122,7 @@ def test_height_map_under_any_layout(renderer: Renderer, name: str) -> None:
 
 
 def _inside(mesh: Mesh) -> NDArray[np.bool_]:
-    """Texels well within the plane's parallelogram of uv."""
+    """Return the texels well inside the plane's parallelogram of uv."""
     v, u = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE
     places = np.c_[mesh.uv.astype(float), np.ones(len(mesh.uv))]
     back = np.linalg.lstsq(places, mesh.positions[:, :2].astype(float), rcond=None)[0]
@@ -139,7 +139,7 @@ def test_two_maps_of_one_relief_count_once(renderer: Renderer) -> None:
 
 
 def test_fine_height_adds_to_a_coarse_normal_map(renderer: Renderer) -> None:
-    """Waves of one texel of the normal map, which it cannot hold, in a height map eight times finer."""
+    """A height map eight times finer has waves of one texel of the normal map."""
     column = np.arange(8 * SIZE)
     pores = np.broadcast_to(0.01 * np.sin(2 * np.pi * (column - 3.5) / 8), (8 * SIZE, 8 * SIZE))
     slopes = np.full((SIZE, SIZE, 2), 0.1)
@@ -153,7 +153,7 @@ def test_fine_height_adds_to_a_coarse_normal_map(renderer: Renderer) -> None:
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("slope", [0.1, 0.4])
 def test_slopes_too_fine_to_see_are_roughness(renderer: Renderer, slope: float, axis: int) -> None:
-    """Stripes of +s and -s: a footprint of two texels sees no tilt, and a lobe wider by s."""
+    """Stripes of +s and -s under a footprint of two texels: no tilt, and a lobe wider by s."""
     stripes = np.zeros((SIZE, SIZE, 2))
     stripes[..., axis] = slope * (1 - 2 * (np.indices((SIZE, SIZE))[1 - axis] % 2))
     head = head_of(plane(SIDE), normal=stripes)
@@ -166,7 +166,7 @@ def test_slopes_too_fine_to_see_are_roughness(renderer: Renderer, slope: float, 
 
 
 def test_height_too_fine_to_see_is_roughness(renderer: Renderer) -> None:
-    """Ridges of 4 texels: slopes of +s, 0, -s, 0 from the differences; their variance widens the lobe."""
+    """Ridges of 4 texels have slopes of +s, 0, -s, 0, whose variance widens the lobe."""
     ridges = np.tile([0.0, 0.1, 0.0, -0.1], (4 * SIZE, SIZE))
     texel_mm = SIDE / (4 * SIZE)
     slopes = np.array([0.2, 0.0, -0.2, 0.0]) / (2 * texel_mm)

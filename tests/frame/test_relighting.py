@@ -1,4 +1,4 @@
-"""A head relit from pictures of a light stage is the head that is rendered in those surroundings."""
+"""A head relit from pictures of a light stage equals the head rendered in that environment."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SETTINGS = Settings(size=(24, 24), atlas=64, samples=1, technique="none", occlus
 
 @pytest.mark.parametrize("degrees", [0.0, 90.0])
 def test_relit_is_rendered(renderer: Renderer, tmp_path: Path, degrees: float) -> None:
-    """In a sky that is brightest towards +X; turned the other way the error is ten times as large."""
+    """In a sky that is brightest towards +X; the opposite rotation has ten times the error."""
     sky = 1.0 + 0.9 * directions(256, 512) @ np.array([[0.9, 0.3, 0.0], [0.2, 0.8, 0.0], [-0.4, 0.1, 0.9]]).T
     write_exr(tmp_path / "sky.exr", sky.astype(np.float32))
     around = Environment(name=str(tmp_path / "sky.exr"), rotation_degrees=degrees)

@@ -1,4 +1,4 @@
-"""What a renderer keeps from frame to frame never shows in the image."""
+"""Caches of a renderer never change the picture."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyP
 
 
 def test_maps_that_failed_are_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are read on another thread, and what came of it is kept."""
+    """Maps are read on another thread, and the result is cached."""
     renderer = Renderer(ADAPTER)
 
     def fail(*_: Any) -> None:
@@ -124,7 +124,7 @@ CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
 
 @pytest.fixture(scope="module")
 def other(renderer: Renderer) -> Renderer:
-    """A second renderer, made to forget all before each of its frames."""
+    """Return a second renderer, whose cache is cleared before each frame."""
     return Renderer(renderer.device.adapter.name)
 
 
@@ -135,7 +135,7 @@ def fresh(other: Renderer, what: Scene, **settings: Any) -> Image:
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_no_change_leaves_a_trace(renderer: Renderer, other: Renderer, name: str) -> None:
-    """After a plain frame, and after whatever came before: the image of a renderer without a past."""
+    """After any other frame, the picture is that of a fresh renderer."""
     make, settings = CHANGES[name]
     what = make()
     made = drawn(renderer, what, **settings)
@@ -145,13 +145,13 @@ def test_no_change_leaves_a_trace(renderer: Renderer, other: Renderer, name: str
 
 
 def test_changes_are_changes(renderer: Renderer) -> None:
-    """The list above would prove nothing if all of its images were one."""
+    """The changes give different pictures, else the tests above would prove nothing."""
     images = [drawn(renderer, make(), **settings).tobytes() for make, settings in CHANGES.values()]
     assert len(set(images)) == len(images) - 1  # "albedo back" is "head" once more
 
 
 def test_light_of_another_head_does_not_linger(renderer: Renderer, other: Renderer) -> None:
-    """Texels that the second head leaves empty hold the first one's light no more."""
+    """Empty texels of the second head hold no light of the first."""
     from test_shade import tailed
 
     full = head_of(bent_plane(50.0, [[1, 0, 0], [0, 1, 0]]))
@@ -161,7 +161,7 @@ def test_light_of_another_head_does_not_linger(renderer: Renderer, other: Render
 
 
 def test_shadows_of_another_head_do_not_linger(renderer: Renderer, other: Renderer) -> None:
-    """Heads of one size, seen by the light through one matrix: only what is inside has moved."""
+    """Heads of one size have one light matrix: only their content differs."""
 
     def under(x: float) -> Scene:
         corners = [(plane(4.0), (s * 25.0, s * 25.0, 20.0), (0.8, 0.4 + 0.4 * s, 0.1)) for s in (-1, 1)]
@@ -196,7 +196,7 @@ def test_bytes_arrive_as_they_were_made(renderer: Renderer, size: tuple[int, int
 
 
 def moving(count: int) -> list[Scene]:
-    """Scenes whose light and camera move."""
+    """Return scenes whose light and camera move."""
     lights = [DirectionalLight(direction=(1, -0.4, -1 - k), irradiance=(2.0, 1.5, 1.0)) for k in range(count)]
     camera = [front_camera(BALL, frame_mm=70.0 + 5 * k) for k in range(count)]
     return [scene_of(BALL, light, camera=one) for light, one in zip(lights, camera, strict=True)]
@@ -225,7 +225,7 @@ def test_more_floats_than_a_buffer_holds_are_refused(
 
 
 def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
-    """Bytes that nobody fetches harm nobody, and other frames may come in between."""
+    """Pictures that are not read are harmless, and other frames may come in between."""
     scenes, chosen = moving(5), settings_of()
     expected = [renderer.draw(one, chosen).srgb8().tobytes() for one in scenes]
     for _ in range(3):
@@ -239,7 +239,7 @@ def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
 
 
 def test_the_image_does_not_depend_on_its_width(renderer: Renderer) -> None:
-    """The frame's height is given: a wider image shows more at its sides and the same in its middle."""
+    """The height of the view is fixed: a wider picture shows more at its sides."""
     narrow, wide = (drawn(renderer, scene(), size=(w, 40)) for w in (20, 60))
     assert np.abs(wide[:, 20:40] - narrow).max() < 0.01 * narrow.max()
 
@@ -261,7 +261,7 @@ def test_too_many_lights(renderer: Renderer) -> None:
 
 
 def test_more_lights_are_more_light(renderer: Renderer, close: float) -> None:
-    """Light adds up: an image under two lights is the sum of the images under each."""
+    """A picture under two lights is the sum of the pictures under each."""
     one, two = LIGHT, DirectionalLight(direction=(-1, 1, -2), irradiance=(0.5, 1.0, 1.5))
     parts = [drawn(renderer, scene(BALL, light)) for light in (one, two)]
     both = drawn(renderer, scene(BALL, one, two))

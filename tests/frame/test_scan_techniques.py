@@ -1,4 +1,4 @@
-"""The scan under the techniques of engines, beside light that spreads over the atlas."""
+"""The scanned head with screen-space techniques, compared with diffusion on the atlas."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIZES["interreflection"] = False  # whose cells lie otherwise on each technique'
 
 @pytest.mark.samples
 def test_scan(renderer: Renderer) -> None:
-    """Each is much nearer to the atlas' picture than dry skin is, and as bright."""
+    """Each technique is much nearer to the atlas than dry skin is, and as bright."""
     head = load_head("lee_perry_smith", subdivide=0)
     scene = Scene(head, lights=load_lights("studio"), camera=FACE)
     made = {}

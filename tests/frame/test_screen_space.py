@@ -1,4 +1,4 @@
-"""Light that spreads over the picture: the stage against numpy, analytic answers, what must not leak."""
+"""Screen-space scattering: against NumPy, closed forms, and without leaks."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ TAPS, STEEPEST = 16, 4.0
 
 
 class View(NamedTuple):
-    """A camera: tangents of the half angles, and the picture's size."""
+    """Camera: tangents of the half angles, and the size of the picture."""
 
     half: tuple[float, float]
     size: tuple[int, int]
 
     @classmethod
     def over(cls, width_mm: float, depth_mm: float, side: int) -> View:
-        """A square picture of so much of a plane that faces the camera."""
+        """Return a square picture of part of a plane that faces the camera."""
         return cls((0.5 * width_mm / depth_mm,) * 2, (side, side))
 
     def places(self, depth: Floats) -> Floats:
-        """(h, w, 3) in the camera's frame [mm]."""
+        """Return (h, w, 3) positions in camera space [mm]."""
         width, height = self.size
         y, x = np.indices(depth.shape)
         right = (2 * (x + 0.5) / width - 1) * self.half[0]
@@ -44,7 +44,7 @@ class View(NamedTuple):
 
 
 def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
-    """(h, w, 3) light after both passes, as it comes out where all of it leaves and nothing lies over it."""
+    """Return (h, w, 3) light after both passes, with a transmittance of 1 and no other light."""
     apart = make_subsurface_layers(device, view.size)
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
@@ -55,7 +55,7 @@ def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
 
 
 def share_within(distance: float) -> Floats:
-    """The stage's table between its entries."""
+    """Interpolate the table of the stage."""
     at = (TABLE.shape[1] - 1) * np.sqrt(min(distance / REACH, 1.0))
     low = min(int(at), TABLE.shape[1] - 2)
     return np.asarray(TABLE[0, low, :3] + (at - low) * (TABLE[0, low + 1, :3] - TABLE[0, low, :3]))
@@ -64,9 +64,9 @@ def share_within(distance: float) -> Floats:
 def twin_side(
     view: View, places: Floats, light: Floats, here: tuple[int, int], step: tuple[int, int]
 ) -> Floats:
-    """Light from one side of a pixel.
+    """Return the light from one side of a pixel.
 
-    places : (h, w, 3) of the pixels in the camera's frame, 0 where there is no skin
+    places : (h, w, 3) positions of the pixels in camera space, 0 without skin
     """
     depth = places[..., 2]
     pixel = float(
@@ -97,7 +97,7 @@ def twin_side(
 
 
 def twin(view: View, light: Floats, depth: Floats) -> Floats:
-    """Both passes, along rows and then along columns."""
+    """Return the result of both passes, along rows and then along columns."""
     places = view.places(depth)
     for step in ((0, 1), (1, 0)):
         back, source, light = (-step[0], -step[1]), light, light.copy()
@@ -108,7 +108,7 @@ def twin(view: View, light: Floats, depth: Floats) -> Floats:
 
 
 def rough_depth(size: tuple[int, int]) -> Floats:
-    """A wavy surface with a step in depth and holes."""
+    """Return a wavy surface with a step in depth and holes."""
     rng = np.random.default_rng(3)
     y, x = np.indices(size[::-1])
     depth = 400 + 2 * np.sin(x / 5) + 3 * np.cos(y / 3) + np.where(x > size[0] // 2, 12.0, 0.0)
@@ -117,7 +117,7 @@ def rough_depth(size: tuple[int, int]) -> Floats:
 
 @pytest.mark.parametrize("width_mm", [4.0, 24.0, 150.0])
 def test_twin(device: Device, width_mm: float) -> None:
-    """Close, where taps are far apart; as portraits are; and far, where the kernel is a few pixels wide."""
+    """Compare close by, where taps are far apart; at a portrait's distance; and far away."""
     view = View((0.5 * width_mm / 400, 0.5 * width_mm / 400 * 20 / 28), (28, 20))
     depth = rough_depth(view.size)
     light = np.random.default_rng(4).random((*depth.shape, 3)).astype(np.float32) * (depth > 0)[..., None]
@@ -127,7 +127,7 @@ def test_twin(device: Device, width_mm: float) -> None:
 
 @pytest.mark.parametrize("width_mm", [4.0, 24.0, 150.0])
 def test_even_light_stays_even(device: Device, width_mm: float) -> None:
-    """On a plane that faces the camera, and on any other skin, to the rims of its holes."""
+    """Uniform light stays uniform on a plane and on any other skin, up to the rims of holes."""
     view = View.over(width_mm, 400.0, 48)
     for depth in (np.full((48, 48), 400.0), rough_depth(view.size)):
         made = spread(device, view, (depth > 0)[..., None] * np.array([1.0, 0.3, 2.7]), depth)
@@ -136,7 +136,7 @@ def test_even_light_stays_even(device: Device, width_mm: float) -> None:
 
 
 def test_table_is_the_kernel() -> None:
-    """Between its entries too; what would lie beyond, less than a thousandth, lies within."""
+    """Interpolated values agree too; the light beyond the reach, less than 0.1 %, is added within it."""
     for distance in np.geomspace(1e-3, REACH, 40):
         assert np.abs(share_within(distance) - KERNEL.one_side(distance)).max() < 6e-4
     assert (share_within(REACH) == 0.5).all()
@@ -144,7 +144,7 @@ def test_table_is_the_kernel() -> None:
 
 
 def across(kernel: SeparableKernel, pixel_mm: float, side: int) -> Floats:
-    """(side, side, 3) light that each pixel gets from the middle one: the kernel's integral over pixels."""
+    """Return the (side, side, 3) light from the middle pixel: the kernel integrated over pixels."""
     edges = (np.arange(side + 1) - side // 2 - 0.5) * pixel_mm
     line = np.diff(kernel.one_side(edges), axis=0)
     return np.asarray(line[:, None] * line[None, :])
@@ -152,7 +152,7 @@ def across(kernel: SeparableKernel, pixel_mm: float, side: int) -> Floats:
 
 @pytest.mark.parametrize("pixel_mm", [0.45, 1.0])
 def test_point_of_light(device: Device, pixel_mm: float) -> None:
-    """Where taps lie on neighbouring pixels each gets what the kernel sends there, and nothing is lost."""
+    """With taps on neighbouring pixels each gets the light of the kernel, and nothing is lost."""
     side = 63
     view = View.over(side * pixel_mm, 500.0, side)
     light = np.zeros((side, side, 3))
@@ -183,7 +183,7 @@ def test_spot_of_light_seen_closely(device: Device, pixel_mm: float) -> None:
 
 
 def test_one_line_of_light_is_the_profile_itself(device: Device) -> None:
-    """Seen from its side the separable kernel is exact: a line of light spreads as the profile does."""
+    """The separable kernel is exact for a line of light."""
     profile, pixel_mm, side = load_profile("gpu-gems-3"), 0.45, 63
     light = np.zeros((side, side, 3))
     light[:, 31] = 1.0 / pixel_mm
@@ -199,7 +199,7 @@ def test_one_line_of_light_is_the_profile_itself(device: Device) -> None:
 
 
 def test_tilted_skin_spreads_as_far_on_its_surface(device: Device) -> None:
-    """A stripe on a plane turned by 60 degrees about the vertical: its spread is measured on the plane."""
+    """On a plane turned by 60 degrees about the vertical, the width of a stripe is measured on the plane."""
     side, tilt = 201, np.radians(60.0)
     view = View.over(40.0, 5000.0, side)
     slope = (2 * (np.arange(side) + 0.5) / side - 1) * view.half[0]
@@ -220,7 +220,7 @@ def test_tilted_skin_spreads_as_far_on_its_surface(device: Device) -> None:
 
 @pytest.mark.parametrize(("gap_mm", "leak"), [(20.0, 0.0), (8.0, 2e-4), (4.0, 0.02)])
 def test_light_stays_on_its_own_surface(device: Device, gap_mm: float, leak: float) -> None:
-    """A lit surface before a dark one: what the straight distance between them lets across, and no more."""
+    """A lit surface before a dark one leaks only what the straight distance between them allows."""
     side = 64
     view = View.over(side * 0.25, 500.0, side)
     front = np.arange(side) < 32
@@ -233,7 +233,7 @@ def test_light_stays_on_its_own_surface(device: Device, gap_mm: float, leak: flo
 
 @pytest.mark.parametrize("gap_mm", [2.0, 90.0])
 def test_light_passes_a_slit(device: Device, gap_mm: float) -> None:
-    """A pixel that shows something dark behind takes no light from the skin on its sides."""
+    """A pixel that shows a dark background takes no light from the skin on its sides."""
     side, middle = 64, 32
     view = View.over(side * 0.1, 500.0, side)
     x = np.broadcast_to(np.arange(side), (side, side))
@@ -259,7 +259,7 @@ def test_other_materials_neither_give_nor_take(device: Device) -> None:
 
 
 def test_rings_of_the_separable_kernel(device: Device) -> None:
-    """A point of light against the round profile: within 1 mm the kernel, a cross, lacks 6 % of red."""
+    """Against the radial profile, within 1 mm of a point of light the kernel, a cross, lacks 6 % of red."""
     profile, pixel_mm, side = load_profile("gpu-gems-3"), 0.45, 63
     light = np.zeros((side, side, 3))
     light[31, 31] = 1.0

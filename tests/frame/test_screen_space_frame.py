@@ -1,4 +1,4 @@
-"""Whole frames whose light spreads over the picture."""
+"""Frames with screen-space scattering."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def image(renderer: Renderer, scene: Scene, technique: str, **settings: Any) -> 
 
 
 def narrow(folder: Path) -> str:
-    """A profile that spreads light by 10 micrometres: less than any pixel here."""
+    """Return a profile that scatters light by 10 micrometres, less than any pixel here."""
     path = folder / "narrow.csv"
     path.write_text("variance_mm2,red,green,blue\n0.0001,0.9,0.8,0.7\n")
     return str(path)
@@ -39,7 +39,7 @@ def narrow(folder: Path) -> str:
 def test_what_does_not_spread_is_dry_skin(
     renderer: Renderer, tmp_path: Path, samples: int, albedo: str
 ) -> None:
-    """Light taken apart and put together again, gloss and edges included; colour counted once."""
+    """Light that is separated and recombined equals dry skin; colour is applied once."""
     scene = scene_of(BALL, SIDE_LIGHT, camera=front_camera(BALL), profile=narrow(tmp_path), albedo=albedo)
     dry, apart = (
         image(renderer, scene, technique, samples=samples, background=(0.2, 0.4, 0.1))
@@ -67,7 +67,7 @@ def test_energy_on_a_ball(renderer: Renderer) -> None:
 
 
 def test_plain_materials_stay_as_they_are(renderer: Renderer) -> None:
-    """An eye beside skin, lit from beside: neither takes the other's light."""
+    """An eye beside skin, lit from the side: neither receives light of the other."""
     mesh = joined(
         (plane(40.0), (-20, 0, 0), (0, 0, 0.5)),
         (plane(40.0), (20, 0, 0), (0.5, 0.5, 0.5)),
@@ -81,7 +81,7 @@ def test_plain_materials_stay_as_they_are(renderer: Renderer) -> None:
 
 
 def test_a_lit_plate_before_a_shaded_wall(renderer: Renderer) -> None:
-    """Skin behind skin, one of them dark: no light leaks over the edge, with edges antialiased."""
+    """Dark skin behind lit skin: no light leaks over the antialiased edge."""
     mesh = joined((plane(40.0), (-20, 0, 30), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)
     # From the left, rising: the plate's shadow falls on the wall to the right of its edge.
@@ -99,7 +99,7 @@ def test_a_lit_plate_before_a_shaded_wall(renderer: Renderer) -> None:
 
 
 def test_a_step_within_a_pixel(renderer: Renderer) -> None:
-    """A step of a millimetre in skin that glows from a stripe of light beside it is no dark line."""
+    """A step of a millimetre in skin beside a stripe of light is no dark line."""
     mesh = joined((plane(40.0), (-20, 0, 1), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)
     beside = place(head, (-3, 0, 1))

@@ -1,4 +1,4 @@
-"""Light across the seams of a map, in the frame: stitched, and under the talk's remedies."""
+"""Light across the seams of a map in the frame: stitched, and with the methods of the talk."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEAD = head_of(BALL)
 
 
 def striped() -> Scene:
-    """Bands of light with hard ends that cross the seams of the face, and a little light besides."""
+    """Return bands of light with hard ends that cross the seams of the face, and some uniform light."""
     bands = [
         StripeLight(
             direction=(0, 0, -1),
@@ -40,7 +40,7 @@ def striped() -> Scene:
 
 
 def jumps(renderer: Renderer, seams: str) -> Floats:
-    """Change of the scattered light from one side of each seam to the other, of the light there."""
+    """Return the relative change of the scattered light across each seam."""
     inputs = run_frame(renderer, striped(), atlas=SIZE, seams=seams, transmission="none")
     light = download(renderer.device, inputs.resources.scattered).astype(float)[..., :3]
     atlas = cached_atlas(BALL, SIZE, SEAM_METHODS[seams].layouts[0])
@@ -58,13 +58,13 @@ def test_stitched_light_has_no_seams(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("seams", [name for name in SEAM_METHODS if name != "stitch"])
 def test_remedies_leave_seams(renderer: Renderer, seams: str) -> None:
-    """What they are for is to look less bad than black beside each chart."""
+    """The methods look less bad than black beside each chart, but leave seams."""
     assert np.percentile(jumps(renderer, seams), 90) > 3 * SEAM
 
 
 @pytest.mark.parametrize("technique", ["texture-space", "gpu-gems-3"])
 def test_black_bleeds_in_without_a_remedy(renderer: Renderer, technique: str) -> None:
-    """The darkest light at the seams, by remedy: each of them is lighter than none."""
+    """Compare the darkest light at the seams: each method is lighter than none."""
     darkest = {}
     for seams in ("none", "clear-colour", "stretch-map", "alpha"):
         chosen = {"atlas": SIZE, "seams": seams, "technique": technique, "transmission": "none"}

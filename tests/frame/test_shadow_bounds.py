@@ -1,4 +1,4 @@
-"""The nearest depths in squares of the shadow maps, and that nothing changes where they are passed over."""
+"""Nearest depths in squares of shadow maps; skipped squares do not change the light."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LIGHTS: dict[str, Any] = {
 
 
 def squares(depth: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Nearest depth in squares of a map, whose own side is a multiple of theirs."""
+    """Return the nearest depth in squares of a map, whose side is a multiple of theirs."""
     count = len(depth) // side
     return np.asarray(depth.reshape(count, side, count, side).max(axis=(1, 3)))
 
@@ -51,7 +51,7 @@ def test_each_level_holds_the_nearest_of_its_squares(renderer: Renderer, size: i
 @pytest.mark.parametrize("shadow_size", [256, 1000])
 @pytest.mark.parametrize("name", LIGHTS)
 def test_what_is_passed_over_hides_nothing(renderer: Renderer, name: str, shadow_size: int) -> None:
-    """Bounds that say there may be something everywhere give the same light, to the last bit."""
+    """Bounds without any empty square give the same light, bit for bit."""
     inputs = run_frame(renderer, scene_of(BALLS, LIGHTS[name]), atlas=256, shadow_size=shadow_size)
 
     def light() -> Any:

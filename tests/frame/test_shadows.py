@@ -1,4 +1,4 @@
-"""Shadows lie where geometry puts them, surfaces do not shade themselves, and nothing is drawn in vain."""
+"""Shadows are where geometry puts them, surfaces do not shadow themselves, and no pass runs needlessly."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SLANTED = DirectionalLight(direction=(1, 0, -1))
 
 
 def seen(renderer: Renderer, head: Head, light: AnyLight, **settings: Any) -> tuple[Floats, Floats, Floats]:
-    """Visibility, cosine and place of each texel of the atlas; the cosine is 0 where there is none."""
+    """Return the visibility, cosine and position of each texel; the cosine is 0 outside charts."""
     inputs = run_frame(renderer, scene_of(head, light), **settings)
     size = settings["atlas"]
     _, arriving = probe(
@@ -40,7 +40,7 @@ def seen(renderer: Renderer, head: Head, light: AnyLight, **settings: Any) -> tu
 
 
 def crossing(x: Floats, visibility: Floats) -> float:
-    """Where a profile of visibility passes one half for the first time."""
+    """Return where a profile of visibility passes one half for the first time."""
     k = int(np.argmax((visibility[:-1] - 0.5) * (visibility[1:] - 0.5) <= 0))
     share = (0.5 - visibility[k]) / (visibility[k + 1] - visibility[k])
     return float(x[k] + share * (x[k + 1] - x[k]))
@@ -55,7 +55,7 @@ OVERHEAD = {"position": place(PLATE, (-15, 0, 220)), "target": place(PLATE, (-15
 @pytest.mark.parametrize("softness", [0.5, 1.5, 6.0])
 @pytest.mark.parametrize("shadow_size", [256, 1024])
 def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness: float) -> None:
-    """A plate at x from -30 to 0, 20 mm up, in light that falls at 45 degrees along +x."""
+    """A plate at x from -30 to 0, 20 mm high, in light at 45 degrees along +x."""
     light = SLANTED.model_copy(update={"softness_mm": softness})
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=shadow_size)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
@@ -72,7 +72,7 @@ def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness
 
 @pytest.mark.parametrize("light", [PointLight(**OVERHEAD), SpotLight(**OVERHEAD)], ids=["point", "spot"])
 def test_a_point_lights_shadow_is_larger_than_the_plate(renderer: Renderer, light: AnyLight) -> None:
-    """From 220 mm up a plate of 30 mm at 20 mm throws a shadow of 33 mm."""
+    """From 220 mm, a plate of 30 mm at 20 mm casts a shadow of 33 mm."""
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=512)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
     x, profile = points[row, :350, 0], visibility[row, :350]
@@ -82,7 +82,7 @@ def test_a_point_lights_shadow_is_larger_than_the_plate(renderer: Renderer, ligh
 
 
 def test_wide_edges_fade_over_their_softness(renderer: Renderer) -> None:
-    """Under a tent 2 to 98 per cent take 0.8 of the whole width; steps of a shadow texel blur the count."""
+    """Under a tent, 2 to 98 % take 0.8 of the width; steps of a shadow texel limit the accuracy."""
     light = frontal(shadows=True).model_copy(update={"softness_mm": 2.0})
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=512)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
@@ -117,7 +117,7 @@ def test_a_lone_ball_does_not_shade_itself(
 
 
 def step(height: float) -> Head:
-    """A floor at x > 0 beside a block of that height, in a scene as large as a bust."""
+    """Return a floor at x > 0 beside a block of the given height, in a scene of the size of a bust."""
     wall = plane(20.0, 1)
     side = wall.positions[:, [2, 1, 0]] * [1, 1, -height / 20.0] + [0, 0, height / 2]
     upright = type(wall)(**{**vars(wall), "positions": side.astype(np.float32)})
@@ -147,7 +147,7 @@ def test_a_small_step_keeps_its_shadow(renderer: Renderer, height: float, dark: 
 
 
 def stages_of(renderer: Renderer, *lights: AnyLight, **draw: Any) -> bool:
-    """Whether a frame under these lights draws shadow maps."""
+    """Return whether a frame under these lights draws shadow maps."""
     renderer.draw(scene_of(PLATE, *lights), settings_of(), **draw)
     return "shadows" in renderer.graph.executed_stages
 

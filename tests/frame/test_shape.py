@@ -1,4 +1,4 @@
-"""The shape on the device: twins in float64, and meshes built anew from the same positions."""
+"""Shape on the device: float64 references, and meshes rebuilt from the same positions."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ RNG = np.random.default_rng(5)
 
 
 def bent(points: Floats) -> Floats:
-    """Points of a ball of 30 mm as a bean: stretched, twisted and bent."""
+    """Return the points of a ball of 30 mm as a bean: stretched, twisted and bent."""
     x, y, z = points.T
     turn = 0.02 * y
     x, z = np.cos(turn) * x - np.sin(turn) * z, np.sin(turn) * x + np.cos(turn) * z
     return np.stack([1.3 * x + 0.004 * y**2, 0.8 * y, z - 0.006 * x * y], axis=-1)
 
 
-def anew(mesh: Mesh, points: Floats) -> Mesh:
-    """The mesh with other places of its points, as a file of its own."""
+def rebuilt(mesh: Mesh, points: Floats) -> Mesh:
+    """Return the mesh with other point positions, as if loaded from a file."""
     places = points[mesh.point].astype(np.float32)
     return build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
 
 
 def evaluated(device: Device, head: Head, motion: MotionBytes) -> tuple[Shape, NDArray[np.float32]]:
-    """The shape in motion, and (v, 16) its vertices."""
+    """Return the shape in motion, and its (v, 16) vertices."""
     made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
     shape.draw(frame, made, motion)
     frame.submit()
@@ -69,7 +69,7 @@ def test_vertices_are_those_of_a_mesh_built_anew(device: Device, head: Head) -> 
     """Normals and tangents follow the surface."""
     moved = bent(head.positions_mm.astype(float))
     _, table = evaluated(device, head, MotionBytes(words(moved)))
-    mesh = anew(head.mesh, moved.astype(np.float32).astype(float))
+    mesh = rebuilt(head.mesh, moved.astype(np.float32).astype(float))
     assert np.array_equal(table[:, :3], mesh.positions) and np.array_equal(table[:, 3], mesh.uv[:, 0])
     assert np.abs(table[:, 4:7] - mesh.normals).max() < SHAPE_NORMAL
     for first, tangent in ((8, mesh.dpdu), (12, mesh.dpdv)):
@@ -88,7 +88,7 @@ def test_a_files_own_normals_rest_and_turn_with_the_surface(device: Device, head
 
 
 def rigged(head: Head) -> Head:
-    """Two targets that share points, three bones in a row, and points between the control points."""
+    """Return a head with two targets that share points, three bones in a row, and subdivided points."""
     count = len(head.positions_mm)
     chosen = [np.sort(RNG.choice(count, size, replace=False)) for size in (count // 2, count // 3)]
     point = np.concatenate(chosen).astype(np.int32)
@@ -120,7 +120,7 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
     made, table = evaluated(
         device, moving, MotionBytes(words(rig.positions_mm), words(weights), words(matrices))
     )
-    posed = rig.posed(weights, matrices)
+    posed = rig.pose(weights, matrices)
     assert np.abs(points_of(device, made.stencils["control"]) - posed).max() < SHAPE * 30
     refined = rig.stencils.points(posed)
     assert np.abs(points_of(device, made.surface["points"]) - refined).max() < SHAPE * 30
@@ -149,7 +149,7 @@ def test_the_map_is_stretched_as_at_rest(device: Device, head: Head, layout: str
 def test_the_map_is_stretched_as_one_made_for_the_moved_surface(device: Device, head: Head) -> None:
     moved = bent(head.positions_mm.astype(float))
     made = stretched(device, head, build_atlas(head.mesh, 256), moved)
-    atlas = build_atlas(anew(head.mesh, moved), 256)
+    atlas = build_atlas(rebuilt(head.mesh, moved), 256)
     expected = np.dstack([atlas.stretch, atlas.shear]).astype(float)[atlas.coverage]
     error = np.abs(made[..., :3][atlas.coverage] - expected)
     assert error.max() < STRETCHED * expected.max()
@@ -164,10 +164,13 @@ def test_a_scaled_ball_has_the_density_of_its_size(device: Device, head: Head, s
 
 
 def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Floats]:
-    """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
+    """Return the (a, 2) sources of gutter texels at each resolution, traced on the device."""
     textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
-    walks, walked = make_gutter_tracing(device, head.mesh, atlas, textures), with_own_gutters(device, textures)
+    walks, walked = (
+        make_gutter_tracing(device, head.mesh, atlas, textures),
+        with_own_gutters(device, textures),
+    )
     shape.draw(frame, made, MotionBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
     frame.submit()
@@ -179,7 +182,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
 
 
 def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> None:
-    """Whatever the size of the head, and however it is turned as a whole."""
+    """Scale and rotation of the whole head do not change the gutters."""
     atlas = build_atlas(head.mesh, 256, "stitched")
     sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
@@ -192,7 +195,7 @@ def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> N
 
 
 def test_gutters_of_another_shape_are_as_far_from_their_edge_as_on_it(device: Device, head: Head) -> None:
-    """A ball twice as large: the same texels beyond an edge are twice as many mm, and so the same places."""
+    """On a ball twice as large the texels beyond an edge are twice as many mm away: the same points."""
     atlas = build_atlas(head.mesh, 256, "stitched")
     fine, *_ = sources(device, head, atlas, 2 * head.positions_mm)
     away = np.linalg.norm(fine - atlas.source, axis=1)

@@ -1,4 +1,4 @@
-"""What is left as it is, since it is there already, is what would be drawn anew."""
+"""Results that are reused equal those that are computed again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SEQUENCES: dict[str, list[dict[str, Any]]] = {
 
 @pytest.fixture(scope="module")
 def keeping() -> Iterator[Renderer]:
-    """Keeps two of each thing, and levels in halves, whatever the adapter."""
+    """Return a renderer with two variants per resource, and half-float levels on any adapter."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(technique, "level_format", lambda _: HALVES)
         yield Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), cache_size=2)
@@ -43,18 +43,18 @@ def drawn(renderer: Renderer, settings: dict[str, Any], **draw: Any) -> bytes:
 
 @pytest.mark.parametrize("name", SEQUENCES)
 def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
-    anew = []
+    fresh = []
     for settings in SEQUENCES[name]:
         keeping.clear_cache()
-        anew.append(drawn(keeping, settings))
+        fresh.append(drawn(keeping, settings))
     keeping.clear_cache()
     kept = [drawn(keeping, settings) for settings in SEQUENCES[name]]
-    assert [a == b for a, b in zip(kept, anew, strict=True)] == [True] * len(anew)
-    assert drawn(keeping, SEQUENCES[name][-1], force=True) == anew[-1]
+    assert [a == b for a, b in zip(kept, fresh, strict=True)] == [True] * len(fresh)
+    assert drawn(keeping, SEQUENCES[name][-1], force=True) == fresh[-1]
 
 
 def test_what_is_there_is_left_as_it_is(keeping: Renderer) -> None:
-    """Stages that run in a frame like the last one, after another exposure, camera and light."""
+    """Check the stages that run after a change of exposure, camera or light only."""
     keeping.clear_cache()
     plain, near = scene(), scene(60.0)
     brighter = scene_of(HEAD, frontal(4.0), camera=near.camera)

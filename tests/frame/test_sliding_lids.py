@@ -1,4 +1,4 @@
-"""Lids on the device: they slide over the eyes as their twin in float64 does, and shade them."""
+"""Lids on the device: they slide over the eyes as their twin in float64, and shade them."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def test_edges_of_lids_are_those_of_the_surface() -> None:
         head = bare(levels)
         motion = Pose({"eyeWideLeft": 0.8, "jawOpen": 0.3}, {"head": (0, 15, 0)}).motion(head.control)
         points = replace(head.control, contact=None).points_mm(motion)
-        edges = head.control.edges_mm(motion)
+        edges = head.control.lid_edges_mm(motion)
         np.testing.assert_allclose(edges, points[lid_rings()[..., 1]], atol=1e-3)
 
 
 def seen_from_front(renderer: Renderer, head: Head, parts: str) -> Floats:
-    """(256, 512) the left eye from its front, 20 pixels a millimetre, its middle in the picture's."""
+    """Return a front view (256, 512) of the left eye, 20 pixels per mm, centred on the eye."""
     middle = np.array([28.4, 0.0, 14.0]) - head.centre_mm
     near = tuple(float(c) for c in middle)
     camera = Camera(position=(near[0], near[1], near[2] + 400), target=near, frame_mm=12.8)
@@ -83,7 +83,7 @@ def test_lids_shade_the_white(renderer: Renderer) -> None:
 
 
 def test_tears_shine_along_the_lower_lid(renderer: Renderer) -> None:
-    """In a thin line, below the middle of the eye, where neither ball nor lid does."""
+    """Tears shine in a thin line below the middle of the eye."""
     shine = seen_from_front(renderer, bare(1), "specular")[180:, 236:277].max(axis=1)
     bright = np.flatnonzero(shine > 0.1)
     assert 2 <= len(bright) <= 16 and bright[-1] - bright[0] < 16

@@ -1,6 +1,6 @@
-"""What a change makes stale: kept frames are those of a fresh renderer, and no pass runs for nothing.
+"""Effects of a change: cached frames equal those of a fresh renderer, and no pass runs needlessly.
 
-The fields that are changed are found by introspection: a new one is tested the day it is added.
+The fields are found by introspection, so that new fields are tested at once.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
+from dermis.scene.frozen_model import FrozenModel, field_choices
 from dermis.scene.lights import LIGHTS, PointLight, SpotLight
 from dermis.scene.model import Scene
-from dermis.scene.frozen_model import FrozenModel, field_choices
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 
@@ -48,7 +48,9 @@ GIVEN: dict[str, dict[str, Any]] = {  # what kinds of light have no default for
     "directional": {"direction": (0.0, -0.3, -1.0)},
     "stripe": {"direction": (0.0, 0.0, -1.0)},
 }
-BESIDE: dict[tuple[type[FrozenModel], str], dict[str, Any]] = {  # what lets a field matter, or be changed at all
+BESIDE: dict[
+    tuple[type[FrozenModel], str], dict[str, Any]
+] = {  # what lets a field matter, or be changed at all
     (Skin, "profile_map"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
     (Skin, "other_profiles"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
     (Skin, "pigments"): {"profile": "light"},
@@ -59,7 +61,7 @@ BESIDE: dict[tuple[type[FrozenModel], str], dict[str, Any]] = {  # what lets a f
 
 @pytest.fixture(autouse=True, scope="module")
 def masks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Files that a skin's fields name."""
+    """Write the files that fields of a skin name."""
     with chdir(tmp_path_factory.mktemp("masks")):
         for name, levels in {"half.png": [[255, 0]], "white.png": [[255]]}.items():
             write_png(name, np.array(levels, np.uint8)[..., None])
@@ -67,7 +69,7 @@ def masks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def others(model: type[FrozenModel], name: str, value: Any) -> Iterator[Any]:
-    """Values that the field may have instead, the likely ones first."""
+    """Yield other valid values of a field, likely ones first."""
     if (model, name) in WORDS:
         yield WORDS[model, name]
     yield from (word for word in field_choices(model, name) if word != value)
@@ -83,7 +85,7 @@ def others(model: type[FrozenModel], name: str, value: Any) -> Iterator[Any]:
 
 
 def changed(values: FrozenModel, name: str) -> FrozenModel:
-    """The same with another value of one field."""
+    """Return a copy with another value of one field."""
     told = {key: getattr(values, key) for key in type(values).model_fields}
     for other in others(type(values), name, getattr(values, name)):
         try:
@@ -104,7 +106,7 @@ def base(model: type[FrozenModel], name: str) -> FrozenModel:
 
 
 def kept_and_fresh(renderer: Renderer, *frames: tuple[Scene, Settings]) -> tuple[bytes, bytes]:
-    """The last frame after those before it, and from a renderer without a past."""
+    """Return the last frame after the others, and the same frame of a fresh renderer."""
     for scene, settings in frames[:-1]:
         renderer.draw(scene, settings)
     kept = picture(renderer, *frames[-1])
@@ -227,7 +229,7 @@ def test_everything_runs_when_asked(renderer: Renderer) -> None:
 
 
 def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
-    """Each stage with its shader, in order; what a camera's move leaves is marked as kept."""
+    """Each stage is listed with its shader, in order; stages that a camera move leaves valid are marked."""
     renderer.draw(BASE, SETTINGS)
     listing = renderer.graph.listing = Listing()
     renderer.draw(replace(BASE, camera=SCENES["camera"]), SETTINGS)

@@ -1,4 +1,4 @@
-"""What the skin's surface settings do to one pixel, seen from straight above, against its closed form."""
+"""Surface settings of the skin in one pixel seen from straight above, against closed forms."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ LIGHT = DirectionalLight(direction=(0.6, 0, -1), irradiance=(2.0, 2.0, 2.0), sha
 
 
 def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
-    """(3,) radiance at the foot of the camera."""
+    """Return the (3,) radiance below the camera."""
     scene = scene_of(head, LIGHT, camera=front_camera(head), **skin)
     inputs = run_frame(renderer, scene, size=(1, 1), technique="none")
     return download(renderer.device, inputs.resources.post.picture.exposed).astype(float)[0, 0, :3]
 
 
 def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:
-    """(3,) radiance from below and radiance off the surface."""
+    """Return the (3,) radiance from below the surface, and the reflected radiance."""
     to_light = np.array([-0.6, 0.0, 1.0]) / np.sqrt(1.36)
     arriving, law = 2.0 * to_light[2], ENERGY[energy]
     entering = law.entering_fraction(twins.surface_albedo([to_light[2]], m, model, fresnel)[0], rho_s)
@@ -91,13 +91,13 @@ def test_strength_stays_within_one() -> None:
 
 
 class WaxedSkin(Skin):
-    """Skin with a dial that the package does not know."""
+    """Skin with a field that the package does not know."""
 
     wax: float = 0.25
 
 
 def skin_struct(tmp_path: Path, renderer: Renderer, *members: str) -> ComputeProgram:
-    """A shader with the package's `Skin`, and more members at its start."""
+    """Return a shader with the package's struct `Skin`, with more members at its start."""
     declared = SURFACE.read_text("utf-8").replace("struct Skin {", "\n".join(["struct Skin {", *members]))
     path = tmp_path / "waxed.wgsl"
     path.write_text(f"{declared}\n@compute @workgroup_size(1) fn main() {{}}", "utf-8")

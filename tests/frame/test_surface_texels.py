@@ -1,4 +1,4 @@
-"""What is kept of the surface at each texel of an atlas: how exactly, and how long."""
+"""Packed surface at the texels of an atlas: precision and lifetime."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def packed(renderer: Renderer) -> tuple[Floats, Floats, list[Floats]]:
-    """Directions, colours with heights, and what came out of the words they were packed in."""
+    """Return directions and colours with heights, and the results of packing and unpacking them."""
     random = np.random.default_rng(3)
     directions = random.normal(size=(SIZE, SIZE, 4))
     directions[0, :6, :3] = np.concatenate([np.eye(3), -np.eye(3)])
@@ -42,7 +42,7 @@ def packed(renderer: Renderer) -> tuple[Floats, Floats, list[Floats]]:
 
 
 def test_directions(packed: tuple[Floats, Floats, list[Floats]]) -> None:
-    """16 bits along each side of the octahedron."""
+    """Directions have 16 bits along each side of the octahedron."""
     directions, _, (normal, bent, _, places) = packed
     assert np.abs(normal[..., :3] - directions).max() < 6e-5
     assert np.abs(bent[..., :3] + directions).max() < 6e-5
@@ -59,7 +59,7 @@ def test_colours_and_heights(packed: tuple[Floats, Floats, list[Floats]]) -> Non
 
 
 def drawn(renderer: Renderer, *scenes: Scene, atlas: int = SIZE) -> list[int]:
-    """How often the surface is drawn in each of some frames."""
+    """Return how often the surface pass runs in each of some frames."""
     found = []
     for scene in scenes:
         run_frame(renderer, scene, atlas=atlas)
@@ -79,7 +79,7 @@ def test_drawn_only_when_it_changes(renderer: Renderer) -> None:
 
 
 def test_what_changed_is_seen(renderer: Renderer) -> None:
-    """A head seen before, drawn again after others, is as it was at first."""
+    """A head rendered again after others looks as it did at first."""
     coloured = head_of(HEAD.mesh, colour=np.full((4, 4, 3), 0.25))
     changed = [scene_of(coloured, frontal(), mix=1.0), scene_of(HEAD, frontal(), mix=1.0, rho_s=0.9)]
     first, *_, last = found = [

@@ -1,4 +1,4 @@
-"""The frame's shaders once more in numpy float64, as plainly as their equations."""
+"""Reference implementations of the frame's shaders in float64."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.features.diffusion.kernels import MAX_TABLE_VARIANCE, ROWS_PER_UNIT, SUMMED_TRUNCATION, kernel_table
+from dermis.frame.features.diffusion.kernels import (
+    MAX_TABLE_VARIANCE,
+    ROWS_PER_UNIT,
+    SUMMED_TRUNCATION,
+    kernel_table,
+)
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
@@ -27,7 +32,7 @@ DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
 
 
 def _table_ratio(relative: Floats) -> Floats:
-    """The kernel table between its rows."""
+    """Interpolate the kernel table between its rows."""
     taps = np.ceil(SUMMED_TRUNCATION * np.sqrt(relative)).astype(int)
     row = relative * ROWS_PER_UNIT
     table = kernel_table().astype(np.float64)
@@ -44,7 +49,7 @@ class Kernel(NamedTuple):
 
     @classmethod
     def of(cls, variance: Floats, step: Floats) -> Kernel:
-        """variance : [texel^2]"""
+        """Return the kernel of a variance [texel^2]."""
         relative = variance / step**2
         wide = relative > MAX_TABLE_VARIANCE
         taps = np.ceil(np.where(wide, WIDE_TRUNCATION, SUMMED_TRUNCATION) * np.sqrt(relative)).astype(int)
@@ -60,7 +65,7 @@ def _step(sigma: Floats, sigma_before: Floats) -> Floats:
 
 
 def _added_by_lean(lean: Floats, kernel: Kernel) -> Floats:
-    """Variance [texel^2] that reading between two texels adds."""
+    """Return the variance that interpolation between two texels adds [texel^2]."""
     added, total = np.zeros(lean.shape), np.ones(lean.shape)
     for n in range(1, kernel.taps.max() + 1):
         f = (lean * n * kernel.step) % 1.0
@@ -70,7 +75,7 @@ def _added_by_lean(lean: Floats, kernel: Kernel) -> Floats:
 
 
 def _between(source: Floats, y: NDArray[np.int64], x: Floats) -> Floats:
-    """Texels of row y between two columns; the outermost ones repeat themselves beyond the texture."""
+    """Return texels of row y, interpolated between two columns; the texture repeats its border."""
     n = len(source)
     column = np.floor(x).astype(int)
     one, other = (source[np.clip(y, 0, n - 1), np.clip(column + k, 0, n - 1)] for k in (0, 1))
@@ -85,10 +90,10 @@ def spread(
     before: float,
     axis: int,
 ) -> Floats:
-    """One axis of one Gaussian of variance [mm2] added to a source that has `before` already.
+    """Blur a source of variance `before` to `variance` along one axis [mm2].
 
     source : (n, n, 4) light and coverage, metric : (n, n, 3) texels per mm along u, v and the cosine between
-    reach : (n, n, 4) left, right, up, down; None reads whatever the texture holds
+    reach : (n, n, 4) left, right, up, down; None reads the whole texture
     """
     along_u, along_v, cosine = np.moveaxis(np.asarray(metric, float), -1, 0)
     covered = along_v > 0
@@ -118,9 +123,9 @@ def spread(
 def levels(
     source: Floats, metric: Floats, reach: NDArray[np.integer] | None, variances: ArrayLike
 ) -> list[Floats]:
-    """The blurred levels of (n, n, 3) light, each from the one before.
+    """Return the blurred levels of (n, n, 3) light, each computed from the one before.
 
-    metric : (n, n, 2 or 3) texels per mm along u, v, and the cosine between them, 0 when left out
+    metric : (n, n, 2 or 3) texels per mm along u, v, and the cosine between them, 0 by default
     """
     metric = np.concatenate([metric, np.zeros((*metric.shape[:2], 3 - metric.shape[2]))], axis=-1)
     made, before = [np.dstack([source, np.ones(source.shape[:2])])], 0.0
@@ -132,7 +137,7 @@ def levels(
 
 
 def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:
-    """(..., 3) sum of the profile's Gaussians from `first` on at squared distances [1/mm2]."""
+    """Return the (..., 3) sum of the profile's Gaussians from `first` on at squared distances [1/mm2]."""
     total = np.zeros((*r2_mm2.shape, 3))
     for variance, weight in zip(profile.variance_mm2[first:], profile.weight[first:], strict=True):
         total += (np.exp(-r2_mm2 / (2 * variance)) / (2 * np.pi * variance))[..., None] * weight
@@ -142,7 +147,7 @@ def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:
 def surface_albedo(
     cosine: ArrayLike, m: float, model: str = USUAL, fresnel: str = "schlick"
 ) -> tuple[Floats, Floats]:
-    """Directional albedo of the surface and its mean, by the shader's table."""
+    """Return the directional albedo of the surface and its mean, from the shader's table."""
     table = albedo_table(model, fresnel).astype(np.float64)
     column = np.sqrt(np.clip(np.asarray(cosine, float), 0, None)) * (table.shape[1] - 1)
     where = [np.full(column.shape, (np.sqrt(m) - 0.2) / 0.8 * (len(table) - 1)), column]
@@ -151,17 +156,17 @@ def surface_albedo(
 
 
 def enters(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
-    """Share of light from a direction that enters the skin."""
+    """Return the fraction of light from a direction that enters the skin."""
     return ENERGY["full"].entering_fraction(surface_albedo(cosine, m)[0], rho_s)
 
 
 def leaves(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
-    """What leaves in a direction, of light that would leave evenly."""
+    """Return the fraction of uniform light that leaves in a direction."""
     return ENERGY["full"].exitance_factor(*surface_albedo(cosine, m), rho_s)
 
 
 def beckmann_by_table(cos_h: Floats, m: float) -> Floats:
-    """Beckmann's distribution by the shader's table."""
+    """Return Beckmann's distribution from the shader's table."""
     table = beckmann_table().astype(np.float64)
     where = [np.full(cos_h.shape, m * len(table) - 0.5), cos_h * (len(table) - 1)]
     return np.asarray((2.0 * map_coordinates(table, where, order=1, mode="nearest")) ** 10)
@@ -170,7 +175,7 @@ def beckmann_by_table(cos_h: Floats, m: float) -> Floats:
 def incident(
     light: PointLight | SpotLight | DirectionalLight, centre: ArrayLike, points: Floats
 ) -> tuple[Floats, Floats]:
-    """(..., 3) unit vectors to the light and (..., 3) irradiance on a surface that faces it."""
+    """Return (..., 3) unit vectors to the light, and (..., 3) irradiance on a surface that faces it."""
     colour = np.array(light.irradiance)
     if isinstance(light, DirectionalLight):
         way = np.array(light.direction) / np.linalg.norm(light.direction)
@@ -189,7 +194,7 @@ def incident(
 
 
 def entering(scene: Scene, points: Floats, normals: Floats) -> Floats:
-    """(..., 3) irradiance that passes the surface, without shadows, relief and colour."""
+    """Return the (..., 3) irradiance that enters the surface, without shadows, relief and colour."""
     total = np.zeros(points.shape)
     for light in scene.lights:
         to_light, arriving = incident(light, scene.head.centre_mm, points)
@@ -200,7 +205,7 @@ def entering(scene: Scene, points: Floats, normals: Floats) -> Floats:
 
 
 def surface(atlas: Atlas, head: Head) -> tuple[Floats, Floats]:
-    """Position and unit normal of each texel, 0 where there is none."""
+    """Return the position and the unit normal of each texel, 0 outside charts."""
     point = atlas.interpolate(head.mesh, head.mesh.positions)
     normal = atlas.interpolate(head.mesh, head.mesh.normals)
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)

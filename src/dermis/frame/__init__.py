@@ -1,1 +1,1 @@
-"""The frame: everything that the device computes to draw a scene, and its renderer."""
+"""Frame: all that the device computes to render a scene, and the renderer."""

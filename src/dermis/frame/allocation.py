@@ -8,7 +8,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import cached_atlas
 from dermis.frame.features import diffusion, hair, outputs, post, shape
 from dermis.frame.features.atlas.gutters import GutterTracing, make_gutter_tracing, with_own_gutters
-from dermis.frame.features.atlas.lit import GutterUpdate
+from dermis.frame.features.atlas.lit_atlas import GutterUpdate
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.features.hair.resources import no_strand_shadows
 from dermis.frame.features.interreflection.interreflection import make_interreflection, no_interreflection
@@ -126,7 +126,7 @@ def _shared_bindings(
     shapes: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
-    """Return the resources that light all layouts, except maps and lights."""
+    """Return the shader resources that all layouts share, without maps and lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
     curvature = shapes.curvature

@@ -134,7 +134,7 @@ def _bake_points(
     points: NDArray[np.uint32],
     side: int,
 ) -> Floats:
-    """Return the (n, COUNT) channels of surface points, in the light of a frame that is drawn for them."""
+    """Render a frame for its light, and return the (n, COUNT) shading channels of surface points."""
     renderer.draw(scene, settings, timed=False, outputs=outputs)
     inputs = renderer.prepare(scene, settings, "", outputs)
     bindings, output_resources = _bindings(renderer, inputs, scene), inputs.resources.outputs

@@ -40,7 +40,7 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 
 
 def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
-    """Return a captured frame with one of `factor` coarse hairs, as much wider; 0 keeps all hairs."""
+    """Return a captured frame with fewer and wider coarse hairs, one of every `factor`; 0 keeps all."""
     for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
         count = int(record["coarse"]) // factor
         record["wider"] *= record["coarse"] / max(1, count)

@@ -115,7 +115,7 @@ def _halved(settings: Settings, option: str) -> Settings | None:
 
 
 def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
-    """Options of the command line, by their names."""
+    """Return the command line options of a setting, by the name of the setting."""
     if option != "size":
         return {option: f"--{option.replace('_', '-')} {getattr(settings, option)}"}
     width, height = settings.size

@@ -54,7 +54,7 @@ class FrameRequest:
 
     @property
     def topology(self) -> Head:
-        """Return the head without maps and hair from which atlas and tables are computed."""
+        """Return the bare head whose mesh determines the atlas and the tables."""
         return self.head.topology
 
     @property
@@ -64,7 +64,7 @@ class FrameRequest:
 
     @property
     def pair_positions_mm(self) -> NDArray[np.float32] | None:
-        """Return the rest positions in which translucency pairs are searched, None for the topology's [mm].
+        """Return the control points at rest for the pair search, None for those of the topology [mm].
 
         People of one template share the pairs of the template; only the weights of the pairs differ.
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dermis.frame.features import diffusion, hair, outputs, post, shape
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.interreflection.interreflection import Interreflection
 from dermis.frame.features.occlusion.moving import MovingOcclusion, VertexSky
 from dermis.frame.features.shadows.shadows import ShadowMaps

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.textures import AtlasTextures, pack_surface_points
 from dermis.frame.features.irradiance import irradiance
 from dermis.frame.features.shadows import shadows

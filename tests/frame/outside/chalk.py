@@ -1,4 +1,4 @@
-"""A surface lobe from outside the package: the same in all directions."""
+"""A surface lobe from outside the package, constant in all directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ALBEDO = 0.5
 
 
 def chalk(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF albedo / pi [1/sr]."""
+    """Return the BRDF, albedo / pi [1/sr]."""
     value = np.broadcast_to(ALBEDO / np.pi, np.broadcast_shapes(angles.n_l.shape, np.shape(m)))
     return np.where(angles.above, value, 0.0)
 

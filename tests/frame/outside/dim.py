@@ -1,4 +1,4 @@
-"""A technique of another package: light leaves where it entered, and half of it is lost."""
+"""A technique of another package: light leaves where it enters, and half of it is lost."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ LEFT = 0.5
 
 
 class Dim(AtlasTechnique):
-    """One level of light, which is not blurred."""
+    """Technique with one level of light, which is not blurred."""
 
     sources = ("Borshukov2003",)
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """All of the profile's light in one level."""
+        """Return one Gaussian with all of the profile's light."""
         return single_gaussian(profile)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """No."""
+        """Return False."""
         return False
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """None."""
+        """Return 0 for both levels."""
         return (0, 0)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Half of the light."""
+        """Declare the pass that halves the light."""
         shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store=levels.texel)
         bound = {"light": levels.layer(0), "stored": levels.layer(1)}
         graph.compute("dim", shader, bound, (levels.size, levels.size), TILE)

@@ -1,4 +1,4 @@
-"""How the frame draws a light from outside the package."""
+"""Kind of a light from outside the package."""
 
 from __future__ import annotations
 

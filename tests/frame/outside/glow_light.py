@@ -1,4 +1,4 @@
-"""A kind of light from outside the package: a point that shines the more, the straighter ahead."""
+"""Light from outside the package: a point whose light is concentrated in its direction."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dermis.scene.lights import PointLight
 
 
 class GlowLight(PointLight):
-    """Falls off with a power of the cosine from the line to its target."""
+    """Point light that falls off with a power of the cosine from the line to its target."""
 
     kind: Literal["after-glow"] = "after-glow"  # type: ignore[assignment]
     power: Annotated[float, Field(ge=1, le=64)] = 4.0

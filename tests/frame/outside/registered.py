@@ -52,7 +52,7 @@ renderer = Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
 
 
 def drawn(light: GlowLight, power: float) -> np.ndarray:
-    """The picture in a light whose power is changed."""
+    """Return the picture in a light with another power."""
     scene = scene_of(floor, frontal(0.1), light.replace(power=power), specular="blue-chalk", rho_s=0.4)
     rendered = renderer.draw(scene, settings, outputs=("uv", "uv_sum"))
     assert np.allclose(rendered.output("uv_sum"), rendered.output("uv").sum(axis=-1), atol=1e-6)

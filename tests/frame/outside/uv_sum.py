@@ -1,4 +1,4 @@
-"""An output from outside the package."""
+"""Output from outside the package."""
 
 from __future__ import annotations
 

@@ -22,9 +22,10 @@ L = TypeVar("L", bound=Light)
 class Kind(Generic[L]):
     """Kind of light in the frame; this base class is a punctual light without members of its own.
 
-    The shader has the name of the module with the suffix .wgsl. It defines `fn NAME_incident(light: Light, p:
-    vec3f, part: u32) -> Incident`, where NAME is the name of the kind in scene files, with underscores for
-    hyphens.
+    The shader has the name of the module with the suffix .wgsl. With NAME as in scene files, but with
+    underscores for hyphens, it defines
+
+        fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident
 
     Attributes
     ----------

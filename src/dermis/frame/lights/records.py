@@ -72,7 +72,10 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Of passes that know how the surface goes on beside a point, which half-spaces ask for."""
+    """Return constants that enable oblique incidence if the skin is a half-space.
+
+    Only passes that know the shape of the surface around a point may use them.
+    """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
 

@@ -56,11 +56,11 @@ class PreIntegratedSkin(Technique):
         return memo.get(pre_integrate, device, profile)
 
     def write_view_record(
-        self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None
+        self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
         """Write the scales of the tables to the shading record."""
-        assert isinstance(own, PreIntegratedTables)
-        scales = {"max_curvature": MAX_CURVATURE, "penumbra": own.penumbra_width_mm, "relief": own.relief_mm}
+        assert isinstance(resources, PreIntegratedTables)
+        scales = {"max_curvature": MAX_CURVATURE, "penumbra": resources.penumbra_width_mm, "relief": resources.relief_mm}
         view["pre"] = shade.record("PreIntegrated", **scales)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:

@@ -56,7 +56,7 @@ class SubsurfaceLayers(TechniqueResources):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Texture of the fraction of light on one side up to a distance, over the square root of the distance.
+    """Cumulative one-sided diffusion kernel as a texture over the square root of the distance.
 
     reach_mm : distance of the last entry [mm]
     """
@@ -82,9 +82,9 @@ class ScreenSpace(Technique):
         """Return the textures of the outputs, without a finished picture."""
         return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
 
-    def subsurface_layers(self, own: TechniqueResources | None) -> Texture | None:
+    def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
         """Return the texture of light below the skin and its transmittance."""
-        return own.layers if isinstance(own, SubsurfaceLayers) else None
+        return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
         """Declare the passes that diffuse the light below the skin, and return the finished picture."""
@@ -173,7 +173,10 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
 
 
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return the (1, n, 4) fractions of light over the root of the relative distance, and the reach [mm]."""
+    """Return the (1, n, 4) cumulative one-sided kernel, and its reach [mm].
+
+    Entries are evenly spaced in the square root of the distance.
+    """
     reach = _reach(kernel)
     fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
     fractions *= 0.5 / fractions[-1]  # the light beyond the reach is added to the light within it

@@ -59,7 +59,7 @@ class Technique(TechniqueTraits):
     """
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Create textures for light and its blurred levels, of the least size without atlas light."""
+        """Create textures for light and its blurred levels, minimal where the atlas holds no light."""
         return make_levels(device, side, halvings, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Texture:
@@ -91,19 +91,19 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return the textures for light below the skin of the outputs, None for none."""
+        """Return the textures in which light below the skin is rendered for outputs, None for none."""
         return None
 
     def write_view_record(
-        self, view: UniformRecord, shade: ComputeProgram, own: TechniqueResources | None
+        self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
         """Write the technique's members of the shading record.
 
         shade : program of the shading pass
-        own : result of `make`
+        resources : result of `make`
         """
 
-    def subsurface_layers(self, own: TechniqueResources | None) -> Texture | None:
+    def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
         """Return the texture to which the shading pass writes light below the skin, None for none."""
         return None
 
@@ -130,7 +130,7 @@ class Technique(TechniqueTraits):
 
 
 class AtlasTechnique(Technique):
-    """Technique that lights the atlas, blurs the light by each Gaussian of the profile and sums up."""
+    """Technique that lights the atlas, blurs the light by each Gaussian, and sums the levels."""
 
     uses_atlas = True
 

@@ -54,7 +54,7 @@ def with_own_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
 
 
 def _start_words(atlas: Atlas) -> Words:
-    """Return (a, 5) words: texel, triangle and weights of a path's start, and the source without a path."""
+    """Return (a, 5) words: texel, triangle and weights of the start of a path, and the fallback source."""
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
     x, y = atlas.gutter.T.astype(np.uint32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.textures import GUTTER_ENTRY_BYTES, AtlasTextures
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.programs import TILE, program, workgroup_grid

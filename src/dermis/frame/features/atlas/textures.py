@@ -65,7 +65,7 @@ class AtlasTextures:
     median_texels_per_mm: float = 0.0
 
     def mips_for(self, edge: str) -> tuple[AtlasTextures, ...]:
-        """Return the atlas at its own and at the coarser resolutions that blurs with an edge mode may use."""
+        """Return the atlas at all resolutions that blurs with an edge mode may use, the finest first."""
         return (self, *(self.coarser if edge == "repeated" else ()))
 
 
@@ -104,7 +104,7 @@ def _mean_density(stretch: NDArray[np.float16]) -> float:
 
 
 def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
-    """Return the median over texels of the smaller of both densities [texels/mm].
+    """Return the median over texels of the smaller density, along u or v [texels/mm].
 
     Non-negative half floats have the order of their 16-bit words, of which there are few: a histogram is
     faster than sorting.
@@ -215,7 +215,7 @@ def _quads(image: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return the numbers of squares to the left, right, up and down that all counted texels reach."""
+    """Return the reach of 2 x 2 squares, in squares: the least reach of their counted texels."""
     squares = np.zeros((*counted.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.lights.records import oblique_constants
 from dermis.frame.programs import FLOATS, program
 from dermis.gpu import Constants, Recorder, TextureOrView

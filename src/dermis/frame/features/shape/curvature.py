@@ -66,7 +66,7 @@ def placeholder_curvature(device: Device) -> Buffer:
 
 
 def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:
-    """Return the number of averagings over neighbours that smooth by `SMOOTH_MM`."""
+    """Return the number of smoothing steps whose total standard deviation is `SMOOTH_MM`."""
     points = mesh.points_mm
     square = ((points[pairs[:, 0]] - points[pairs[:, 1]]) ** 2).sum(axis=1)
     degree = 1.0 + np.bincount(both[:, 0], minlength=len(points))

@@ -54,10 +54,10 @@ def upload_maps(
     if not isinstance(maps, PaintedMaps):
         return UploadedMaps(_from_files(device, head, use_colour, decoded), None)
     if not decoded and use_colour and maps.colour is None:  # only a picture can be taken for linear
-        found = paint.paint_arrays(device, _surface(head), maps.look, side)
+        found = paint.paint_arrays(device, _painted_surface(head), maps.look, side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
-    painted, expression_maps = _painted(device, head, maps, use_colour, (side, animated))
+    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (side, animated))
     return UploadedMaps(_from_files(device, head, use_colour, decoded) | painted, expression_maps)
 
 
@@ -69,17 +69,17 @@ def detail_bindings(device: Device, fine: bool) -> MutableBindings:
     slopes = detail_slopes() if fine else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
     sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
-    return {"detail_map": map_mips.detail(device, slopes), "detail_sampler": sampler}
+    return {"detail_map": map_mips.upload_detail(device, slopes), "detail_sampler": sampler}
 
 
-def _painted(
+def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps without files, and return them with those that expressions change.
+    """Paint the maps that have no file; return them, and those among them that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """
-    surface, (side, animated) = _surface(head), paint_options
+    surface, (side, animated) = _painted_surface(head), paint_options
     if device.adapter.kind == "CPU":
         side = min(side, _SOFTWARE_SIDE)
     from_file = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
@@ -91,8 +91,8 @@ def _painted(
     return {f"{role}_map": textures[role] for role in used}, painted.expression_maps
 
 
-def _surface(head: Head) -> PaintedSurface:
-    """Return the surface to paint, that of the topology, which all people of a template share."""
+def _painted_surface(head: Head) -> PaintedSurface:
+    """Return the surface to paint: that of the topology, as all people of a template share it."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
@@ -107,11 +107,11 @@ def _from_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> 
     colour = colour if decoded else encode_srgb(colour)
     return {
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
-        "relief_map": map_mips.relief(device, maps.height),
-        "slope_map": map_mips.slopes(device, maps.normal),
-        "colour_map": map_mips.colours(device, colour),
-        "specular_map": _grey(device, _relative_to_mean(maps.specular, head.mesh)),
-        "roughness_map": _grey(device, _factor_channel(maps.roughness)),
+        "relief_map": map_mips.make_relief(device, maps.height),
+        "slope_map": map_mips.upload_slopes(device, maps.normal),
+        "colour_map": map_mips.upload_colours(device, colour),
+        "specular_map": _upload_grey(device, _relative_to_mean(maps.specular, head.mesh)),
+        "roughness_map": _upload_grey(device, _factor_channel(maps.roughness)),
         "beckmann_table": device.cached(
             "Beckmann's distribution", lambda: texture_from_array(device, beckmann_table(), "r32float")
         ),
@@ -136,7 +136,7 @@ def _relative_to_mean(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray
     return _factor_channel(values / mean if mean > 0 else np.ones_like(values))
 
 
-def _grey(device: Device, values: NDArray[np.float32]) -> Texture:
+def _upload_grey(device: Device, values: NDArray[np.float32]) -> Texture:
     """Upload a one-channel map as half floats with all mip levels.
 
     The CPU computes the levels, as devices need not support storing r16float.

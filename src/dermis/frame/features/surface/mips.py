@@ -41,7 +41,7 @@ class MippedTexture(NamedTuple):
         return width, height
 
 
-def colours(device: Device, image: Floats) -> Texture:
+def upload_colours(device: Device, image: Floats) -> Texture:
     """Upload an (h, w, 3) picture with its mip levels."""
     made = empty_map(device, image.shape)
     upload(device, made.texture, np.dstack([image.astype(np.float16), np.ones(image.shape[:2], np.float16)]))
@@ -51,7 +51,7 @@ def colours(device: Device, image: Floats) -> Texture:
     return made.texture
 
 
-def slopes(device: Device, image: Floats | None) -> Texture:
+def upload_slopes(device: Device, image: Floats | None) -> Texture:
     """Upload (h, w, 2) slopes with their squares and mip levels; None gives a flat texture."""
     if image is None:
         return _flat(device)
@@ -64,7 +64,7 @@ def slopes(device: Device, image: Floats | None) -> Texture:
     return made.texture
 
 
-def detail(device: Device, slopes: Floats) -> Texture:
+def upload_detail(device: Device, slopes: Floats) -> Texture:
     """Upload the (h, w, 4) slopes of a tile of two kinds of relief, and their squares as a second layer."""
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
@@ -78,7 +78,7 @@ def detail(device: Device, slopes: Floats) -> Texture:
     return texture
 
 
-def relief(device: Device, height: Floats | None) -> Texture:
+def make_relief(device: Device, height: Floats | None) -> Texture:
     """Compute the slopes of an (h, w) height map [mm/texel], with their squares and mip levels.
 
     None gives a flat texture. Heights are extrapolated linearly beyond the edges.

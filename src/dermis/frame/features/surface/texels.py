@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.programs import program
 from dermis.gpu import Device, Recorder, Texture, make_texture, mark_scratch
 

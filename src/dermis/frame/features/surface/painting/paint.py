@@ -297,7 +297,7 @@ def make_expression_maps(
 def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.float32]) -> None:
     """Declare the passes that compute colour and relief for an expression.
 
-    amounts : (9,) amount of each movement of the face, see `human.skin.face.movements` [-]
+    amounts : (9,) amount of each movement of the face, see `human.skin.face.movement_weights` [-]
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
     folding = amounts[:_FOLDING].reshape(2, 4)
