@@ -100,15 +100,15 @@ def _trace_lines(
     mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
 ) -> tuple[Index, Floats]:
     """Return pairs of cells (m, 2) that lines connect, and the number of lines that left each cell."""
-    corners = mesh.positions[mesh.triangles].astype(np.float64)
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    corners -= 0.5 * (low + high)
-    per_mm = 0.5 * lines / (float(np.linalg.norm(corners, axis=2).max()) or 1.0)
+    used, corner = np.unique(mesh.triangles, return_inverse=True)
+    vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
+    vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
     rng, left, facing = np.random.default_rng(_SEED), np.zeros(SIDE * SIDE), [np.zeros((0, 2), np.int64)]
     for direction in _hemisphere_directions(bundles):
         axes = per_mm * _axes(direction, rng.uniform(0.0, 2.0 * np.pi))
-        points = corners @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
-        line, depth, outward, triangle, weights = intersect_lines(points)
+        points = vertices @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
+        line, depth, outward, triangle, weights = intersect_lines(points[corner])
         cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
         left += np.bincount(cell[cell >= 0], minlength=SIDE * SIDE)
         facing.append(_facing_cells(line, depth, outward, cell))
@@ -122,26 +122,29 @@ def intersect_lines(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], I
 
     points : (f, 3, 3) corners of the triangles
     """
-    low, high = np.ceil(points[..., :2].min(axis=1)), np.floor(points[..., :2].max(axis=1))
-    wide, tall = (np.maximum(high - low + 1, 0).astype(np.int64)).T
-    count = wide * tall
+    x, y, z = np.ascontiguousarray(points.transpose(2, 1, 0))
+    (left, width), (bottom, height) = _integer_range(x), _integer_range(y)
+    count = width * height
     triangle, number = expand_runs(np.zeros_like(count), count)
-    x, y = low[triangle].T + np.stack([number % wide[triangle], number // wide[triangle]])
-    a, b, c = points[triangle].transpose(1, 0, 2)
-    signed_areas = np.stack(
-        [
-            (b[:, 0] - x) * (c[:, 1] - y) - (b[:, 1] - y) * (c[:, 0] - x),
-            (c[:, 0] - x) * (a[:, 1] - y) - (c[:, 1] - y) * (a[:, 0] - x),
-            (a[:, 0] - x) * (b[:, 1] - y) - (a[:, 1] - y) * (b[:, 0] - x),
-        ],
-        axis=1,
-    )
-    area = signed_areas.sum(axis=1)
-    inside = (signed_areas * np.sign(area)[:, None] >= 0.0).all(axis=1) & (area != 0.0)
-    weights = signed_areas[inside] / area[inside, None]
-    depth = (weights * points[triangle[inside], :, 2]).sum(axis=1)
-    line = (y[inside] * _LINES_PER_ROW + x[inside]).astype(np.int64)
-    return line, depth, area[inside] > 0.0, triangle[inside], weights
+    row, column = np.divmod(number, width[triangle])
+    line_x, line_y = left[triangle] + column, bottom[triangle] + row
+    (ax, bx, cx), (ay, by, cy) = x[:, triangle] - line_x, y[:, triangle] - line_y
+    a, b, c = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+    area = a + b + c
+    least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    hit = np.flatnonzero(((area > 0.0) & (least >= 0.0)) | ((area < 0.0) & (most <= 0.0)))
+    triangle, area = triangle[hit], area[hit]
+    weights = np.stack([a[hit], b[hit], c[hit]], axis=1) / area[:, None]
+    depth_a, depth_b, depth_c = weights.T * z[:, triangle]
+    line = (line_y[hit] * _LINES_PER_ROW + line_x[hit]).astype(np.int64)
+    return line, depth_a + depth_b + depth_c, area > 0.0, triangle, weights
+
+
+def _integer_range(corner: Floats) -> tuple[Floats, Index]:
+    """Return the lowest integer between the corners (3, f) of each triangle, and the number of integers."""
+    low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
+    high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
+    return low, np.maximum(high - low + 1, 0).astype(np.int64)
 
 
 def _facing_cells(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
