@@ -1,4 +1,4 @@
-"""Panoramas: where their texels point, their sun-like peaks, and prefiltering against plain sums."""
+"""Panoramas: texel directions, sun-like peaks, and prefiltering compared with direct sums."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 
 def room(height: int = 128) -> Floats:
-    """A dim room with a bright window and a coloured floor."""
+    """Return a dim room with a bright window and a coloured floor."""
     towards = directions(height, 2 * height)
     radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
@@ -43,7 +43,7 @@ def room(height: int = 128) -> Floats:
 
 
 def with_lamp(radiance: Floats, towards: tuple[float, float, float], strength: float) -> Floats:
-    """The panorama with a lamp of 2 degrees radius."""
+    """Return the panorama with a lamp of 2 degrees radius."""
     unit = np.array(towards) / np.linalg.norm(towards)
     lit = radiance.copy()
     lit[directions(*radiance.shape[:2]) @ unit > np.cos(np.radians(2.0))] += strength * np.array(
@@ -53,7 +53,7 @@ def with_lamp(radiance: Floats, towards: tuple[float, float, float], strength: f
 
 
 def summed(radiance: Floats, normal: Floats, weight: Floats) -> Floats:
-    """(3,) integral of radiance times a weight per texel."""
+    """Return the integral (3,) of radiance times a weight per texel."""
     area = solid_angles(*radiance.shape[:2])
     return np.asarray((radiance * (weight * area)[..., None]).sum(axis=(0, 1)))
 
@@ -68,7 +68,7 @@ def test_the_middle_lies_behind_the_head_and_the_right_at_its_left() -> None:
 
 @pytest.mark.parametrize("height", [64, 100, 128, 300])
 def test_resampling_keeps_the_light(height: int) -> None:
-    """All of it, and where it is: the mean of radiance times direction."""
+    """Check the mean radiance and the mean of radiance times direction."""
     radiance = with_lamp(room(), (0.3, 0.8, 0.2), 50.0)
     made = resample(radiance.astype(np.float32), height)
     assert made.shape == (height, 2 * height, 3)
@@ -83,7 +83,7 @@ def test_resampling_keeps_the_light(height: int) -> None:
 
 @pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
 def test_any_size_is_taken(tmp_path: Path, height: int, kept: int) -> None:
-    """Also a prime number of rows, and two texels alone."""
+    """Check a prime number of rows, and two texels."""
     pixels = np.random.default_rng(height).uniform(0, 2, (height, 2 * height, 3)).astype(np.float32)
     write_exr(tmp_path / "sky.exr", pixels)
     made = load_panorama(str(tmp_path / "sky.exr"))
@@ -106,7 +106,7 @@ def test_a_lamp_becomes_a_sun_and_no_light_is_lost() -> None:
 
 
 def test_stars_brighter_than_the_sun_do_not_keep_it_from_shining() -> None:
-    """Single texels that give next to no light: a sun is taken for what it gives, not for its brightness."""
+    """Check that suns are selected by irradiance, not by radiance."""
     towards = np.array([0.3, 0.8, 0.2]) / np.linalg.norm([0.3, 0.8, 0.2])
     radiance = with_lamp(room(), (0.3, 0.8, 0.2), 900.0)
     spots = np.random.default_rng(2).integers(20, 100, (40, 2))
@@ -117,7 +117,7 @@ def test_stars_brighter_than_the_sun_do_not_keep_it_from_shining() -> None:
 
 
 def test_a_glow_around_the_sun_does_not_widen_it() -> None:
-    """Its shadows are as sharp as the disc that gives most of the light."""
+    """Check that the radius is that of the disc with most of the light."""
     radiance = with_lamp(np.full((512, 1024, 3), 0.5), (0.3, 0.8, 0.2), 20000.0)
     angle = np.degrees(np.arccos(directions(512, 1024) @ [0.3, 0.8, 0.2] / np.linalg.norm([0.3, 0.8, 0.2])))
     _, (sun,) = split_suns(radiance + 400.0 * np.exp(-((angle / 4.0) ** 2))[..., None])
@@ -130,7 +130,7 @@ def test_a_soft_room_has_no_sun() -> None:
 
 
 def test_harmonics_give_back_what_they_hold() -> None:
-    """A picture of low degree, through analysis and synthesis."""
+    """Check analysis and synthesis of a picture of low degree."""
     x, y, z = np.moveaxis(directions(256, 512), -1, 0)
     picture = np.stack([1 + x * y, z**3 - 0.2 * z, x**2 - z**2 + 0.1 * y], axis=-1)
     again = synthesise(analyse(picture, 12), np.ones(13), 256)
@@ -138,14 +138,14 @@ def test_harmonics_give_back_what_they_hold() -> None:
 
 
 def test_cosine_kernel_is_the_known_one() -> None:
-    """Factors pi, 2 pi / 3, pi / 4, 0, -pi / 24 [RamamoorthiHanrahan2001]."""
+    """Check the factors pi, 2 pi / 3, pi / 4, 0, -pi / 24 [RamamoorthiHanrahan2001]."""
     expected = [np.pi, 2 * np.pi / 3, np.pi / 4, 0, -np.pi / 24]
     assert np.allclose(zonal(np.cos, 4), expected, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
 def lamps(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
-    """A file of a room with a lamp too weak for a sun, and its radiance."""
+    """Return the file of a room with a lamp too weak for a sun, and its radiance."""
     path = tmp_path_factory.mktemp("environment") / "room.exr"
     radiance = with_lamp(room(256), (0.2, 0.9, -0.3), 8.0).astype(np.float32)
     write_exr(path, radiance)

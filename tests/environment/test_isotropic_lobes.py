@@ -1,4 +1,4 @@
-"""Lobes as a few round ones, against sums over the whole lobe."""
+"""Isotropic approximations of lobes compared with sums over the whole lobe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
-    """Their sum looks along the normal, and their shares are all of the light."""
+    """Check that their sum points along the normal and that their weights sum to 1."""
     table = isotropic_lobe_table()
     assert np.allclose(table[..., 3].sum(axis=-1), 1) and table[..., 3].min() >= 0
     assert np.allclose(table[:, -1, :, :2], 0)
@@ -26,7 +26,7 @@ def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> None:
-    """Of those that lie beside it there are two each; the rest lie in it."""
+    """Check that lobes outside of the plane of incidence are symmetric pairs."""
     table = isotropic_lobe_table(model)
     assert np.allclose(table[..., :3, 1], 0) and np.allclose(table[..., 3, 1], -table[..., 4, 1], atol=1e-4)
     beside = table[..., 3, 1] > 0
@@ -42,7 +42,7 @@ def test_mirrors_that_are_looked_up_are_five_at_most_and_three_at_steep_views() 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
-    """At a node of the table, by light sampled over the hemisphere; and nearly its width across."""
+    """Compare mean direction and width with samples of the hemisphere, at a node of the table."""
     light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
     cosine, m = (7 / 15) ** 2, LOBE_TABLE_ROUGHNESSES[6]
     view, up = np.array([-np.sqrt(1 - cosine**2), cosine, 0]), np.array([0.0, 1.0, 0.0])
@@ -66,7 +66,7 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
 
 
 def test_mirrors_of_another_packages_model_are_fitted_when_asked_for() -> None:
-    """As those of the table were."""
+    """Compare a fit on demand with the table."""
     with MODELS.including("theirs", MODELS["kelemen"]):
         made = isotropic_lobe_table("theirs")
     assert np.allclose(made, isotropic_lobe_table("kelemen"), atol=2e-3)
@@ -74,7 +74,7 @@ def test_mirrors_of_another_packages_model_are_fitted_when_asked_for() -> None:
 
 @pytest.fixture(scope="module")
 def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
-    """A file of a dim room with a bright window and a coloured floor, and its radiance."""
+    """Return the file of a dim room with a bright window and a coloured floor, and its radiance."""
     towards = directions(256, 512)
     radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
@@ -98,10 +98,10 @@ def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
     ],
 )
 def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle: float, most: float) -> None:
-    """Against a plain sum of the whole lobe, over 24 views.
+    """Compare with a direct sum of the whole lobe, over 24 views.
 
-    Four lobes in the plane of view, whose directions are averaged from column to column of the table, err by
-    49, 21, 1.5, 2.7, 3.6, 1.9, 0.8 and 5.7 %.
+    Four lobes in the plane of incidence, with directions interpolated between columns of the table, have
+    errors of 49, 21, 1.5, 2.7, 3.6, 1.9, 0.8 and 5.7 %.
     """
     pairs = np.random.default_rng(5).normal(size=(24, 2, 3))
     assert error_of(lit_room, pairs, float(np.cos(np.radians(angle))), m) < most
@@ -111,7 +111,7 @@ def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle
 def test_grazing_reflections_all_around_are_the_lobes(
     lit_room: tuple[str, Floats], cosine: float, most: float
 ) -> None:
-    """Roughness 0.3, along a turn; one round lobe errs by 7, 20 and 25 %."""
+    """Check roughness 0.3 over all azimuths; one isotropic lobe has errors of 7, 20 and 25 %."""
     tangents = [np.array([np.cos(turn), 0.3, np.sin(turn)]) for turn in np.linspace(0, 2 * np.pi, 7)[:-1]]
     pairs = np.array([[np.cross(tangent, [0.2, 1.0, -0.4]), tangent] for tangent in tangents])
     pairs[:, 1] = np.cross(pairs[:, 1], pairs[:, 0])
@@ -119,7 +119,7 @@ def test_grazing_reflections_all_around_are_the_lobes(
 
 
 def error_of(lit_room: tuple[str, Floats], pairs: Floats, cosine: float, m: float) -> float:
-    """Root mean square of what round lobes err by, over the mean, for (n, 2, 3) normals and tangents."""
+    """Return the RMS error of isotropic lobes relative to the mean, for (n, 2, 3) normals and tangents."""
     name, radiance = lit_room
     layers, towards, area = prefilter(name).layers, directions(256, 512), solid_angles(256, 512)
     made, exact = [], []
@@ -141,7 +141,7 @@ def error_of(lit_room: tuple[str, Floats], pairs: Floats, cosine: float, m: floa
 
 
 def lobes_between(cosine: float, m: float) -> Floats:
-    """(5, 4) round lobes between the nodes of the table."""
+    """Return isotropic lobes (5, 4) between the nodes of the table."""
     x, y = np.sqrt(cosine) * 15, np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(12))
     j, i = int(x), int(y)
     five = isotropic_lobe_table()[i : i + 2, j : j + 2]
@@ -149,9 +149,9 @@ def lobes_between(cosine: float, m: float) -> Floats:
 
 
 def seen_in(layers: NDArray[np.float32], frame: Floats, lobe: Floats) -> Floats:
-    """(3,) mean radiance under a round lobe, between texels and layers.
+    """Return the mean radiance (3,) of an isotropic lobe, interpolated between texels and layers.
 
-    frame : (3, 3) across the mirror direction in the plane of view and beside it, and that direction
+    frame : (3, 3) mirror direction last, preceded by the axes in and across the plane of incidence
     """
     x, y = lobe[:2]
     direction = np.array([2 * x, 2 * y, 1 - x**2 - y**2]) / (1 + x**2 + y**2) @ frame

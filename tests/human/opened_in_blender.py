@@ -1,4 +1,4 @@
-"""Run by Blender's Python: a .glb is opened, moved and rendered; what was found goes into a folder."""
+"""Script for Blender's Python: open, move and render a .glb file, and write the results to a folder."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def main(file: str, folder: Path) -> None:
 
 
 def places(face: object) -> np.ndarray:
-    """(v, 3) where Blender draws the vertices [m], its own axes."""
+    """Return the vertices (v, 3) as Blender draws them, in Blender's axes [m]."""
     bpy.context.view_layer.update()
     seen = face.evaluated_get(bpy.context.evaluated_depsgraph_get())
     found = np.empty(3 * len(seen.data.vertices), np.float32)
@@ -51,13 +51,13 @@ def places(face: object) -> np.ndarray:
 
 
 def turn(bone: object) -> None:
-    """About the upward axis through where the bone rests."""
+    """Rotate a bone about the upward axis through its rest position."""
     there = Matrix.Translation(bone.bone.head_local)
     bone.matrix = there @ Matrix.Rotation(math.radians(DEGREES), 4, "Z") @ there.inverted() @ bone.matrix
 
 
 def render(path: Path, place: tuple[float, float, float], lens: float) -> None:
-    """A small picture from the front, under white light from everywhere."""
+    """Render a small picture from the front, under uniform white light."""
     bpy.ops.preferences.addon_enable(module="cycles")
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))

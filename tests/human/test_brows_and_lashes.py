@@ -1,4 +1,4 @@
-"""Brows and lashes of the parametric human: where they grow, and that they go along with the skin."""
+"""Brows and lashes of the parametric human: positions, and motion with the skin."""
 
 from __future__ import annotations
 
@@ -28,10 +28,12 @@ def grown(index: int = 0) -> Head:
 
 
 def knots(head: Head, **pose: float) -> Floats:
-    """(n, k, 3) in space [mm]."""
+    """Return the knots (n, k, 3) in space [mm]."""
     assert head.strands is not None
-    points = head.mesh.points_mm if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
-    return head.strands.places_mm(head.mesh, points)
+    points = (
+        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+    )
+    return head.strands.knot_positions_mm(head.mesh, points)
 
 
 def lashes(head: Head) -> NDArray[np.bool_]:
@@ -65,7 +67,7 @@ def test_brows_lie_on_the_skin(index: int) -> None:
 
 @pytest.mark.parametrize("index", range(len(PEOPLE)))
 def test_lashes_leave_the_eyes(index: int) -> None:
-    """Outside of the balls, and in front of them."""
+    """Check that lashes are outside of the eyeballs and in front of them."""
     head = grown(index)
     tips = knots(head)[lashes(head)]
     for name, side in (("left eye", 1.0), ("right eye", -1.0)):

@@ -1,4 +1,4 @@
-"""A person as a file: sound, for other programs, and the same person when it is read."""
+"""Heads of people as .glb files: validity, and equality after reading them back."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def written(folder: Path, head: Head, **more: object) -> Path:
 
 
 def posed_mm(head: Head, pose: Pose) -> np.ndarray:
-    """(v, 3) the vertices in a pose, of lids that do not slide over the eyes: in files nothing does."""
+    """Return the vertices (v, 3) in a pose without lid contact, which files do not have."""
     rig = replace(head.control, contact=None)
     return np.asarray(rig.points_mm(pose.motion(rig))[head.mesh.point])
 
 
 def in_file(head: Head) -> np.ndarray:
-    """(v,) the vertices in the order of the file: material after material."""
+    """Return the order (v,) of the vertices in the file, which is grouped by material."""
     used = np.unique(head.mesh.material)
     return np.concatenate([np.unique(head.mesh.triangles[head.mesh.material == one]) for one in used])
 
@@ -67,7 +67,7 @@ def test_control_points_read_back_as_they_move(tmp_path: Path) -> None:
 
 
 def test_finer_heads_read_back_as_they_move(tmp_path: Path) -> None:
-    """Expressions exactly; a turn of four bones to a finer mesh is not the mean of turned control points."""
+    """Check expressions exactly, bones approximately: rotation and subdivision do not commute."""
     head = PERSON.head()
     back, order = load_head(written(tmp_path, head), eyes="plain", subdivide=0), in_file(head)
     for pose in (Pose(), *EXPRESSIONS):
@@ -80,7 +80,7 @@ def test_finer_heads_read_back_as_they_move(tmp_path: Path) -> None:
 
 
 def test_a_coarse_file_is_refined_as_the_person_is(tmp_path: Path) -> None:
-    """By Catmull's and Clark's rules, and sharp at the rim of the cut."""
+    """Check Catmull-Clark subdivision with a sharp rim of the cut."""
     head, path = PERSON.head(), written(tmp_path, PERSON.head(subdivide=0))
     back = load_head(path, subdivide=1, eyes="plain")
     order = np.lexsort(np.round(head.mesh.uv, 6).T)

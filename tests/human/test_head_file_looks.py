@@ -1,4 +1,4 @@
-"""Eyes and hairs of a written person: what other programs show, and what this package reads back."""
+"""Eyes and hairs of a written person, as other programs draw them and as they are read back."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.person_file import write_person_glb
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import LIMBUS_MM, EyePictures, eye_uv, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, EyeTextures, eye_uv, profile_mm
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)
 PERSON = replace(Human.drawn(7), eyes=LOOK)
@@ -28,26 +28,26 @@ SIDE = 256
 
 
 @pytest.fixture(scope="module")
-def pictures(device: Device) -> EyePictures:
+def pictures(device: Device) -> EyeTextures:
     return eye_pictures(device, LOOK, SIDE)
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory, pictures: EyePictures) -> Path:
+def path(tmp_path_factory: pytest.TempPathFactory, pictures: EyeTextures) -> Path:
     file = tmp_path_factory.mktemp("looks") / "person.glb"
     write_person_glb(file, PERSON, PERSON.head(subdivide=0), roughness=0.3, eyes=pictures)
     return file
 
 
 def primitive(document: Document, name: str) -> dict[str, Any]:
-    """Of the material of that name."""
+    """Return the primitive with a material of that name."""
     names = [one["name"] for one in document.tree["materials"]]
     (found,) = [p for p in document.tree["meshes"][0]["primitives"] if names[p["material"]] == name]
     return dict(found)
 
 
 def texel(picture: np.ndarray, off_mm: float, turn: float) -> np.ndarray:
-    """Of an eye's picture, where a place so far off the axis is laid out."""
+    """Return the texel of an eye's picture at a distance from the axis."""
     angle = np.linspace(0.0, 0.5 * np.pi, 2000)
     angle = np.interp(off_mm, profile_mm(angle) * np.sin(angle), angle)
     place = profile_mm(angle) * np.array(
@@ -57,8 +57,8 @@ def texel(picture: np.ndarray, off_mm: float, turn: float) -> np.ndarray:
     return np.asarray(picture[v, u])
 
 
-def test_an_eye_is_painted_as_it_is_seen(pictures: EyePictures) -> None:
-    """A black pupil, larger through the cornea; a blue iris; a white, and normals that gather light."""
+def test_an_eye_is_painted_as_it_is_seen(pictures: EyeTextures) -> None:
+    """Check a black pupil enlarged by the cornea, a blue iris, a white, and normals that focus light."""
     turns = np.linspace(0.0, 6.0, 12)
     rings = {
         off: np.array([texel(pictures.colour, off, t) for t in turns]).mean(axis=0)
@@ -72,7 +72,7 @@ def test_an_eye_is_painted_as_it_is_seen(pictures: EyePictures) -> None:
     assert right[0] < -0.3 and abs(right[1]) < 0.05  # the iris turns to the axis, the cornea from it
 
 
-def test_eyes_have_their_pictures_and_a_coat(path: Path, pictures: EyePictures) -> None:
+def test_eyes_have_their_pictures_and_a_coat(path: Path, pictures: EyeTextures) -> None:
     document = check_rules(path)
     for name in ("left eye", "right eye"):
         found = primitive(document, name)
@@ -96,7 +96,7 @@ def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     places, normals = fibres.posed(head.mesh.points_mm)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     rings = places.reshape(len(head.strands), -1, 3)[:, :3]
-    middle = head.strands.places_mm(head.mesh, head.mesh.points_mm)[:, 0]
+    middle = head.strands.knot_positions_mm(head.mesh, head.mesh.points_mm)[:, 0]
     np.testing.assert_allclose(rings.mean(axis=1), middle, atol=1e-4)
     far = np.linalg.norm(rings - middle[:, None], axis=2)
     np.testing.assert_allclose(far, 1.2092 * head.strands.radius_mm[:, :1].repeat(3, axis=1), rtol=1e-3)
@@ -115,7 +115,9 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
     def colour(look: HairLook) -> np.ndarray:
         head = Human(hair=look).head(subdivide=0)
         assert head.strands is not None
-        return np.asarray(FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1)))
+        return np.asarray(
+            FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1))
+        )
 
     black, brown, blond = (colour(HairLook(eumelanin=e, pheomelanin=0.0)) for e in (8.0, 1.3, 0.3))
     assert black.max() < 0.01 < brown[0] < 0.05 < blond[0] < 0.3
@@ -123,7 +125,7 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
 
 
 def test_lashes_go_along_with_a_lid(path: Path) -> None:
-    """As the package moves them, to a hundredth of a millimetre and what lids slide."""
+    """Check motion as in the package within 0.01 mm, except for lid contact."""
     head, document = PERSON.head(subdivide=0), check_rules(path)
     found, names = (
         primitive(document, "brows and lashes"),
@@ -135,7 +137,9 @@ def test_lashes_go_along_with_a_lid(path: Path) -> None:
     assert strands is not None
     rig = head.control
     points = rig.points_mm(Pose({"eyeBlinkLeft": 1.0}).motion(rig))
-    before, after = (strands.places_mm(head.mesh, p)[:, -1] for p in (rig.points_mm(rig.rest), points))
+    before, after = (
+        strands.knot_positions_mm(head.mesh, p)[:, -1] for p in (rig.points_mm(rig.rest), points)
+    )
     tip = np.arange(len(strands)) * 13 + 12
     np.testing.assert_allclose(rest[tip], before, atol=0.01)
     missed = np.linalg.norm(moved[tip] - (after - before), axis=1)
@@ -150,7 +154,7 @@ def test_the_khronos_validator_finds_no_errors(path: Path) -> None:
 
 
 def test_the_same_person_is_read_back(path: Path) -> None:
-    """Its eyes look the same; hairs are no part of its mesh."""
+    """Check that the eyes look the same and that hairs are not part of the mesh."""
     back = load_head(path)
     assert back.eyes is not None and back.eyes.look == LOOK
     assert len(load_head(path, eyes="plain", subdivide=0).mesh.triangles) == len(

@@ -1,4 +1,4 @@
-"""Hair of the head and beards of the parametric human: where they grow, how dense, and on whom."""
+"""Hair and beards of the parametric human: positions, density, and who has them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis import Human, Pose
 from dermis.base.errors import DermisError
 from dermis.human.hair import density, groom
-from dermis.human.hair.head_hair import MOST_PER_CM2
+from dermis.human.hair.head_hair import MAX_PER_CM2
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.skin_surface import SkinSurface
@@ -39,9 +39,11 @@ def hair(head: Head) -> Strands:
 
 
 def knots(head: Head, **pose: float) -> Floats:
-    """(n, k, 3) in space [mm]."""
-    points = head.mesh.points_mm if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
-    return hair(head).places_mm(head.mesh, points)
+    """Return the knots (n, k, 3) in space [mm]."""
+    points = (
+        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+    )
+    return hair(head).knot_positions_mm(head.mesh, points)
 
 
 def everywhere(places: Floats) -> Floats:
@@ -55,7 +57,7 @@ def test_the_same_seed_has_the_same_hair() -> None:
     for name in ("knots_mm", "radius_mm", "absorption", "cover"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
     assert np.array_equal(one.roots.quad, other.roots.quad)
-    assert len(another) != len(one) or not np.array_equal(another.roots.place, one.roots.place)
+    assert len(another) != len(one) or not np.array_equal(another.roots.position, one.roots.position)
 
 
 def test_roots_are_as_dense_as_is_said() -> None:
@@ -70,16 +72,14 @@ def test_roots_are_as_dense_as_is_said() -> None:
 
 @pytest.mark.parametrize("density", [0.3, 1.0])
 def test_fewer_hairs_stand_for_all_there_are(density: float) -> None:
-    """Summed over a square centimetre of the crown they are as wide as 200 hairs are, times the density."""
+    """Check that the total width per cm2 of the crown is that of 200 hairs times the density."""
     head = Human(hair=HairLook(style="cropped", density=density)).head(subdivide=0)
     strands, place = hair(head), knots(head)[:, 0]
     top = place[:, 1] > 85.0
     quads = np.unique(strands.roots.quad[top])
     inside = np.isin(strands.roots.quad, quads)
     area = density.quad_areas_cm2(head.mesh, quads.astype(np.int64)).sum()
-    assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(
-        0.034 * MOST_PER_CM2 * density, rel=0.05
-    )
+    assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(0.034 * MAX_PER_CM2 * density, rel=0.05)
 
 
 def test_a_share_of_hairs_covers_as_much_as_all() -> None:
@@ -137,7 +137,7 @@ def test_no_hair_is_lost_where_none_is_looked_for(where: density.HairDensity) ->
     both = where, where._replace(candidates=ALL)
     some, every = (density.sample_roots(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
     assert not where.candidates.all() and len(some.quad) > 1000
-    assert np.array_equal(some.place, every.place) and np.array_equal(some.quad, every.quad)
+    assert np.array_equal(some.position, every.position) and np.array_equal(some.quad, every.quad)
 
 
 @pytest.mark.parametrize("seed", [2, 11, 30])
@@ -192,7 +192,7 @@ def test_what_is_no_hair_is_refused(bad: dict[str, object]) -> None:
 
 
 def test_places_on_the_average_person_are_below_the_crown() -> None:
-    """The edge of the breast, too, which its file stores as far above."""
+    """Check also the edge of the chest, which the file stores far above."""
     places = density.average_points()[:, :3]
     assert places[:, 1].max() < 130.0 and places[:, 1].min() < -330.0
     assert (knots(grown("cropped"))[:, 0, 1] > -110.0).all()

@@ -1,4 +1,4 @@
-"""Blender opens a person's file and moves it as this package does, where DERMIS_BLENDER_PYTHON names one."""
+"""Blender moves the file of a person as the package does; runs if DERMIS_BLENDER_PYTHON is set."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{P
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With the file, and what Blender found in it."""
+    """Return the folder with the file and Blender's results."""
     made = tmp_path_factory.mktemp("blender")
     device = open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
     painted, eyes = painted_head(device, PERSON.head(), 512)
@@ -67,7 +67,7 @@ def test_names_are_those_of_the_head(told: dict[str, Any], head: Head) -> None:
 
 @pytest.mark.parametrize("move", MOVES)
 def test_vertices_move_as_a_pose_says(folder: Path, head: Head, move: str) -> None:
-    """Blender's Z is up and its front -Y."""
+    """Compare vertices; in Blender Z is up and -Y is the front."""
     motion = MOVES[move].motion(head.control)
     meant = head.control.points_mm(motion)[head.mesh.point]
     with np.load(folder / "places.npz") as found:
@@ -85,7 +85,7 @@ def test_the_picture_shows_skin(folder: Path) -> None:
 
 
 def test_an_eye_shows_a_pupil_an_iris_and_the_white(folder: Path) -> None:
-    """Seen along its axis; the person has brown eyes."""
+    """Check a brown eye in a view along its axis."""
     picture = read_image(folder / "eye.png")[..., :3].astype(float)
     pupil, iris, white = (
         picture[30:36, those].mean(axis=(0, 1)) for those in (slice(29, 35), slice(39, 42), slice(46, 51))

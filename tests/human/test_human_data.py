@@ -1,4 +1,4 @@
-"""The data of the parametric human in the package, against the published files that it is made of."""
+"""Data of the parametric human in the package, compared with the published files."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_the_tile_of_detail_is_what_the_tool_makes(tmp_path: Path, monkeypatch: 
 
 
 def test_the_tile_goes_on_over_its_edges() -> None:
-    """Its slopes are no steeper there than inside."""
+    """Check that slopes at the edges are not steeper than inside."""
     slopes = np.abs(detail_slopes()[..., 2:])
     edge = np.concatenate([slopes[0], slopes[-1], slopes[:, 0], slopes[:, -1]])
     assert edge.mean() < 1.3 * slopes.mean()

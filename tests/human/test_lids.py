@@ -1,4 +1,4 @@
-"""Lids on eyes of true size: they touch them, slide over them and close, on whoever has them."""
+"""Lids on anatomical eyeballs: contact, sliding and closing, for several people."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.human.makehuman import morphed_points_mm
 from dermis.human.model import _sockets, build_head
 from dermis.human.movement import expression_targets
 from dermis.human.skin.surface import lid_rings
-from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
+from dermis.mesh.eyeball import SCLERA_MM, apex_mm, radial_distances_mm
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose
@@ -51,14 +51,14 @@ def head_of(seed: int | None) -> Head:
 
 
 def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Floats]:
-    """(28, 4, 3) the left eye's rings in the eye's own space, and how far each is from it [mm]."""
+    """Return the left eye's rings (28, 4, 3) in the eye's coordinates, and their distances from it [mm]."""
     head = head_of(seed)
     assert head.eyes is not None
     motion = Pose(weights).motion(head.control)
     points = head.control.points_mm(motion)[lid_rings()[0]]
     frame = head.eyes.frames(head.control, motion)[0]
     own = points @ frame[:3, :3].T + frame[:3, 3]
-    far, surface = clearance_mm(own, np.array([0.0, 0.0, 1.0]))
+    far, surface = radial_distances_mm(own, np.array([0.0, 0.0, 1.0]))
     return own, far - surface
 
 
@@ -90,13 +90,13 @@ def test_without_contact_a_lid_that_travels_straight_cuts_into_the_eye(seed: int
     straight = rig.positions_mm.astype(float)
     each = np.repeat(motion.weights, np.diff(rig.targets.first))
     np.add.at(straight, rig.targets.point, each[:, None] * rig.targets.delta_mm)
-    moved = np.linalg.norm(rig.contact.kept_off(straight) - straight, axis=1)
+    moved = np.linalg.norm(rig.contact.push_out(straight) - straight, axis=1)
     assert 0.4 < moved.max() < 2.5
 
 
 @pytest.mark.parametrize("seed", [*PEOPLE, *range(30, 40)])
 def test_closed_lids_meet(seed: int | None) -> None:
-    """The upper crest ends below the lower one, and not far below."""
+    """Check that the upper crest ends slightly below the lower one."""
     own, _ = rings(seed, {"eyeBlinkLeft": 1.0})
     lower = own[LOW, CREST][::-1]
     over = np.interp(own[UP, CREST, 0], lower[:, 0], lower[:, 1]) - own[UP, CREST, 1]
@@ -127,24 +127,24 @@ def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
 
 
 def test_lids_follow_who_has_another_head() -> None:
-    """Contact goes by where that person's eyes are."""
+    """Check that contact uses the positions of that person's eyes."""
     head, other = head_of(None), Human.drawn(7)
     motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)
     assert head.eyes is not None
     points = head.control.points_mm(motion)[lid_rings()[0]]
     frame = head.eyes.frames(head.control, motion)[0]
-    far, surface = clearance_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
+    far, surface = radial_distances_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
     assert (far - surface)[ON_BALL, CREST].min() > 0.0
 
 
 def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
-    """As if both eyes were gone over for each, also for blinks, which move the other eye's inner corner."""
+    """Compare with a correction of both eyes for each target; blinks move the other eye's inner corner."""
     places = morphed_points_mm(Human.drawn(3).weights())
     sockets = _sockets(places)
     found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
     targets = expression_targets()
     for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
-        part, moved = targets.of(targets.index[name]), places.copy()
+        part, moved = targets.rows(targets.index[name]), places.copy()
         point = targets.point[part]
         moved[point] += targets.delta_mm[part]
         drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.FORWARD))

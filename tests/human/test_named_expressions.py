@@ -1,4 +1,4 @@
-"""Named expressions have one home, to which other packages add."""
+"""Named expressions are defined in one place, and other packages can register more."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import ast
 from pathlib import Path
 
 import pytest
-from dermis.human.expression_targets import EXPRESSIONS, expression, targets_of
 
 import dermis
 from dermis.apps.batch.spec import parse_spec
 from dermis.base.errors import DermisError
+from dermis.human.expressions import EXPRESSIONS, expand_targets, expression
 from dermis.human.movement import expression_targets
 
 ROOT = Path(__file__).parent.parent.parent
@@ -19,7 +19,7 @@ ROOT = Path(__file__).parent.parent.parent
 def test_all_move_what_the_human_has() -> None:
     known = set(expression_targets().names)
     for name, weights in EXPRESSIONS.items():
-        assert expression(name).keys() == set(targets_of(weights)) <= known
+        assert expression(name).keys() == set(expand_targets(weights)) <= known
         assert all(0 < weight <= 1 for weight in weights.values())
 
 
@@ -42,7 +42,7 @@ def test_one_from_outside_is_known_to_data_sets() -> None:
 
 @pytest.mark.parametrize("folder", ["src", "gallery", "tools", "benchmarks"])
 def test_no_other_file_states_an_expression(folder: str) -> None:
-    """A dictionary, or a call, that gives numbers to two of ARKit's shapes."""
+    """Find dictionaries and calls with weights of two ARKit shapes."""
     known = set(expression_targets().names)
     known |= {name.removesuffix(side) for name in known for side in ("Left", "Right")}
     for path in (ROOT / folder).rglob("*.py"):

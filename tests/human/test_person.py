@@ -1,4 +1,4 @@
-"""People of the parametric human: what they are made of, and heads that are whole."""
+"""People of the parametric human: their fields, and valid heads."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_the_average_build_needs_no_target() -> None:
 
 
 def test_people_between_two_lie_between_them() -> None:
-    """Seen from the middle between the eyes, as all of them are."""
+    """Compare positions relative to the midpoint between the eyes."""
     young, middle, old = (Human(age=age).positions_mm for age in (25, 57.5, 90))
     off = np.abs(0.5 * (young + old) - middle)
     assert (off[: mesh_point_count()].max(axis=1) < 1e-3).mean() > 0.85
@@ -104,11 +104,13 @@ def test_the_layout_has_most_room_for_the_face(head: Head) -> None:
 @pytest.mark.parametrize("layout", ["own", "hm08"])
 def test_every_triangle_has_texels_of_its_own(layout: str) -> None:
     mesh = Human().head(layout=layout, subdivide=0).mesh  # type: ignore[arg-type]
-    assert build_atlas(mesh, 1024, "stitched").unscattered_fraction(mesh) < (1e-3 if layout == "own" else 0.02)
+    assert build_atlas(mesh, 1024, "stitched").unscattered_fraction(mesh) < (
+        1e-3 if layout == "own" else 0.02
+    )
 
 
 def test_the_bust_is_closed(head: Head) -> None:
-    """Where the skin ends a cap begins, at the same places."""
+    """Check that the cap begins where the skin ends."""
     mesh = head.mesh
     cap = mesh.material == list(MATERIALS).index("cap")
     body = mesh.material == list(MATERIALS).index("body")

@@ -1,4 +1,4 @@
-"""People as small files of their numbers."""
+"""People as JSON files of their numbers."""
 
 from __future__ import annotations
 

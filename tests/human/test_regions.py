@@ -1,4 +1,4 @@
-"""Regions of the face: labels by landmarks, tables, soft maps."""
+"""Regions of the face: labels by landmarks, tables, blurred maps."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _head(name: str, folder: Path) -> Head:
 
 
 def _areas(head: Head, table: RegionTable, size: int = 512) -> np.ndarray:
-    """Area by region on the right and on the left (2, 10) [mm²]."""
+    """Return the area by region on the right and on the left side (2, 10) [mm2]."""
     atlas = build_atlas(head.mesh, size)
     labels = label_texels(head, atlas, table)
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
@@ -149,7 +149,7 @@ def test_people_have_all_regions_on_both_sides(person: Human, unlike: float) -> 
 
 
 def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
-    """Layouts, levels of subdivision and people differ; landmarks stay in their regions."""
+    """Compare the regions of landmarks between layouts, levels of subdivision and people."""
     wanted = _at_landmarks(AVERAGE_HUMAN.head(), 512)
     wrong = {
         place: region
@@ -166,7 +166,7 @@ def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
 
 
 def _at_landmarks(head: Head, size: int) -> dict[str, str]:
-    """Region of the texel that is nearest to each landmark on skin."""
+    """Return the region of the texel nearest to each landmark on the skin."""
     from scipy.spatial import cKDTree
 
     atlas = build_atlas(head.mesh, size)
@@ -331,7 +331,7 @@ def _table(m: float, rho_s: float) -> RegionTable:
 
 
 def _quad() -> Mesh:
-    """A card of 200 mm that fills the uv square."""
+    """Return a square of 200 mm that fills the uv square."""
     from dermis.mesh.mesh import Material, build_mesh
 
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)

@@ -1,4 +1,4 @@
-"""Camera presets show the head whole, from the side that their name says."""
+"""Camera presets show the whole head, from the side in their name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def head(tmp_path_factory: pytest.TempPathFactory) -> Head:
 
 
 def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:
-    """Places of points [mm, relative to the head's centre] in the image: x to the right, y up, -1..1."""
+    """Project points [mm from the head's centre] into the picture: x to the right, y up, -1 to 1."""
     (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1).clips
     world = np.column_stack((points + head.centre_mm, np.ones(len(points))))
     x, y, _, w = clip @ world.T

@@ -1,4 +1,4 @@
-"""Parts of a scene as newcomers give them: taken where the meaning is clear, else refused in a sentence."""
+"""Arguments of a scene: clear ones are converted, others are refused with a message."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_what_is_not_clear_is_refused(head: Head, parts: dict[str, Any], said: s
 
 
 def test_places_in_metres_are_pointed_out(head: Head) -> None:
-    with pytest.warns(DermisWarning, match=r"^camera: .*1\.1 mm from its middle\. Write 1100 for 1\.1 m\."):
+    with pytest.warns(DermisWarning, match=r"^camera: .*1\.1 mm from the centre\. Write 1100 for 1\.1 m\."):
         dermis.Scene(head, camera=dermis.Camera(position=(0, 0, 1.1)))
     with pytest.warns(DermisWarning, match="^light: "):
         dermis.Scene(head, lights=[dermis.PointLight(position=(0.5, 0, 0.9))])

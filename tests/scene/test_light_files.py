@@ -1,4 +1,4 @@
-"""Rigs, lights of every kind and environments in scene files."""
+"""Light presets, lights of each kind and environments in scene files."""
 
 from __future__ import annotations
 
@@ -111,8 +111,8 @@ def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
         ('[environment]\nname = "uniform"\nexposure = -1\n', "-1"),
         ('[environment]\nname = "uniform"\nvisible = true\n', 'background = "environment"'),
         ('[[lights]]\nkind = "sphere"\nposition = [0, 0, 90]\nradius_mm = 100\n', "outside the sphere"),
-        ('[[lights]]\nkind = "stripe"\ndirection = [0, -1, 0]\n', "another direction"),
-        ('[[lights]]\nkind = "stripe"\ndirection = [1, 0, 0]\nangle_degrees = 2\n', "no angle_degrees"),
+        ('[[lights]]\nkind = "stripe"\ndirection = [0, -1, 0]\n', "not parallel to the direction"),
+        ('[[lights]]\nkind = "stripe"\ndirection = [1, 0, 0]\nangle_degrees = 2\n', "angle_degrees of 0"),
         ('[[lights]]\nkind = "rectangle"\nposition = [0, 0, 900]\nwidth_mm = 0\n', "width_mm"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A light stage: lights evenly around, and weights that are the light of the surroundings."""
+"""Light stage: uniform lights, and weights that reproduce an environment."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_lights_are_evenly_around() -> None:
 
 
 def test_weights_are_the_light_from_the_turned_surroundings(tmp_path: Path) -> None:
-    """All of it, and most of it from where the bright spot comes to lie."""
+    """Check the total irradiance, and that most of it comes from the rotated bright spot."""
     sky = np.full((256, 512, 3), 0.1, np.float32)
     sky[128, 384] = (900.0, 600.0, 300.0)  # towards +X
     write_exr(tmp_path / "spot.exr", sky)

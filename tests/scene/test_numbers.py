@@ -1,4 +1,4 @@
-"""Every number of a model, a person or a skin is finite, in single precision too, and in a stated range."""
+"""Every numeric field is finite in single precision and has a stated range."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LEAST = 5e-324  # which is 0 in single precision
 
 
 def _models(kind: type[FrozenModel] = FrozenModel) -> Iterator[type[FrozenModel]]:
-    """All but those of data sets, whose numbers are distributions with bounds of their own (tests/batch)."""
+    """Yield all models except those of data sets, whose fields are distributions (tests/batch)."""
     for one in kind.__subclasses__():
         ours = one.__module__.startswith("dermis.") and not one.__module__.startswith("dermis.apps.batch.")
         if ours and not one.__name__.startswith("_"):
@@ -60,7 +60,7 @@ def test_no_model_is_left_out() -> None:
 
 
 def _made(model: type[FrozenModel], field: str, value: Any) -> Any:
-    """A model with the value as its field's number, in each place of a list or under a name."""
+    """Build a model with the value as a number of the field, at each position of a list or mapping."""
     kind = model.model_fields[field].annotation
     count = len(get_args(kind)) if getattr(kind, "__origin__", None) is tuple else 0
     if getattr(kind, "__origin__", None) is dict:

@@ -1,4 +1,4 @@
-"""Scattering below the skin of people."""
+"""Subsurface scattering in the skin of people."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def profile(person: Human) -> GaussianSum:
 
 
 def mean_square_mm2(sum_of: GaussianSum) -> float:
-    """Of red light, by its own brightness."""
+    """Return the mean squared distance of red light, normalised by its total."""
     red = sum_of.weight[:, 0]
     return float((red * sum_of.variance_mm2).sum() / red.sum())
 

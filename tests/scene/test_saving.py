@@ -1,4 +1,4 @@
-"""What is saved is read back as it was, every field of it."""
+"""Every field of a saved scene is read back unchanged."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ SETTINGS = Settings(
     "plain", [CAMERA, SKIN, PIGMENTS, ROOM, SETTINGS, *LIGHTS], ids=lambda p: type(p).__name__
 )
 def test_no_field_here_has_its_default(plain: FrozenModel) -> None:
-    """Or the round trip below would not tell whether it was saved."""
+    """Check the test data, as the round trip could not detect an unsaved default."""
     fixed = {"kind", "angle_degrees"} if isinstance(plain, StripeLight) else {"kind"}
     for name in type(plain).model_fields.keys() - fixed:
         assert getattr(plain, name) != type(plain).model_fields[name].default, name

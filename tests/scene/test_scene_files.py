@@ -1,4 +1,4 @@
-"""Scene files: what is written comes out, names are found beside the file, the rest has its default."""
+"""Scene files: written values, files relative to the scene, and defaults."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ background = [0.1, 0.2, 0.3]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder that is not the current one, with a head, maps, a profile and lights."""
+    """Return a folder with a head, maps, a profile and lights, which is not the current one."""
     write_head(tmp_path / "head.obj")
     (tmp_path / "maps").mkdir()
     write_png(tmp_path / "maps" / "skin.png", np.full((16, 16, 3), 128, np.uint8))

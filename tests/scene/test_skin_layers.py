@@ -1,4 +1,4 @@
-"""The tissue of a skin: its profile's, with pigments or layers of its own."""
+"""Tissue of a skin: that of its profile, with overrides of pigments or layers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.scene.tissue import skin_tissue, tissue_layers
 
 
 def with_layers(name: str, **fields: object) -> Skin:
-    """A medium whose first layer has other values."""
+    """Return a medium whose first layer has other values."""
     first, *rest = tissue_layers(Skin(profile=name))
     changed = TissueLayer(**(first.model_dump() | fields))
     return Skin(profile=name, layers=(changed, *rest))

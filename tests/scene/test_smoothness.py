@@ -1,4 +1,4 @@
-"""Levels of subdivision by how smooth an outline looks in a picture."""
+"""Levels of subdivision by the smoothness of the outline in a picture."""
 
 from __future__ import annotations
 

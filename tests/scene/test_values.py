@@ -1,4 +1,4 @@
-"""Scene data are frozen, checked, and say in one form what is wrong."""
+"""Scene data are immutable and validated, with uniform error messages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BAD = [
     (
         Settings,
         {"exposure": "bright"},
-        "auto or a number from 1e-06 to 1000000 (20 stops either way), but 'bright'",
+        "auto or a number from 1e-06 to 1000000 (20 stops either way), but got 'bright'",
     ),
     (Settings, {"background": (0, 0, -1)}, "background.2"),
     (Settings, {"background": "#12345"}, "none, gradient, environment or a colour: three linear numbers"),
@@ -40,7 +40,7 @@ BAD = [
     (Settings, {"technique": "wet"}, "got 'wet'"),
     (Camera, {}, "position: expected a value, but there is none"),
     (Camera, {"position": (0, 0, 0)}, "away from the target"),
-    (Camera, {"position": (0, 900, 0)}, "along up"),
+    (Camera, {"position": (0, 900, 0)}, "parallel to up"),
     (Camera, {"position": (0, 0, 1e30)}, "1000000"),
     (Camera, {"position": (0, 0, 900), "up": (0, 0, 0)}, "a direction other than"),
     (Camera, {"position": (0, 0, 900), "frame_mm": float("nan")}, "got nan"),
@@ -126,7 +126,7 @@ def test_equal_values_are_those_that_say_the_same() -> None:
 
 
 def test_a_word_may_stand_for_a_number() -> None:
-    """And comes out as it went in, into files too; colours as they are encoded become linear."""
+    """Check that words are kept, also in files, and that encoded colours become linear."""
     settings = Settings(exposure="auto", background="gradient")
     assert Settings(**settings.model_dump()) == settings
     assert (settings.exposure, settings.background) == ("auto", "gradient")

@@ -1,4 +1,4 @@
-"""How light shares itself out between the surface and the skin below it: the white furnace."""
+"""Energy conservation between surface reflection and skin: the white furnace."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def furnace(energy: EnergyModel, views: Floats, m: float, rho_s: float, model: s
 
 
 def test_published_use_loses_what_others_measured() -> None:
-    """Strength 0.18, m = 0.3: 0.96 over the surface and 0.85 at grazing angles, against 0.99 when divided."""
+    """Check strength 0.18 and m = 0.3: 0.96 overall and 0.85 at grazing angles, 0.99 if divided by pi."""
     ends = furnace(ENERGY["published"], np.array([1.0, 0.05]), 0.3, 0.18)
     assert ends == pytest.approx([0.96, 0.85], abs=0.005)
     divided = furnace(EnergyModel(1.0, returned=False), np.array([1.0, 0.05]), 0.3, 0.18)
@@ -44,7 +44,7 @@ def test_without_the_term_skin_gives_more_than_it_gets() -> None:
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
 @pytest.mark.parametrize("model", MODELS)
 def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
-    """By the shader's own tables: no view above 1.01, the mean within 1 %."""
+    """Check the shader's tables: no view above 1.01, the mean within 1 %."""
     rho = directional_albedo(VIEWS, m, MODELS[model].lobe)
     table, mean = twins.surface_albedo(VIEWS, m, model)
     for rho_s in (0.18, 1.0):
@@ -57,7 +57,7 @@ def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
 @pytest.mark.parametrize("view", [0.1, 0.6, 1.0])
 @pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "two-lobe"])
 def test_furnace_light_by_light(model: str, view: float) -> None:
-    """The whole reflection summed over directions of light, nothing taken from a quadrature of its own."""
+    """Sum the whole reflection over light directions, without a quadrature of the model."""
     m, rho_s, energy = 0.35, 0.7, ENERGY["full"]
     mu, phi = (np.arange(500) + 0.5) / 500, np.pi * (np.arange(240) + 0.5) / 240
     sine = np.sqrt(1 - mu**2)
@@ -75,7 +75,7 @@ def test_furnace_light_by_light(model: str, view: float) -> None:
 
 
 def test_dark_skin_gets_no_lighter_than_its_own_colour() -> None:
-    """What the surface throws back inside comes out dimmed by the skin once, as all that enters does."""
+    """Check that light reflected back inside is dimmed by the skin once."""
     m, rho_s, colour = 0.3, 1.0, 0.2
     rho, mean = directional_albedo(VIEWS, m), mean_albedo(m)
     below = (1 - rho_s * mean) * colour * ENERGY["full"].exitance_factor(rho, mean, rho_s)

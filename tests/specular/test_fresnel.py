@@ -1,4 +1,4 @@
-"""Reflectance by angle against independent tables."""
+"""Fresnel reflectance compared with independent tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.specular.fresnel import SKIN_ETA, SKIN_F0, dielectric, hemispherical
 
 @pytest.fixture(scope="module")
 def columns(sample_folder: Path) -> NDArray[np.float64]:
-    """Cosine, exact, Schlick from the exact F0, Schlick from 0.028."""
+    """Return the cosine, exact, Schlick from the exact F0, and Schlick from 0.028."""
     path = sample_folder / "reference" / "data" / "fresnel_eta1.4.csv"
     return np.loadtxt(path, delimiter=",", skiprows=1).T
 
@@ -27,7 +27,7 @@ def test_both_curves_are_the_reference_columns(columns: NDArray[np.float64]) -> 
 
 
 def test_schlick_follows_fresnel() -> None:
-    """It leaves the exact curve by at most 0.05, near grazing; at the front by 0.0003."""
+    """Check deviations from the exact curve of at most 0.05 near grazing and 0.0003 at normal incidence."""
     cosine = np.linspace(0.0, 1.0, 501)
     assert np.abs(schlick(cosine) - dielectric(cosine)).max() < 0.05
     assert abs(schlick(1.0) - dielectric(1.0)) < 3e-4

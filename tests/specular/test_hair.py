@@ -1,4 +1,4 @@
-"""What a hair scatters: it keeps light, colours it by its pigments, and looks the same from both sides."""
+"""Hair scattering: energy conservation, colour by pigments, and symmetry."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ ANGLES = np.radians([-75.0, -40.0, 0.0, 10.0, 55.0, 80.0])
 
 
 def bands(count: int, low: float, high: float) -> tuple[Floats, float]:
-    """Middles of bands, and how wide they are."""
+    """Return the centres of intervals and their width."""
     step = (high - low) / count
     return low + step * (np.arange(count) + 0.5), step
 
 
 def albedo(sin_o: float, depth: Floats, roughness: float = LONGITUDINAL_ROUGHNESS) -> Floats:
-    """(3,) what comes back under light from all around."""
+    """Return the radiance (3,) under uniform light."""
     (sines, ds), (phi, dphi) = bands(1000, -1, 1), bands(60, -np.pi, np.pi)
     i, p = np.meshgrid(sines, phi, indexing="ij")
     return np.asarray(scattering(i, sin_o, p, depth, fibre(roughness)).sum(axis=(0, 1)) * ds * dphi)
@@ -74,7 +74,7 @@ def test_left_and_right_are_alike() -> None:
 
 
 def test_pigments_colour_hair() -> None:
-    """Blond over brown over black; pheomelanin alone is redder."""
+    """Compare blond, brown and black; pheomelanin alone is redder."""
     usual = 0.04  # mm
     seen = [albedo(0.1, usual * absorption_per_mm(much, 0.0)) for much in (0.3, 1.3, 8.0)]
     assert (np.diff(seen, axis=0) < 0).all()

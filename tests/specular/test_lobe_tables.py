@@ -1,4 +1,4 @@
-"""Directional albedos against independent tables, and the tables that the shaders read."""
+"""Directional albedos compared with independent tables, and the tables of the shaders."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_directional_albedo(sample_folder: Path, name: str) -> None:
 @pytest.mark.parametrize("cosine", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("name", MODELS)
 def test_albedo_is_the_lobe_integrated_over_light(name: str, cosine: float, m: float) -> None:
-    """Against a plain sum over directions of light, fine enough for the narrowest lobe."""
+    """Compare with a sum over light directions that resolves the narrowest lobe."""
     # the plain highlights end in a step at the horizon, where the sum is slow to settle
     mu, phi = (np.arange(1000) + 0.5) / 1000, np.pi * (np.arange(500) + 0.5) / 500
     sine = np.sqrt(1 - mu**2)
@@ -62,7 +62,7 @@ def test_no_surface_reflects_more_than_arrives(name: str, fresnel: str) -> None:
 
 
 def read(table: Floats, cosine: Floats, m: Floats) -> Floats:
-    """A channel of the albedo table between its texels, as the shader reads it."""
+    """Interpolate a channel of the albedo table as the shader does."""
     rows, columns = table.shape
     places = np.broadcast_arrays((np.sqrt(m) - 0.2) / 0.8 * (rows - 1), np.sqrt(cosine) * (columns - 1))
     return np.asarray(map_coordinates(table, places, order=1, mode="nearest"))
@@ -93,7 +93,7 @@ def test_tables_are_made_once() -> None:
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.7])
 def test_beckmann_slopes_integrate_to_pi(m: float) -> None:
-    """A normalised distribution has 1 as its integral of D cos over the hemisphere; this one lacks 1/pi."""
+    """Check the integral of D cos over the hemisphere, which is pi without the 1/pi of a normalised D."""
     cos_h = (np.arange(200_000) + 0.5) / 200_000
     assert (beckmann(cos_h, m) * cos_h).mean() * 2 == pytest.approx(1.0, rel=1e-4)
 

@@ -1,4 +1,4 @@
-"""Every surface model against published numbers, and its own laws."""
+"""Specular models compared with published numbers and with physical laws."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tolerances import PUBLISHED, RECIPROCAL
 
 from dermis.base import citations as cite
 from dermis.specular.beckmann import beckmann
-from dermis.specular.comparison import peak, reciprocity_error
+from dermis.specular.comparison import normal_incidence_peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines
 from dermis.specular.fresnel import ENERGY, FRESNEL, SKIN_F0, schlick
 from dermis.specular.models import MODELS, EnergyName, FresnelName
 from dermis.specular.torrance_sparrow import smith_masking
-from dermis.specular.two_lobe import NARROW, WIDE, two_lobe_masking
+from dermis.specular.two_lobe import NARROW_FACTOR, WIDE_FACTOR, two_lobe_masking
 
 Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
@@ -31,7 +31,7 @@ COLUMNS = {
 
 
 def towards(theta: Floats, phi: Floats) -> Floats:
-    """(n, 3) unit vectors at angles from +Z and around it [deg]."""
+    """Return unit vectors (n, 3) from angles to +Z and azimuths [degrees]."""
     t, p = np.radians(theta), np.radians(phi)
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
 
@@ -61,7 +61,7 @@ def test_lobe_is_the_reference_lobe(sample_folder: Path, name: str, m: float) ->
 
 @pytest.mark.parametrize("name", MODELS)
 def test_light_and_view_may_change_places_where_the_model_says_so(name: str) -> None:
-    """The plain highlights have no cosine of the light, and Phong's knows only the angle of incidence."""
+    """Check reciprocity; the plain highlights are not reciprocal."""
     error = reciprocity_error(name)
     assert error < RECIPROCAL if MODELS[name].reciprocal else error > 0.1
     assert MODELS[name].reciprocal or "not reciprocal" in MODELS[name].note
@@ -90,16 +90,16 @@ def test_roughness_may_differ_from_point_to_point(name: str) -> None:
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
 def test_peaks_over_the_surface(m: float) -> None:
-    """F0 / (4 pi m^2) of Beckmann's lobes and of the power as wide; two lobes mix theirs."""
+    """Compare with F0 / (4 pi m^2) of Beckmann lobes and equally wide powers; two lobes mix theirs."""
     one = SKIN_F0 / (4 * np.pi * m**2)
     for name in ("kelemen", "torrance-sparrow", "torrance-sparrow-smith", "blinn-phong"):
-        assert peak(name, m) == pytest.approx(one, rel=1e-9)
-    two = 0.85 / max(NARROW, 0.05 / m) ** 2 + 0.15 / min(WIDE, 1 / m) ** 2
-    assert peak("two-lobe", m) == pytest.approx(one * two, rel=1e-9)
+        assert normal_incidence_peak(name, m) == pytest.approx(one, rel=1e-9)
+    two = 0.85 / max(NARROW_FACTOR, 0.05 / m) ** 2 + 0.15 / min(WIDE_FACTOR, 1 / m) ** 2
+    assert normal_incidence_peak("two-lobe", m) == pytest.approx(one * two, rel=1e-9)
 
 
 def test_models_agree_about_narrow_lobes_that_meet_at_a_small_angle() -> None:
-    """Masking and half-vector lengths matter only far from the normal."""
+    """Compare near the normal, where masking and the length of the half vector do not matter."""
     angles = cosines(Z, towards(np.array([8.0]), np.zeros(1)), towards(np.array([8.0]), np.array([175.0])))
     lobes = [MODELS[name].lobe(angles, 0.1) for name in COLUMNS]
     assert np.ptp(lobes) < 0.03 * np.max(lobes)
@@ -115,12 +115,12 @@ def test_smith_masking_at_its_limits() -> None:
 
 @pytest.mark.parametrize("degrees", [30.0, 70.0, 85.0])
 def test_facets_of_both_kinds_that_are_seen_fill_just_what_the_surface_fills(degrees: float) -> None:
-    """Seen facets' areas across the view add up to the surface's own, cos theta."""
+    """Check that projected areas of visible facets sum to cos theta."""
     m, step = 0.3, np.pi / 400
     theta, phi = np.meshgrid(step * (np.arange(200) + 0.5), step * np.arange(800))
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     facing = sine * np.sin(theta) * np.cos(phi) + cosine * np.cos(theta)
-    kinds = ((0.85, NARROW * m), (0.15, WIDE * m))
+    kinds = ((0.85, NARROW_FACTOR * m), (0.15, WIDE_FACTOR * m))
     slopes = sum(share * beckmann(np.cos(theta), rough) / np.pi for share, rough in kinds)
     areas = (slopes * np.maximum(facing, 0) * np.sin(theta)).sum() * step**2
     assert areas * two_lobe_masking(cosine, m) == pytest.approx(cosine, rel=1e-3)
