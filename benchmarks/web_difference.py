@@ -27,10 +27,10 @@ from dermis.frame.capture import capture_renderer
 ATLAS, MAP = 512, 1024  # as exported
 SHOWN = ("software", 512), ("gpu", 256)
 LINEAR = """async () => {
-  const page = dermis, frame = page.player.frame, device = page.made.device, [width, height] = frame.size;
+  const page = dermis, frame = page.player.frame, device = page.gpuScene.device, [width, height] = frame.size;
   const buffer = device.createBuffer({ size: 16 * width * height, usage: 9 });
   const encoder = device.createCommandEncoder();
-  const texture = page.made.resource(frame.linear);
+  const texture = page.gpuScene.resource(frame.linear);
   encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow: 16 * width }, [width, height]);
   device.queue.submit([encoder.finish()]);
   await buffer.mapAsync(1);

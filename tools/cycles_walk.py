@@ -27,12 +27,12 @@ ETA = 1.4
 ENTRIES = ("straight", "skin")
 PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
 HEADER = """\
-# quantity: share of the light seen along the normal of a half-space that fell on it within a radius of the
-#   place seen: walks of Cycles, isotropic, of at most {most} steps, that leave an index-matched surface.
-#   entry: where walks begin, "straight" down, or as RANDOM_WALK_SKIN has it: half of them diffuse, half
-#   refracted at index {eta} by facets of GGX's roughness 1. root: sqrt(1 - albedo of single scattering)
+# quantity: fraction of the light that leaves a half-space along its normal and entered within a radius of that
+#   point: isotropic random walks of Cycles, of at most {most} steps, that leave an index-matched surface.
+#   entry: first direction of walks, "straight" down, or that of RANDOM_WALK_SKIN: half of them diffuse, half
+#   refracted at index {eta} by facets of GGX with roughness 1. root: sqrt(1 - single-scattering albedo)
 # unit: radius in mean free paths; within: dimensionless
-# source: {photons} photons an entry, counted by tools/cycles_walk.py (seed 7)
+# source: {photons} photons for each entry, computed by tools/cycles_walk.py (seed 7)
 # licence: Apache-2.0
 entry,root,radius,within
 """

@@ -1,4 +1,4 @@
-"""A small data set, drawn once and undisturbed, which others have to equal byte for byte."""
+"""A small data set, drawn in one process without interruption, as the reference for others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.apps.batch.spec import Spec
 
 @pytest.fixture(scope="package")
 def small_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With spec.toml and what it names."""
+    """Return a folder with spec.toml and the files that it names."""
     folder = tmp_path_factory.mktemp("batch")
     write_spec(folder)
     return folder
@@ -25,7 +25,7 @@ def small_spec(small_folder: Path) -> Spec:
 
 @pytest.fixture(scope="package")
 def undisturbed(small_folder: Path, small_spec: Spec) -> dict[str, bytes]:
-    """Files of the data set by their names."""
+    """Return the files of the data set by name."""
     report = drawn(small_spec, small_folder / "undisturbed")
     assert report.is_complete and not report.failed
     return contents(small_folder / "undisturbed")

@@ -1,4 +1,4 @@
-"""A worker that begins no other shard while there is a whole one, until a file says that it may."""
+"""Worker that waits, once a shard is complete, until a file allows it to start another."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from dermis.apps.batch import worker_pool
 from dermis.apps.batch.worker import Worker
 
 GATE = "HELD_UNTIL"
-"""Variable: the file."""
+"""Environment variable with the path of the file."""
 
 
 def run_worker(pipe: Any, slot: Any, options: Any) -> None:
-    """Serve as a worker does, but hold."""
-    gate, usual = Path(os.environ[GATE]), Worker.render_shard
+    """Run a worker that waits before each shard."""
+    gate, original = Path(os.environ[GATE]), Worker.render_shard
 
-    def render_shard(worker: Worker, *given: Any) -> Any:
+    def render_shard(worker: Worker, *arguments: Any) -> Any:
         while any(options.out.glob("shard-*.tar")) and not gate.exists():
             time.sleep(0.01)
-        return usual(worker, *given)
+        return original(worker, *arguments)
 
     with patch.object(Worker, "render_shard", render_shard):
         worker_pool.run_worker(pipe, slot, options)

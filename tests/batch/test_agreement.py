@@ -1,4 +1,4 @@
-"""What was drawn is held against what a spec states: chance is let pass, and nothing else."""
+"""Goodness of fit of drawn parameters against the distributions of a spec."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LAWS: dict[str, tuple[Any, Any]] = {
 
 
 def index(folder: Path, spec: Spec) -> Path:
-    """An index of what the spec draws, without any pictures."""
+    """Write an index of the parameters that a spec draws, without pictures."""
     rows = [spec.parameters(k) for k in range(spec.count)]
     names = sorted({name for row in rows for name in row})
     arrow = import_extra("pyarrow", "a test")
@@ -38,25 +38,25 @@ def index(folder: Path, spec: Spec) -> Path:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of the example, with two images of each person."""
-    made = tmp_path_factory.mktemp("drawn")
+    """Return a folder with the index of the example, with two images of each person."""
+    folder = tmp_path_factory.mktemp("drawn")
     text = example_toml().replace("images_per_person = 1 ", "images_per_person = 2 ")
-    (made / "spec.toml").write_text(text)
-    return index(made, load_spec(made / "spec.toml", count=COUNT))
+    (folder / "spec.toml").write_text(text)
+    return index(folder, load_spec(folder / "spec.toml", count=COUNT))
 
 
 def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
     found = {one.parameter: one for one in fit_tests(folder, load_spec(folder / "spec.toml"))}
     assert len(found) > 30 and all(one.passes for one in found.values())
     chances = np.array([one.p_value for one in found.values()])
-    assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "chances of what is so are even"
+    assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "p-values are uniform"
     assert found["person.age"].sample_count == COUNT // 2, "people count once"
-    assert found["gaze.yaw_deg"].sample_count < 0.4 * COUNT, "what only some images have"
+    assert found["gaze.yaw_deg"].sample_count < 0.4 * COUNT, "only some images have it"
     assert found["head.yaw_deg"].distance < 3 * found["head.yaw_deg"].expected_distance
 
 
 @pytest.mark.parametrize(
-    ("stated_so", "parameter"),
+    ("changed_line", "parameter"),
     [
         ("yaw_deg = {truncated = [0, 18, -40, 40]}", "head.yaw_deg"),
         ("yaw_deg = {truncated = [3, 14, -40, 40]}", "head.yaw_deg"),
@@ -65,14 +65,14 @@ def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
         ("age = {truncated = [50, 22, 25, 90]}", "person.age"),
     ],
 )
-def test_another_statement_is_found_out(folder: Path, stated_so: str, parameter: str) -> None:
-    """The same index, held against a spec that says something else of one parameter."""
+def test_another_statement_is_found_out(folder: Path, changed_line: str, parameter: str) -> None:
+    """The index does not fit a spec that states another distribution of one parameter."""
     table, _, key = parameter.rpartition(".")
     lines, inside = [], ""
     for line in example_toml().splitlines():
         inside = line.partition("]")[0][1:] if line.startswith("[") else inside
-        lines.append(stated_so if inside == table and line.startswith(f"{key} =") else line)
-    assert stated_so in lines
+        lines.append(changed_line if inside == table and line.startswith(f"{key} =") else line)
+    assert changed_line in lines
     (folder / "other.toml").write_text("\n".join(lines))
     spec = load_spec(folder / "other.toml")
     assert [one.parameter for one in fit_tests(folder, spec) if not one.passes] == [parameter]
@@ -80,10 +80,10 @@ def test_another_statement_is_found_out(folder: Path, stated_so: str, parameter:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
-    told, law = LAWS[name]
+    definition, law = LAWS[name]
     values = np.random.default_rng(1).permutation(law.ppf((np.arange(500) + 0.3) ** 1.02 / 600))
     found, truth = (
-        fit_test(name, parse_distribution(told), list(values)),
+        fit_test(name, parse_distribution(definition), list(values)),
         stats.kstest(values, law.cdf, method="asymp"),
     )
     assert found.distance == pytest.approx(truth.statistic, abs=1e-4)

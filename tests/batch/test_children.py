@@ -1,4 +1,4 @@
-"""Processes that end with the one that started them, and say nothing of it."""
+"""Child processes that end with their parent, without messages."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ DRIVER = """
 import os, sys, time
 sys.path.insert(0, sys.argv[1])
 from dermis.apps.batch.child_processes import start_process
-from test_children import talk
-child = start_process(talk)
+from test_children import send_forever
+child = start_process(send_forever)
 child.pipe.recv_bytes()
-child.pipe.close()  # as a process that is ended lets go of one thing after the other
+child.pipe.close()  # as when a process is ended
 time.sleep(0.2)
 os._exit(0)
 """
 
 
-def talk(pipe: Any) -> None:
+def send_forever(pipe: Any) -> None:
     while True:
         pipe.send_bytes(b"word")  # until nobody is there
 
 
-def tell_threads(pipe: Any) -> None:
+def send_thread_count(pipe: Any) -> None:
     pipe.send(os.environ.get("OPENBLAS_NUM_THREADS"))
 
 
-@pytest.mark.parametrize(("asked", "had"), [(None, "1"), ("3", "3")])
+@pytest.mark.parametrize(("variable", "expected"), [(None, "1"), ("3", "3")])
 def test_linear_algebra_has_one_thread_unless_the_user_says(
-    asked: str | None, had: str, monkeypatch: pytest.MonkeyPatch
+    variable: str | None, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    if asked:
-        monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
-    child = start_process(tell_threads)
+    if variable:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", variable)
+    child = start_process(send_thread_count)
     try:
-        assert child.pipe.recv() == had
-        assert os.environ.get("OPENBLAS_NUM_THREADS") == asked  # of this process, as it was
+        assert child.pipe.recv() == expected
+        assert os.environ.get("OPENBLAS_NUM_THREADS") == variable  # restored in this process
     finally:
         child.kill()
 
@@ -53,4 +53,4 @@ def test_linear_algebra_has_one_thread_unless_the_user_says(
 def test_whose_driver_is_gone_ends_in_silence() -> None:
     command = [sys.executable, "-c", DRIVER, str(FOLDER)]
     ran = subprocess.run(command, capture_output=True, timeout=300, check=False)
-    assert (ran.returncode, ran.stderr) == (0, b"")  # which the child holds open until it has ended
+    assert (ran.returncode, ran.stderr) == (0, b"")  # stderr is open until the child ends

@@ -1,4 +1,4 @@
-"""Workers of dask on this machine write the same bytes, also when some of them die."""
+"""Dask workers write the same bytes, also when some of them are killed."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from dermis.apps.batch.worker import RunOptions
 from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
-pytestmark = pytest.marker.filterwarnings("ignore")  # dask's own
+pytestmark = pytest.mark.filterwarnings("ignore")  # dask's own
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """Two processes with a thread each, which is how a worker of ours wants them."""
+    """Return a cluster of two processes with one thread each."""
     distributed = pytest.importorskip("distributed")
     import dask
 
     slow = {"connect": "300s", "tcp": "300s"}  # of a busy machine
     with (
         dask.config.set({"distributed.comm.timeouts": slow, "distributed.scheduler.worker-ttl": None}),
-        distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as made,
+        distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as local,
     ):
-        yield made
+        yield local
 
 
 def drawn(
-    cluster: Any, spec: Spec, out: Path, told: Callable[[Progress], None] = lambda now: None
+    cluster: Any, spec: Spec, out: Path, on_progress: Callable[[Progress], None] = lambda now: None
 ) -> RunReport:
     return run(
         RunOptions(spec, out, encoders=1),
         DaskCluster(cluster.scheduler_address, None, "cpu"),
-        on_progress=told,
+        on_progress=on_progress,
     )
 
 
@@ -57,12 +57,12 @@ def test_one_that_is_killed_loses_nothing(
 ) -> None:
     killed: list[int] = []
 
-    def told(progress: Progress) -> None:
+    def kill_once(progress: Progress) -> None:
         if not killed:
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], 9)
 
-    assert drawn(cluster, small_spec, tmp_path, told).is_complete
+    assert drawn(cluster, small_spec, tmp_path, kill_once).is_complete
     assert killed and contents(tmp_path) == undisturbed
 
 

@@ -1,4 +1,4 @@
-"""Distributions: what they state comes out, and what cannot be is refused."""
+"""Distributions: statistics of their samples, and invalid definitions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command as a process: ended at any moment it leaves nothing running, and goes on where it was."""
+"""The command as a process: when it is ended, no process remains, and it can be continued."""
 
 from __future__ import annotations
 
@@ -18,57 +18,57 @@ import pytest
 from small_set import SHARDS, contents
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are listed by /proc")
-_LONGEST_S = 200.0
+_TIMEOUT_S = 200.0
 Files = dict[str, bytes]
 
 
 def started(
     spec: Path, out: Path, gate: Path | None = None, start: Callable[..., Any] = child_process.start
 ) -> subprocess.Popen[bytes]:
-    """Start the command in a session of its own, by which its workers are found.
+    """Start the command in its own session, by which its workers are found.
 
-    gate : file until which workers hold once a shard is whole
+    gate : file until which workers wait once a shard is complete
     """
-    words = f"batch {spec} -o {out} --adapter cpu --workers 2 --encoders 1".split()
-    held = (
+    arguments = f"batch {spec} -o {out} --adapter cpu --workers 2 --encoders 1".split()
+    script = (
         f"import sys; sys.path.append({str(Path(__file__).parent)!r}); import held_worker; held_worker.main()"
     )
-    program = ["-m", "dermis"] if gate is None else ["-c", held]
+    program = ["-m", "dermis"] if gate is None else ["-c", script]
     environment, pipe = os.environ | {held_worker.GATE: str(gate)}, subprocess.PIPE
-    command = [sys.executable, *program, *words]
+    command = [sys.executable, *program, *arguments]
     return start(command, stdout=pipe, stderr=pipe, env=environment, start_new_session=True)
 
 
-def session(number: int) -> list[int]:
-    """Its processes that are still running."""
+def session_processes(number: int) -> list[int]:
+    """Return the running processes of a session."""
     found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
+    for file in Path("/proc").glob("[0-9]*/stat"):
         try:
-            state, _, _, of = place.read_text().rpartition(")")[2].split()[:4]
+            state, _, _, session_id = file.read_text().rpartition(")")[2].split()[:4]
         except OSError:
             continue
-        if int(of) == number and state != "Z":
-            found.append(int(place.parent.name))
+        if int(session_id) == number and state != "Z":
+            found.append(int(file.parent.name))
     return found
 
 
 def wait_for_shards(out: Path, count: int, driver: subprocess.Popen[bytes]) -> None:
-    end = time.monotonic() + _LONGEST_S
+    end = time.monotonic() + _TIMEOUT_S
     while len(list(out.glob("shard-*.tar"))) < count:
-        assert driver.poll() is None, "the driver ended before its shards came"
-        assert time.monotonic() < end, "the shards never come"
+        assert driver.poll() is None, "the driver ended before its shards were written"
+        assert time.monotonic() < end, "no shards were written"
         time.sleep(0.01)
 
 
-def wait_until_all_left(number: int) -> None:
-    end = time.monotonic() + _LONGEST_S
-    while session(number) and time.monotonic() < end:
+def wait_until_ended(number: int) -> None:
+    end = time.monotonic() + _TIMEOUT_S
+    while session_processes(number) and time.monotonic() < end:
         time.sleep(0.02)
-    assert session(number) == []
+    assert session_processes(number) == []
 
 
 def besides_progress(notes: bytes) -> list[bytes]:
-    """Lines of stderr but for those that a slow machine gets every half minute."""
+    """Return the lines of stderr without the progress lines of slow machines."""
     return [line for line in notes.splitlines() if b" images/s, " not in line]
 
 
@@ -82,12 +82,12 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
         time.sleep(rng.uniform(0.0, 1.0))
         driver.kill()
         driver.communicate()
-        wait_until_all_left(driver.pid)
+        wait_until_ended(driver.pid)
     skipped = len(list(tmp_path.glob("shard-*.tar")))
     last = started(small_folder / "spec.toml", tmp_path)
-    said, notes = last.communicate()
-    assert (last.returncode, besides_progress(notes)) == (0, []) and session(last.pid) == []
-    assert f"({skipped} were there)".encode() in said and 2 <= skipped <= SHARDS
+    output, notes = last.communicate()
+    assert (last.returncode, besides_progress(notes)) == (0, []) and session_processes(last.pid) == []
+    assert f"({skipped} reused)".encode() in output and 2 <= skipped <= SHARDS
     assert contents(tmp_path) == undisturbed
 
 
@@ -99,14 +99,14 @@ def test_one_that_is_asked_to_end_keeps_what_is_whole(
     wait_for_shards(tmp_path / "out", 1, driver)
     # Ctrl-C reaches all that the terminal has started, not the driver alone.
     os.killpg(driver.pid, number) if number == signal.SIGINT else driver.send_signal(number)
-    said, notes = driver.communicate()
-    assert (driver.returncode, said, besides_progress(notes)) == (128 + number, b"", [])
-    wait_until_all_left(driver.pid)
+    output, notes = driver.communicate()
+    assert (driver.returncode, output, besides_progress(notes)) == (128 + number, b"", [])
+    wait_until_ended(driver.pid)
     assert set(contents(tmp_path / "out")) < set(undisturbed)
 
 
 def test_under_nohup_a_hangup_ends_nothing(small_folder: Path, undisturbed: Files, tmp_path: Path) -> None:
-    """Ctrl-C neither, as a shell's background job ignores it; each reaches the workers too."""
+    """Like Ctrl-C, which background jobs of a shell ignore; both signals reach the workers too."""
     with child_process.ignored_signals():
         driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "gate", subprocess.Popen)
     wait_for_shards(tmp_path / "out", 1, driver)

@@ -1,4 +1,4 @@
-"""Encoders take arrays as they are, keep the order, and end with a word where one of them dies."""
+"""Encoder processes: results, order, and errors when one of them dies."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def encode(number: int, array: np.ndarray) -> tuple[int, dict[str, bytes]]:
 
 def jobs(*numbers: int) -> Iterator[tuple[int, np.ndarray]]:
     for number in numbers:
-        size = 50 if number < 6 else 200_000  # later ones need more room than the first
+        size = 50 if number < 6 else 200_000  # later ones need more memory
         yield number, np.full((size, 3), number, np.float32)[:, ::2]
 
 
 def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
     numbers = range(9)
     with EncoderPool(0, encode) as here, EncoderPool(2, encode) as there:
-        expected, found = list(here.encode_all(jobs(*numbers))), list(there.encoded(jobs(*numbers)))
+        expected, found = list(here.encode_all(jobs(*numbers))), list(there.encode_all(jobs(*numbers)))
     assert [(number, one["raw"]) for number, one in found] == [
         (number, one["raw"]) for number, one in expected
     ]
@@ -40,17 +40,17 @@ def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
 
 
 def test_jobs_are_asked_for_only_a_few_ahead() -> None:
-    asked: list[int] = []
+    started: list[int] = []
 
-    def watched() -> Iterator[tuple[int, np.ndarray]]:
+    def counted_jobs() -> Iterator[tuple[int, np.ndarray]]:
         for job in jobs(*[1] * 20):
-            asked.append(1)
+            started.append(1)
             yield job
 
     with EncoderPool(1, encode) as encoders:
-        found = encoders.encode_all(watched())
+        found = encoders.encode_all(counted_jobs())
         next(found)
-        assert len(asked) <= 4
+        assert len(started) <= 4
         found.close()  # type: ignore[attr-defined]
         assert [number for number, _ in encoders.encode_all(jobs(1, 2))] == [1, 2]
 

@@ -1,4 +1,4 @@
-"""The files of one image: what comes back, and that they are the same to the byte."""
+"""Files of one image: decoded contents, and equality of their bytes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ ALL = tuple(OUTPUTS.names)
 
 
 def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
-    told = small_spec(**spec)
-    seen = observation(number, outputs=told.outputs)
-    return seen, encode_record(number, seen, told.parameters(number), told)
+    used = small_spec(**spec)
+    seen = observation(number, outputs=used.outputs)
+    return seen, encode_record(number, seen, used.parameters(number), used)
 
 
 @pytest.mark.parametrize("encoding", ["png", "exr", "npy"])
@@ -37,11 +37,11 @@ def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encod
     kind, output = file_format(name, encoding), OUTPUTS[name]
     found = decode_output(name, kind, encode_output(name, values, encoding))
     assert found.shape == values.shape and found.dtype == output.kind
-    told = storage_description(name, encoding)
-    if "16-bit PNG" in told:
+    description = storage_description(name, encoding)
+    if "16-bit PNG" in description:
         assert output.levels is not None
         np.testing.assert_allclose(found, values, rtol=1e-6, atol=0.51 * output.levels.step)
-    elif "16" in told:
+    elif "16" in description:
         np.testing.assert_allclose(found, values, rtol=2**-11, atol=1e-7)
     else:
         np.testing.assert_array_equal(found, values)

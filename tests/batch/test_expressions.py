@@ -1,4 +1,4 @@
-"""Expressions of data sets: names that the human has, and mixtures in which nothing works against itself."""
+"""Expressions of data sets: names of blend shapes, and mixtures without opposing movements."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dermis.apps.batch.sampling import expression_weights, hashed_uniform, load_
 from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.person import Human
 
-MANY = 3000
-AGAINST = (
+COUNT = 3000
+OPPOSITES = (
     {"mouthSmile", "mouthFrown"},
     {"browDown", "browInnerUp"},
     {"eyeWide", "eyeSquint"},
@@ -37,9 +37,9 @@ def targets() -> set[str]:
 
 
 def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
-    moved = [name for weights in EXPRESSIONS.values() for name in weights]
-    moved += [name for part in load_movements().values() for one in part for name in one.target_weights]
-    assert set(expand_targets(moved)) <= targets
+    names = [name for weights in EXPRESSIONS.values() for name in weights]
+    names += [name for part in load_movements().values() for one in part for name in one.target_weights]
+    assert set(expand_targets(names)) <= targets
     assert expand_targets(["mouthSmile", "jawOpen", "mouthLeft"]) == (
         "mouthSmileLeft",
         "mouthSmileRight",
@@ -55,8 +55,8 @@ def test_chances_of_a_part_leave_it_room_to_rest() -> None:
 
 
 def test_in_mixtures_nothing_works_against_itself() -> None:
-    found = [drawn(seed) for seed in range(MANY)]
-    assert not [one for one in found for pair in AGAINST if pair <= one.keys()]
+    found = [drawn(seed) for seed in range(COUNT)]
+    assert not [one for one in found for pair in OPPOSITES if pair <= one.keys()]
     for name, probability in (("mouthSmile", 0.35), ("jawLeft", 0.04), ("browInnerUp", 0.35)):
         assert np.mean([name in one for one in found]) == pytest.approx(probability, abs=0.03)
     shut = [one["jawOpen"] for one in found if "jawOpen" in one and one.get("mouthPress", 0) > 0.45]

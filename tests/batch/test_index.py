@@ -1,4 +1,4 @@
-"""The index and the data sheet of a data set."""
+"""Index and data sheet of a data set."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FIRST = ["number", "key", "shard", "camera.K", "camera.R", "camera.t", "head_pos
 
 @pytest.fixture(scope="module")
 def drawn_spec() -> Spec:
-    """400 images whose shards are light, of what the statistics are known."""
+    """Return a spec of 400 small images with known statistics."""
     return small_spec(
         count=400,
         shard_size=150,
@@ -36,7 +36,7 @@ def drawn_spec() -> Spec:
 
 @pytest.fixture(scope="module")
 def described(drawn_spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Its shards without pictures, with index and data sheet."""
+    """Return a folder with shards without pictures, index and data sheet."""
     folder = tmp_path_factory.mktemp("indexed")
     for shard in list_shards(drawn_spec):
         with ShardWriter(folder, shard, drawn_spec, "an adapter") as writer:
@@ -100,7 +100,7 @@ def test_the_same_shards_give_the_same_bytes_whoever_asks(
 
 def test_the_data_sheet_says_what_is_in_it(described: Path, drawn_spec: Spec) -> None:
     text = (described / "README.md").read_text("utf-8")
-    for said in (
+    for line in (
         "| images | 399 of 400, 24 x 16 pixels |",
         "| shards | 3 of up to 150 images, format webdataset |",
         f"`{drawn_spec.digest()}`",
@@ -112,14 +112,14 @@ def test_the_data_sheet_says_what_is_in_it(described: Path, drawn_spec: Spec) ->
         "| ibug-68 | 68 |",
         "| light.kind | 399 | studio (",
     ):
-        assert said in text, said
+        assert line in text, line
     assert "dermis batch spec.toml -o FOLDER" in text
 
 
 def test_programs_read_what_outputs_labels_and_landmarks_mean(described: Path) -> None:
-    told = json.loads((described / "dataset.json").read_text("utf-8"))
-    assert told["outputs"]["depth"]["step"] == 0.1 and told["outputs"]["depth"]["unit"] == "mm"
-    assert told["labels"]["label"]["0"] == "background" and len(told["landmarks"]["ibug-68"]) == 68
+    content = json.loads((described / "dataset.json").read_text("utf-8"))
+    assert content["outputs"]["depth"]["step"] == 0.1 and content["outputs"]["depth"]["unit"] == "mm"
+    assert content["labels"]["label"]["0"] == "background" and len(content["landmarks"]["ibug-68"]) == 68
 
 
 def test_an_index_of_some_shards_has_their_rows(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Files of jobs in the documentation: schedulers can read them, and `dermis batch` takes their commands."""
+"""Job files in the documentation: syntax, and validity of their commands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dermis.cli import batch as command
 
 PAGE = (Path(__file__).parents[2] / "docs" / "batch.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(bash|yaml)\n(.*?)```", PAGE, re.DOTALL)
-GIVEN = {
+ENVIRONMENT = {
     "SLURM_ARRAY_TASK_ID": "15",
     "JOB_COMPLETION_INDEX": "15",
     "SKYPILOT_NODE_RANK": "1",
     "SKYPILOT_NUM_NODES": "2",
 }
-"""What the schedulers set."""
+"""Variables that the schedulers set."""
 
 
 def yaml_of(word: str) -> Any:
@@ -46,15 +46,15 @@ def commands() -> dict[str, str]:
 
 @pytest.mark.parametrize("kind", ["slurm", "kubernetes", "skypilot"])
 def test_commands_are_taken_with_what_schedulers_set(kind: str) -> None:
-    """Every placeholder has a value, and the parser binds every word."""
+    """Every placeholder has a value, and the parser accepts every argument."""
     app = App(name="dermis", result_action="return_value")
     app.command(command.batch, name="batch")
-    words = shlex.split(Template(commands()[kind]).substitute(GIVEN))
+    words = shlex.split(Template(commands()[kind]).substitute(ENVIRONMENT))
     assert words[:2] == ["dermis", "batch"]
     function, bound, _ = app.parse_args([*words[1:], "--dry-run"], exit_on_error=False, print_error=False)
-    told = bound.arguments
-    assert function is command.batch and told["dry_run"] and told["output"] == Path("/shared/faces")
-    index, count = command._part(told["shard"])
+    arguments = bound.arguments
+    assert function is command.batch and arguments["dry_run"] and arguments["output"] == Path("/shared/faces")
+    index, count = command._part(arguments["shard"])
     assert (index, count) == ((1, 2) if kind == "skypilot" else (15, 16))
 
 

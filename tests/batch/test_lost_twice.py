@@ -1,4 +1,4 @@
-"""A worker that loses its device twice is replaced, which is told; workers that all do end the run with 2."""
+"""Workers that lose their device twice are replaced with a note; if all do, the run ends with status 2."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from small_set import HERE, SHARDS, contents, drawn
 from dermis.apps.batch.spec import Spec
 from dermis.cli import main
 
-OPENED_AGAIN, LOST_TWICE = "it is opened again", "it was lost twice"
+REOPENED, LOST_TWICE = "it is opened again", "it was lost twice"
 ATTEMPTS = 2
-SHARD = "shard-00003"  # the only one that is drawn, as the others are there
+SHARD = "shard-00003"  # the only one that is drawn, as the others exist
 
 
 @pytest.fixture
-def begun(
+def incomplete_set(
     undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Path, Path]:
-    """A data set without one shard, and the folder of the workers that lose their devices."""
+    """Return a data set without one shard, and the folder of the workers that lose their devices."""
     out, lost = tmp_path / "out", tmp_path / "lost"
     lost.mkdir()
     for name, data in undisturbed.items():
@@ -37,15 +37,15 @@ def begun(
 def test_another_worker_draws_the_shard(
     small_spec: Spec,
     undisturbed: dict[str, bytes],
-    begun: tuple[Path, Path],
+    incomplete_set: tuple[Path, Path],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    out, lost = begun
+    out, lost = incomplete_set
     monkeypatch.setenv(losing_worker.WORKERS, "1")
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning) as caught:
         report = drawn(small_spec, out)
-    notes = [str(one.message) for one in told]
-    assert [OPENED_AGAIN in note for note in notes] == [True, False], notes
+    notes = [str(one.message) for one in caught]
+    assert [REOPENED in note for note in notes] == [True, False], notes
     assert LOST_TWICE in notes[1] and notes[1].endswith("its shard is rendered again")
     assert (report.shards, report.skipped, report.is_complete) == (1, SHARDS - 1, True)
     assert len(list(lost.iterdir())) == 1 and contents(out) == undisturbed
@@ -53,20 +53,22 @@ def test_another_worker_draws_the_shard(
 
 def test_the_command_ends_with_2_where_all_do(
     small_folder: Path,
-    begun: tuple[Path, Path],
+    incomplete_set: tuple[Path, Path],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    out, lost = begun
+    out, lost = incomplete_set
     before = contents(out)
     monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", ATTEMPTS)
     monkeypatch.setenv(losing_worker.WORKERS, "9")
-    words = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
-    monkeypatch.setattr(sys, "argv", ["dermis", *words, "--workers", "1", "--encoders", "0"])
+    arguments = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
+    monkeypatch.setattr(sys, "argv", ["dermis", *arguments, "--workers", "1", "--encoders", "0"])
     with pytest.raises(SystemExit) as ended:
         main()
-    said = capsys.readouterr().err
-    assert ended.value.code == 2 and OPENED_AGAIN in said and "its shard is rendered again" in said
-    assert re.search(rf"shard 3: .* but {ATTEMPTS} failed, .*{LOST_TWICE}.*\. Complete shards are kept", said)
-    assert ".." not in said and ".;" not in said
+    errors = capsys.readouterr().err
+    assert ended.value.code == 2 and REOPENED in errors and "its shard is rendered again" in errors
+    assert re.search(
+        rf"shard 3: .* but {ATTEMPTS} failed, .*{LOST_TWICE}.*\. Complete shards are kept", errors
+    )
+    assert ".." not in errors and ".;" not in errors
     assert len(list(lost.iterdir())) == ATTEMPTS and contents(out) == before

@@ -1,4 +1,4 @@
-"""What a data set would be: a table of what is drawn, and a contact sheet."""
+"""Preview of a data set: table of parameters and contact sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Data sets read back, in both formats, by this package and by the library webdataset."""
+"""Reading of data sets in both formats, by dermis and by the library webdataset."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset_files.md"
 
 @pytest.fixture(scope="module", params=["webdataset", "folder"])
 def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven images in three shards, every bit of their outputs kept."""
+    """Return a data set of seven images in three shards with lossless outputs."""
     folder: Path = tmp_path_factory.mktemp(request.param)
     write_all(folder, small_spec(format=request.param, encoding="exr"))
     return folder
@@ -49,8 +49,8 @@ def test_what_is_read_is_what_was_written(written: Path) -> None:
 
 
 def test_images_come_in_order_or_by_a_seed_or_shard_by_shard(written: Path) -> None:
-    def numbers(**how: Any) -> list[int]:
-        return [one["number"] for one in dermis.read_dataset(written, **how)]
+    def numbers(**options: Any) -> list[int]:
+        return [one["number"] for one in dermis.read_dataset(written, **options)]
 
     assert numbers() == list(range(7))
     first, again, other = (numbers(shuffle=seed) for seed in (1, 1, 2))
@@ -74,7 +74,7 @@ def test_what_the_documentation_shows_runs(tmp_path: Path, monkeypatch: pytest.M
     write_all(tmp_path / "faces", spec)
     write_index(tmp_path / "faces", spec)
     monkeypatch.chdir(tmp_path)
-    reading, pipeline, asking = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    reading, pipeline, query = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     names: dict[str, Any] = {}
     exec(reading, names)
     assert names["points"].shape == (1, 2) and -20 <= names["turned"] <= 20
@@ -84,7 +84,7 @@ def test_what_the_documentation_shows_runs(tmp_path: Path, monkeypatch: pytest.M
     for one, ours in zip(found, dermis.read_dataset("faces"), strict=True):
         np.testing.assert_array_equal(one["depth"], ours["depth"])
         np.testing.assert_array_equal(one["picture"], ours["picture"])
-    exec(asking, names)
+    exec(query, names)
     truth = [k for k in range(7) if abs(float(spec.parameters(k)["camera.yaw_deg"])) > 20]  # type: ignore[arg-type]
     assert names["profiles"] == [f"{k:09d}" for k in truth] and truth
 
@@ -113,8 +113,8 @@ def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: 
         dermis.read_dataset(written, shuffle="yes")  # type: ignore[arg-type]
 
 
-def repacked(path: Path, change: Any) -> None:
-    """Write a shard anew with other members: (name, bytes) as `change` returns them."""
+def rewrite_shard(path: Path, change: Any) -> None:
+    """Rewrite a shard with the members (name, bytes) that `change` returns."""
     with tarfile.open(path) as old:
         members = [(one.name, old.extractfile(one).read()) for one in old.getmembers()]  # type: ignore[union-attr]
     with tarfile.open(path, "w") as new:
@@ -124,12 +124,12 @@ def repacked(path: Path, change: Any) -> None:
             new.addfile(head, io.BytesIO(data))
 
 
-def replaced(name: str, data: bytes) -> Any:
-    return lambda members: [(one, data if one == name else held) for one, held in members]
+def replace_member(name: str, data: bytes) -> Any:
+    return lambda members: [(one, data if one == name else old_data) for one, old_data in members]
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (lambda members: members[:-1], "its end is missing"),
         (lambda members: [("../../evil.png", b""), *members], r"it contains '\.\./\.\./evil\.png'"),
@@ -139,17 +139,17 @@ def replaced(name: str, data: bytes) -> Any:
         (lambda members: [one for one in members if one[0] != "000000000.json"], r"its \.json is missing"),
         (lambda members: [("000000000.picture.png", b""), *members], r"found \.picture\.png"),
         (lambda members: [("000000000.cls", b"1"), *members], r"found \.cls"),
-        (replaced("000000000.png", b"\x89PNG\r\n\x1a\n"), r"000000000\.png: .* cannot be decoded"),
-        (replaced("000000000.depth.png", b"GIF89a"), r"000000000\.depth\.png: .* cannot be decoded"),
-        (replaced("000000000.json", b"{}"), "a record of an image, but it cannot be understood"),
-        (replaced("000000000.json", b"[" * 9999), "nested too deeply"),
-        (replaced("000000000.json", b" " * (2 << 20)), "2,097,152 bytes"),
+        (replace_member("000000000.png", b"\x89PNG\r\n\x1a\n"), r"000000000\.png: .* cannot be decoded"),
+        (replace_member("000000000.depth.png", b"GIF89a"), r"000000000\.depth\.png: .* cannot be decoded"),
+        (replace_member("000000000.json", b"{}"), "a record of an image, but it cannot be understood"),
+        (replace_member("000000000.json", b"[" * 9999), "nested too deeply"),
+        (replace_member("000000000.json", b" " * (2 << 20)), "2,097,152 bytes"),
     ],
 )
-def test_damaged_tars_are_refused_by_name(tmp_path: Path, change: Any, said: str) -> None:
+def test_damaged_tars_are_refused_by_name(tmp_path: Path, change: Any, message: str) -> None:
     write_all(tmp_path, small_spec(count=1, outputs=("depth",)))
-    repacked(tmp_path / "shard-00000.tar", change)
-    with pytest.raises(DermisError, match=rf"shard-00000\.tar.*{said}"):
+    rewrite_shard(tmp_path / "shard-00000.tar", change)
+    with pytest.raises(DermisError, match=rf"shard-00000\.tar.*{message}"):
         list(dermis.read_dataset(tmp_path))
 
 
@@ -159,9 +159,9 @@ def test_records_and_sizes_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with tarfile.open(path) as shard:
         record = json.loads(shard.extractfile("000000000.json").read())  # type: ignore[union-attr]
 
-    def refused(said: str, **changes: Any) -> None:
-        repacked(path, replaced("000000000.json", json.dumps({**record, **changes}).encode()))
-        with pytest.raises(DermisError, match=said):
+    def refused(message: str, **changes: Any) -> None:
+        rewrite_shard(path, replace_member("000000000.json", json.dumps({**record, **changes}).encode()))
+        with pytest.raises(DermisError, match=message):
             list(dermis.read_dataset(tmp_path))
 
     refused("the record of image 0, but got that of 5", number=5)
@@ -171,8 +171,8 @@ def test_records_and_sizes_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     refused("neither true nor false", landmarks={"a": {"pixels": [], "positions_mm": [], "visible": [1]}})
     refused("cannot be understood", gaze=[[0, 0, 1], [0, 1]])
     small = encode_output("depth", np.ones((3, 4), np.float32), "png")
-    repacked(path, replaced("000000000.json", json.dumps(record).encode()))
-    repacked(path, replaced("000000000.depth.png", small))
+    rewrite_shard(path, replace_member("000000000.json", json.dumps(record).encode()))
+    rewrite_shard(path, replace_member("000000000.depth.png", small))
     with pytest.raises(
         DermisError, match=r"outputs of the picture's size, but \.depth\.png has 4 x 3 pixels"
     ):

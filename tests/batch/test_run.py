@@ -1,4 +1,4 @@
-"""Data sets are the same bytes whoever draws them, and whatever happens meanwhile."""
+"""Data sets have the same bytes for all numbers of workers and after interruptions."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ Files = dict[str, bytes]
 
 
 def killing(moments: set[int], rng: random.Random) -> Callable[[Progress], None]:
-    """Kills one of the workers when so many images are done."""
+    """Return a function that kills a worker when given numbers of images are done."""
 
-    def told(progress: Progress) -> None:
+    def kill_worker(progress: Progress) -> None:
         if progress.images in moments:
             moments.discard(progress.images)
             workers = sorted(multiprocessing.active_children(), key=lambda one: one.pid or 0)
             if workers:
                 rng.choice(workers).kill()
 
-    return told
+    return kill_worker
 
 
 def test_the_set_has_all_that_it_should(undisturbed: Files) -> None:
@@ -43,13 +43,13 @@ def test_the_set_has_all_that_it_should(undisturbed: Files) -> None:
 def test_two_workers_that_have_encoders_write_the_same(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
-    told: list[tuple[int, int]] = []
+    progress: list[tuple[int, int]] = []
     report = drawn(
-        small_spec, tmp_path / "out", 2, 1, on_progress=lambda now: told.append((now.images, now.total))
+        small_spec, tmp_path / "out", 2, 1, on_progress=lambda now: progress.append((now.images, now.total))
     )
     assert contents(tmp_path / "out") == undisturbed
     assert (report.images, report.shards, report.skipped) == (COUNT, SHARDS, 0)
-    assert told[-1] == (COUNT, COUNT)
+    assert progress[-1] == (COUNT, COUNT)
 
 
 def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
@@ -96,12 +96,12 @@ def test_a_shard_that_no_worker_survives_is_given_up(
     put(undisturbed, tmp_path)
     lost = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
     (tmp_path / lost).unlink()
-    always = lambda now: [one.kill() for one in multiprocessing.active_children()]  # noqa: E731
+    kill_all = lambda now: [one.kill() for one in multiprocessing.active_children()]  # noqa: E731
     with (
         pytest.warns(UserWarning, match="rendered again"),
         pytest.raises(DermisError, match=r"shard 0: .*2 failed.*SIGKILL"),
     ):
-        drawn(small_spec, tmp_path, on_progress=always)
+        drawn(small_spec, tmp_path, on_progress=kill_all)
     assert contents(tmp_path).keys() == undisturbed.keys() - {lost}
 
 
@@ -141,7 +141,9 @@ def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, t
     lost = [name for name in undisturbed if name.startswith("shard-00003")]
     put({name: data for name, data in undisturbed.items() if name not in lost}, tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, before[1]))  # its error is another's, its way the same
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (2048, before[1])
+    )  # another error than of a full disk, handled alike
     try:
         with pytest.raises(DermisError, match="cannot be written"):
             run(RunOptions(small_spec, tmp_path), ProcessPool([HERE]))
@@ -153,7 +155,7 @@ def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, t
 
 
 def put(files: Files, folder: Path) -> None:
-    """Write them there."""
+    """Write files into a folder."""
     for name, data in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)

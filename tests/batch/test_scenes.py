@@ -1,4 +1,4 @@
-"""Scenes of data sets: by the parameters alone, with the face in the picture and light on it."""
+"""Scenes of data sets: dependence on parameters, framing of the face, and lighting."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ def wild() -> tuple[Spec, list[tuple[dict[str, Any], Scene]]]:
     return made, [(one, builder.build(one)[0]) for one in map(made.parameters, range(40))]
 
 
-def seen(scene: Scene, places: Any, size: tuple[int, int]) -> Any:
-    """(n, 2) pixels of places of the head [mm]."""
+def project(scene: Scene, positions: Any, size: tuple[int, int]) -> Any:
+    """Return the pixels (n, 2) of positions of the head [mm]."""
     K, R, t = scene.camera.to_opencv(size)
-    x, y, z = K @ (R @ (places - np.array(scene.head.centre_mm)).T + t[:, None])
+    x, y, z = K @ (R @ (positions - np.array(scene.head.centre_mm)).T + t[:, None])
     assert z.min() > 0
     return np.stack([x / z, y / z], axis=1)
 
@@ -71,7 +71,7 @@ def test_the_whole_face_is_in_the_picture_whatever_is_drawn(wild: Any) -> None:
         rig = scene.head.control
         around = rig.positions_mm - np.array(scene.head.centre_mm)
         face = np.flatnonzero((np.abs(around[:, 0]) < 80) & (abs(around[:, 1]) < 90) & (around[:, 2] > 10))
-        pixels = seen(scene, rig.pose_points(face.astype(np.int32), scene.motion), drawn.size)
+        pixels = project(scene, rig.pose_points(face.astype(np.int32), scene.motion), drawn.size)
         assert pixels.min() > -0.5 and (pixels < np.array(drawn.size) - 0.5).all()
 
 
@@ -85,7 +85,7 @@ def test_cameras_are_as_drawn_where_the_face_fits() -> None:
     assert np.linalg.norm(away) == pytest.approx(1000)
     assert away / 1000 == pytest.approx([np.cos(np.pi / 6), 0.5, 0.0], abs=1e-6)
     assert 2 * camera.half_tangent * 1000 == pytest.approx(500)
-    (x, _), width = seen(scene, middle[None] + head.centre_mm, settings.size)[0], settings.size[0]
+    (x, _), width = project(scene, middle[None] + head.centre_mm, settings.size)[0], settings.size[0]
     assert (x + 0.5) / width == pytest.approx(0.5 + 0.5 * 0.2, abs=2e-3)
     lens = spec("[camera]\nfocal_mm = 48\ndistance_mm = 1200")
     assert SceneBuilder(lens).build(lens.parameters(0))[0].camera.frame_mm == pytest.approx(600)
@@ -109,9 +109,9 @@ def test_neck_and_head_turn_as_far_as_is_drawn(wild: Any) -> None:
 
 
 def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
-    told = "[head]\nyaw_deg = 20\n[camera]\nyaw_deg = 10\n"
-    at_camera, aside = spec(told), spec(told + "[gaze]\nat = 'angles'\nyaw_deg = -15\npitch_deg = 10")
-    for drawn in (at_camera, aside):
+    text = "[head]\nyaw_deg = 20\n[camera]\nyaw_deg = 10\n"
+    at_camera, at_angles = spec(text), spec(text + "[gaze]\nat = 'angles'\nyaw_deg = -15\npitch_deg = 10")
+    for drawn in (at_camera, at_angles):
         scene, _ = SceneBuilder(drawn).build(drawn.parameters(0))
         assert scene.head.eyes is not None and scene.motion is not None
         frames = scene.head.eyes.frames(scene.head.control, scene.motion)
@@ -232,7 +232,7 @@ def test_every_image_of_the_example_is_a_scene() -> None:
 
 
 def test_drawn_people_are_let_go_of_when_the_next_one_comes() -> None:
-    """They never come again; sixteen of them took half a gigabyte."""
+    """People are never reused; caching sixteen of them took half a gigabyte."""
     spec = parse_spec({"count": 2, "size": [32, 32], "person": {"hair": {"style": "none"}}})
     builder = SceneBuilder(spec)
     first = weakref.ref(builder.build(spec.parameters(0))[0].head)

@@ -1,4 +1,4 @@
-"""Workers are spread over GPUs in turn; on a host each finds a number of its own."""
+"""Distribution of workers over GPUs, by the number of each worker on its host."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ from typing import Any
 
 import pytest
 
-from dermis.apps.batch import worker_pool as seats
+from dermis.apps.batch import worker_pool
 from dermis.apps.batch.dask_worker import local_rank
 from dermis.apps.batch.worker_pool import SlotRequest
 
 
-def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
+def patch_machine(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
     found = [SimpleNamespace(kind=kind, number=number) for number in numbers]
     by_name: dict[str, Any] = {f"#{one.number}": [one] for one in found} | {"auto": found}
-    monkeypatch.setattr(seats, "similar_adapters", by_name.__getitem__)
-    monkeypatch.setattr(seats, "available_cores", lambda: cores)
+    monkeypatch.setattr(worker_pool, "similar_adapters", by_name.__getitem__)
+    monkeypatch.setattr(worker_pool, "available_cores", lambda: cores)
 
 
-def places(request: SlotRequest) -> list[str]:
+def slot_adapters(request: SlotRequest) -> list[str]:
     return [slot.adapter for slot in request.slots()[0]]
 
 
 def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend(monkeypatch, 16, "DiscreteGPU", 0, 1)
-    assert places(SlotRequest()) == ["#0", "#1"]
-    assert places(SlotRequest(workers_per_gpu=2)) == ["#0", "#1", "#0", "#1"]
-    assert places(SlotRequest(workers=3)) == ["#0", "#1", "#0"]
-    assert places(SlotRequest(numbers=(1,))) == ["#1"]
+    patch_machine(monkeypatch, 16, "DiscreteGPU", 0, 1)
+    assert slot_adapters(SlotRequest()) == ["#0", "#1"]
+    assert slot_adapters(SlotRequest(workers_per_gpu=2)) == ["#0", "#1", "#0", "#1"]
+    assert slot_adapters(SlotRequest(workers=3)) == ["#0", "#1", "#0"]
+    assert slot_adapters(SlotRequest(numbers=(1,))) == ["#1"]
 
 
 @pytest.mark.parametrize(("workers", "encoders"), [(1, 7), (2, 3), (8, 1), (16, 1)])
 def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int, encoders: int) -> None:
-    pretend(monkeypatch, 8, "DiscreteGPU", 0)
+    patch_machine(monkeypatch, 8, "DiscreteGPU", 0)
     found, each = SlotRequest(workers=workers).slots()
     assert each == encoders and all(slot.threads == 0 for slot in found)
     assert SlotRequest(workers=workers, encoders=5).slots()[1] == 5
@@ -43,7 +43,7 @@ def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int,
 def test_a_software_adapter_shares_the_cores(
     monkeypatch: pytest.MonkeyPatch, cores: int, workers: int, threads: int
 ) -> None:
-    pretend(monkeypatch, cores, "CPU", 0)
+    patch_machine(monkeypatch, cores, "CPU", 0)
     found, encoders = SlotRequest().slots()
     assert (len(found), found[0].threads, encoders) == (workers, threads, 0)
 

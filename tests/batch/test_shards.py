@@ -1,4 +1,4 @@
-"""Shards: whole or not there, equal to the byte, and known by their data set."""
+"""Shards: completeness, equality of bytes, and manifests."""
 
 from __future__ import annotations
 

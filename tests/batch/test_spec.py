@@ -1,4 +1,4 @@
-"""Specs of data sets: what is drawn, the same everywhere, and what is refused."""
+"""Specs of data sets: reproducible parameters, and invalid values."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_other_processes_draw_the_same(example: Spec) -> None:
 
 
 def test_the_first_image_of_the_example_stays_what_it_was(example: Spec) -> None:
-    """On every machine, and in every version that claims to draw the same data set."""
+    """The parameters are the same on every machine and in every version with the same generator number."""
     found = example.parameters(0)
     told = {name: found[name] for name in ("person.seed", "person.age", "camera.distance_mm", "head.yaw_deg")}
     assert told == FIRST

@@ -1,4 +1,4 @@
-"""Subjects that the tests of exports share."""
+"""Skins shared by tests of exports."""
 
 from __future__ import annotations
 

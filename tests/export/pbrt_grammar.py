@@ -1,4 +1,4 @@
-"""A reader of pbrt's scene files (version 4) that knows the directives and parameters which we write."""
+"""Parser of pbrt scene files (version 4) for the directives and parameters that dermis writes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _COUNT = {"float": 1, "integer": 1, "rgb": 3, "point3": 3, "string": 1, "texture
 
 
 class Directive(NamedTuple):
-    """One of a file: its word, words in quotes, plain numbers, and parameters by name."""
+    """Directive with its keyword, quoted names, numbers, and parameters by name."""
 
     word: str
     names: list[str]
@@ -54,41 +54,41 @@ class Directive(NamedTuple):
 
 
 def read(text: str) -> list[Directive]:
-    """The directives of a file; AssertionError where pbrt would stop."""
+    """Return the directives of a file, or raise AssertionError where pbrt would report an error."""
     tokens = [found.groups() for found in _TOKEN.finditer(text) if not found[0].startswith("#")]
-    assert not _TOKEN.sub("", text).strip(), "something that is no token"
-    found, at, depth = [], 0, 0
-    while at < len(tokens):
-        word = tokens[at][2]
-        assert word is not None, f"expected a directive, but got {tokens[at]}"
-        one, at = _directive(word, tokens, at + 1)
+    assert not _TOKEN.sub("", text).strip(), "text that is not a token"
+    directives, position, depth = [], 0, 0
+    while position < len(tokens):
+        word = tokens[position][2]
+        assert word is not None, f"expected a directive, but got {tokens[position]}"
+        one, position = _directive(word, tokens, position + 1)
         depth += (word == "AttributeBegin") - (word == "AttributeEnd")
         assert depth >= 0
-        found.append(one)
+        directives.append(one)
     assert depth == 0
-    assert [one.word for one in found].count("WorldBegin") == 1
-    return found
+    assert [one.word for one in directives].count("WorldBegin") == 1
+    return directives
 
 
-def _directive(word: str, tokens: list[tuple[str, ...]], at: int) -> tuple[Directive, int]:
+def _directive(word: str, tokens: list[tuple[str, ...]], position: int) -> tuple[Directive, int]:
     if word in _BARE:
-        return Directive(word, [], [], {}), at
+        return Directive(word, [], [], {}), position
     if word in _NUMBERS:
-        end = at + _NUMBERS[word]
-        return Directive(word, [], [float(one[2]) for one in tokens[at:end]], {}), end
+        end = position + _NUMBERS[word]
+        return Directive(word, [], [float(one[2]) for one in tokens[position:end]], {}), end
     count = _NAMES.get(word, 1)
-    names = [one[0] for one in tokens[at : at + count]]
-    known, at, parameters = _KNOWN[f"{word} {names[-1]}"], at + count, {}
-    while at < len(tokens) and tokens[at][0] is not None:
-        kind, name = tokens[at][0].split(" ")
-        assert name in known and kind in known[name].rstrip("*").split("|"), tokens[at]
-        assert tokens[at + 1][1] == "["
-        end = next(k for k in range(at + 2, len(tokens)) if tokens[k][1] == "]")
-        values = [one[0] if kind in ("string", "texture") else one[2] for one in tokens[at + 2 : end]]
+    names = [one[0] for one in tokens[position : position + count]]
+    known, position, parameters = _KNOWN[f"{word} {names[-1]}"], position + count, {}
+    while position < len(tokens) and tokens[position][0] is not None:
+        kind, name = tokens[position][0].split(" ")
+        assert name in known and kind in known[name].rstrip("*").split("|"), tokens[position]
+        assert tokens[position + 1][1] == "["
+        end = next(k for k in range(position + 2, len(tokens)) if tokens[k][1] == "]")
+        values = [one[0] if kind in ("string", "texture") else one[2] for one in tokens[position + 2 : end]]
         assert None not in values
         _check(kind, values, several=known[name].endswith("*"))
-        parameters[name], at = values, end + 1
-    return Directive(word, names, [], parameters), at
+        parameters[name], position = values, end + 1
+    return Directive(word, names, [], parameters), position
 
 
 def _check(kind: str, values: list[str], several: bool) -> None:

@@ -1,4 +1,4 @@
-"""Blender: formulas against the published and the counted, and the script that is written."""
+"""Blender export: formulas against published and simulated values, and the written script."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def test_walks_return_what_half_spaces_do() -> None:
     assert below == pytest.approx(0.5 * float(walk_cdf(np.array([1e6]), 0.2, "straight")[0]))
 
 
-@pytest.mark.parametrize(("formula", "apart"), [(hulst_albedo, 0.003), (legacy_albedo, 0.03)])
-def test_albedos_of_walks_return_the_colour(formula: Any, apart: float) -> None:
+@pytest.mark.parametrize(("formula", "tolerance"), [(hulst_albedo, 0.003), (legacy_albedo, 0.03)])
+def test_albedos_of_walks_return_the_colour(formula: Any, tolerance: float) -> None:
     for colour in (0.1, 0.3, 0.5, 0.8):
-        assert diffuse_albedo(float(formula(colour))) == pytest.approx(colour, abs=apart)
+        assert diffuse_albedo(float(formula(colour))) == pytest.approx(colour, abs=tolerance)
 
 
 def test_published_diffuse_paths_are_the_radius_of_the_skin_walk() -> None:
-    """The table of [Jensen2001] gives skin1's total and diffuse path; its coefficients give the mean path."""
+    """[Jensen2001] tabulates the diffuse path of skin1; its coefficients give the mean free path."""
     (layer,) = media()["skin1"].layers
     path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
     assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
@@ -100,17 +100,17 @@ def test_parameters_are_better_than_what_is_typed_in(skin1: Subject, variant: st
 
 
 def test_unknown_versions_and_methods_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(DermisError, match=r"a version of Blender that is known: 4\.5, 5\.0, 5\.1, 5\.2"):
+    with pytest.raises(DermisError, match=r"a supported version of Blender: 4\.5, 5\.0, 5\.1, 5\.2"):
         export_skin("skin1", "blender", tmp_path / "a", version="2.79")
     with pytest.raises(DermisError, match="random-walk-skin, random-walk, burley, eevee"):
         export_skin("skin1", "blender", tmp_path / "a", variant="gaussian")
     assert not list(tmp_path.iterdir())
 
 
-def described_in(text: str) -> dict[str, Any]:
-    (told,) = (node for node in ast.parse(text).body if isinstance(node, ast.AnnAssign))
-    assert told.value is not None
-    found: dict[str, Any] = ast.literal_eval(told.value)
+def export_in(text: str) -> dict[str, Any]:
+    (export,) = (node for node in ast.parse(text).body if isinstance(node, ast.AnnAssign))
+    assert export.value is not None
+    found: dict[str, Any] = ast.literal_eval(export.value)
     return found
 
 
@@ -120,24 +120,24 @@ def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
     text = (tmp_path / "skin" / "skin.py").read_text("utf-8")
     compile(text, "skin.py", "exec")
     assert str(Path.home()) not in text and str(tmp_path) not in text and "import dermis" not in text
-    told = described_in(text)
-    assert told["inputs"][RADIUS] == list(get_numbers(report.parameters, RADIUS))
-    assert (told["method"], told["versions"], told["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
+    export = export_in(text)
+    assert export["inputs"][RADIUS] == list(get_numbers(report.parameters, RADIUS))
+    assert (export["method"], export["versions"], export["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
 
 
 def test_head_lies_beside_its_script(tmp_path: Path) -> None:
     head = write_head(tmp_path / "a'\"; head.obj")
     export_skin(head, "blender", tmp_path / "made.py", variant="burley", profile="skin1")
     text = (tmp_path / "made.py").read_text("utf-8")
-    told = described_in(text)
-    assert (told["head"], told["skin_slots"], told["name"]) == ("made.glb", [0], "a'\"; head.obj")
+    export = export_in(text)
+    assert (export["head"], export["skin_slots"], export["name"]) == ("made.glb", [0], "a'\"; head.obj")
     assert (tmp_path / "made.glb").read_bytes()[:4] == b"glTF"
-    assert told["versions"] == [[4, 5], None] and str(tmp_path) not in text
+    assert export["versions"] == [[4, 5], None] and str(tmp_path) not in text
 
 
 def test_names_are_words_and_never_code() -> None:
     usual, hostile = (script_text({"name": name, "lights": [1.5, None]}) for name in ("head", HOSTILE))
-    assert described_in(hostile) == {"name": HOSTILE, "lights": [1.5, None]}
+    assert export_in(hostile) == {"name": HOSTILE, "lights": [1.5, None]}
     trees = [ast.parse(text) for text in (usual, hostile)]
     for tree in trees:
         tree.body = [node for node in tree.body if not isinstance(node, ast.AnnAssign)]
@@ -166,13 +166,13 @@ def test_scene_stands_upright_in_metres() -> None:
     head = Head("ball", uv_sphere(100.0, 16, 8), Maps())
     lamp = PointLight(position=(0, 300, 400), target=(0, 0, 0), irradiance=(2, 1, 1))
     scene = Scene(head, lights=[lamp], camera=Camera(position=(100, 0, 1000), target=(100, 0, 0)))
-    told, panorama = describe_scene(scene, (0.0, 10.0, 0.0))
-    light, camera = np.array(told["lights"][0]["to_world"]), np.array(told["camera"]["to_world"])
+    export, panorama = describe_scene(scene, (0.0, 10.0, 0.0))
+    light, camera = np.array(export["lights"][0]["to_world"]), np.array(export["camera"]["to_world"])
     assert light[:3, 3] == pytest.approx([0.0, -0.4, 0.31])
     assert camera[:3, 3] == pytest.approx([0.1, -1.0, 0.01])
     assert -camera[:3, 2] == pytest.approx([0.0, 1.0, 0.0]) and camera[:3, 1] == pytest.approx(
         [0.0, 0.0, 1.0]
     )
     # Blender's irradiance is P / 4 pi^2 d^2 times pi: a lamp's power is spread over a sphere
-    assert told["lights"][0]["set"]["energy"] / (4 * np.pi * 0.5**2) == pytest.approx(2.0)
+    assert export["lights"][0]["set"]["energy"] / (4 * np.pi * 0.5**2) == pytest.approx(2.0)
     assert panorama is None

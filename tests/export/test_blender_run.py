@@ -1,4 +1,4 @@
-"""What is written for Blender, run by the Blender that DERMIS_BLENDER_PYTHON names."""
+"""Exports to Blender, run by the Blender that DERMIS_BLENDER_PYTHON names."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from dermis.apps.validation.engines import blender
 from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")
-MEASURING = blender.SCRIPT
-ASKED = """
+MEASURING_SCRIPT = blender.SCRIPT
+QUERY = """
 import json, sys
 import bpy
 bpy.ops.wm.open_mainfile(filepath=sys.argv[-2])
@@ -30,7 +30,7 @@ nodes = [node for one in bpy.data.materials for node in one.node_tree.nodes]
 shaders = [node for node in nodes if node.type == "BSDF_PRINCIPLED"]
 skin = [node for node in shaders if node.inputs["Subsurface Weight"].default_value == 1.0]
 meshes = [one for one in scene.objects if one.type == "MESH"]
-told = {
+answer = {
     "name": scene.name,
     "methods": [node.subsurface_method for node in skin],
     "radius_m": [x * skin[0].inputs["Subsurface Scale"].default_value
@@ -39,7 +39,7 @@ told = {
     "lights": len([one for one in scene.objects if one.type == "LIGHT"]),
     "camera": list(scene.camera.matrix_world.translation),
 }
-open(sys.argv[-1], "w").write(json.dumps(told))
+open(sys.argv[-1], "w").write(json.dumps(answer))
 """
 
 pytestmark = pytest.mark.skipif(not PYTHON, reason=f"{PYTHON_VARIABLE} is not set")
@@ -47,10 +47,10 @@ pytestmark = pytest.mark.skipif(not PYTHON, reason=f"{PYTHON_VARIABLE} is not se
 
 @pytest.fixture(scope="module")
 def version() -> str:
-    """Of Blender, as the target knows it."""
-    words = [PYTHON, "-I", "-c", "import bpy; print('version', *bpy.app.version[:2])"]
-    said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120).stdout
-    (line,) = (line for line in said.splitlines() if line.startswith("version"))
+    """Return Blender's version."""
+    command = [PYTHON, "-I", "-c", "import bpy; print('version', *bpy.app.version[:2])"]
+    output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    (line,) = (line for line in output.splitlines() if line.startswith("version"))
     return ".".join(line.split()[1:])
 
 
@@ -58,16 +58,16 @@ def test_head_is_saved_upright_with_its_skin(tmp_path: Path, version: str) -> No
     head = write_head(tmp_path / "a'\"; head.obj")
     file = tmp_path / "head.blend"
     report = export_skin(head, "blender", file, version=version, variant="burley", profile="skin1")
-    (tmp_path / "ask.py").write_text(ASKED)
-    told_file = tmp_path / "told.json"
-    words = [PYTHON, "-I", str(tmp_path / "ask.py"), str(file), str(told_file)]
-    subprocess.run(words, check=True, capture_output=True, timeout=120)
-    told: dict[str, Any] = json.loads(told_file.read_text())
-    assert told["methods"] == ["BURLEY"]
-    assert np.array(told["radius_m"]) == pytest.approx(4e-3 * np.pi * report.d_mm, rel=0.03)
-    assert told["size_m"] == pytest.approx([0.16, 0.19, 0.24], rel=0.03)  # 240 mm high, its face to -Y
-    assert told["lights"] >= 1 and told["camera"][1] < -1.0
-    assert "head.obj" in told["name"]
+    (tmp_path / "query.py").write_text(QUERY)
+    answer_file = tmp_path / "answer.json"
+    command = [PYTHON, "-I", str(tmp_path / "query.py"), str(file), str(answer_file)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    answer: dict[str, Any] = json.loads(answer_file.read_text())
+    assert answer["methods"] == ["BURLEY"]
+    assert np.array(answer["radius_m"]) == pytest.approx(4e-3 * np.pi * report.d_mm, rel=0.03)
+    assert answer["size_m"] == pytest.approx([0.16, 0.19, 0.24], rel=0.03)  # 240 mm high, its face to -Y
+    assert answer["lights"] >= 1 and answer["camera"][1] < -1.0
+    assert "head.obj" in answer["name"]
 
 
 def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -> None:
@@ -81,16 +81,16 @@ def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -
 
 @pytest.mark.parametrize("variant", ["random-walk-skin", "random-walk", "burley"])
 def test_cycles_shows_the_edge_that_was_predicted(tmp_path: Path, version: str, variant: str) -> None:
-    """Red of a half-lit plane within 4 mm; the benchmark has all colours with less noise."""
+    """Red channel within 4 mm of an edge of light; the benchmark has all channels with less noise."""
     subject, target = load_subject("skin1"), TARGET.with_variant(variant)
     rows = target.parameters(subject, version)
     target.write(subject, rows, tmp_path, version)
     one = {"channel": 0, "width_m": 8e-3, "size": [8, 32], "samples": 128, "seed": 1}
     (tmp_path / "passes.json").write_text(json.dumps([one]))
-    words = [PYTHON, "-I", str(MEASURING), str(tmp_path)]
-    subprocess.run(words, check=True, capture_output=True, timeout=300)
+    command = [PYTHON, "-I", str(MEASURING_SCRIPT), str(tmp_path)]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     (columns,) = json.loads((tmp_path / "done.json").read_text())["columns"]
-    shown = target.predicted_curve(rows, subject, version)
-    fine = shown.edge_response(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
+    predicted = target.predicted_curve(rows, subject, version)
+    fine = predicted.edge_response(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
     expected = fine.reshape(8, 32).mean(axis=1)
-    assert np.pi * np.array(columns)[:, 0] == pytest.approx(expected * shown.energy[0], abs=0.025)
+    assert np.pi * np.array(columns)[:, 0] == pytest.approx(expected * predicted.energy[0], abs=0.025)

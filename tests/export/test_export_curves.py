@@ -1,4 +1,4 @@
-"""Curves, fits and deviations, against closed forms and numbers of published works."""
+"""Cumulative profiles, fits and errors against closed forms and published values."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def test_homogeneous_medium_of_layers_has_their_energy_and_tells_its_error(dj3: 
 def test_spectral_skin_is_per_light_that_enters() -> None:
     skin = load_subject("medium")
     assert skin.tissue is not None
-    given = skin.tissue.profile().total
-    np.testing.assert_allclose(skin.curve.energy * (1.0 - (0.4 / 2.4) ** 2), given, rtol=1e-9)
+    expected = skin.tissue.profile().total
+    np.testing.assert_allclose(skin.curve.energy * (1.0 - (0.4 / 2.4) ** 2), expected, rtol=1e-9)
 
 
 def test_words_that_stand_for_nothing_are_refused() -> None:

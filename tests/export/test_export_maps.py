@@ -1,4 +1,4 @@
-"""Baked maps against what the frame itself shows of the same skin."""
+"""Baked maps against frames of the same skin."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LIGHT, PAINT, DRAWN = 0.03, 0.01, 0.03
 """Root mean square of the difference over that of the values: texels hold the mean of what lies in them, and
 light leaves towards the eye as along the normal only where the skin faces it. Measured .019, .005, .02."""
 SETTINGS = Settings(atlas=512, size=(192, 192), samples=1, strands=False)
-SEEN = "diffuse", "irradiance", "albedo", "melanin", "thickness", "uv"
+OUTPUTS = "diffuse", "irradiance", "albedo", "melanin", "thickness", "uv"
 
 
 @pytest.fixture(scope="module")
@@ -47,23 +47,23 @@ def baked(renderer: Renderer, scene: Scene) -> BakedMaps:
     return bake(renderer, scene, SETTINGS, SIDE)
 
 
-def looked_up(values: NDArray[Any], uv: NDArray[Any]) -> NDArray[Any]:
-    """Bilinear."""
-    at = uv * len(values) - 0.5
-    low = np.clip(np.floor(at).astype(int), 0, len(values) - 2)
+def sample_bilinear(values: NDArray[Any], uv: NDArray[Any]) -> NDArray[Any]:
+    """Return bilinear samples of a map."""
+    position = uv * len(values) - 0.5
+    low = np.clip(np.floor(position).astype(int), 0, len(values) - 2)
     x, y = low.T
-    fx, fy = (part if values.ndim == 2 else part[:, None] for part in (at - low).T)
+    fx, fy = (part if values.ndim == 2 else part[:, None] for part in (position - low).T)
     rows = [values[y + k, x] * (1 - fx) + values[y + k, x + 1] * fx for k in (0, 1)]
     return np.asarray(rows[0] * (1 - fy) + rows[1] * fy)
 
 
-def apart(found: NDArray[Any], wanted: NDArray[Any]) -> float:
-    return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
+def relative_rmse(found: NDArray[Any], expected: NDArray[Any]) -> float:
+    return float(np.sqrt(((found - expected) ** 2).mean() / (expected**2).mean()))
 
 
 def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, baked: BakedMaps) -> None:
-    drawn = renderer.draw(scene, SETTINGS, outputs=SEEN)
-    seen = {name: drawn.output(name) for name in SEEN}
+    drawn = renderer.draw(scene, SETTINGS, outputs=OUTPUTS)
+    seen = {name: drawn.output(name) for name in OUTPUTS}
     skin = seen["thickness"] > 0
     uv = seen["uv"][skin]
     for name, of, factor, most in (
@@ -73,8 +73,8 @@ def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, ba
         ("melanin", "melanin", 1.0, 2 * PAINT),
         ("thickness", "thickness", 1.0, PAINT),
     ):
-        found = looked_up(baked.maps[name], uv)
-        assert apart(found / factor, seen[of][skin]) < most, name
+        found = sample_bilinear(baked.maps[name], uv)
+        assert relative_rmse(found / factor, seen[of][skin]) < most, name
 
 
 def test_a_head_drawn_with_the_maps_looks_the_same(
@@ -88,7 +88,7 @@ def test_a_head_drawn_with_the_maps_looks_the_same(
     mean = float(np.average(rho_s[baked.covered], weights=area[baked.covered]))
     skin = scene.skin.model_copy(update={"rho_s": mean})
     after = renderer.draw(scene.replace(head=replace(scene.head, maps=maps), skin=skin), SETTINGS).linear()
-    assert apart(after, before) < DRAWN
+    assert relative_rmse(after, before) < DRAWN
 
 
 def test_nothing_beside_the_skin_is_black(baked: BakedMaps) -> None:
@@ -108,32 +108,32 @@ def test_skin_without_pigments_or_thin_parts_says_so(renderer: Renderer, scene: 
 
 
 def test_files_read_back_as_the_json_says(tmp_path: Path) -> None:
-    place = tmp_path / "maps"
-    report = export_skin("human:7", "maps", place, side=256, adapter="cpu", variant="directx")
-    told = json.loads((place / "maps.json").read_text("utf-8"))
-    assert told["size"] == 256
-    assert told["normal_green"].startswith("down")
+    folder = tmp_path / "maps"
+    report = export_skin("human:7", "maps", folder, side=256, adapter="cpu", variant="directx")
+    content = json.loads((folder / "maps.json").read_text("utf-8"))
+    assert content["size"] == 256
+    assert content["normal_green"].startswith("down")
     assert {file.name for file in report.files} >= {"albedo.exr", "albedo.png", "scattered.exr", "height.png"}
-    for name, about in told["maps"].items():
-        linear = read_image(place / f"{name}.exr")
+    for name, info in content["maps"].items():
+        linear = read_image(folder / f"{name}.exr")
         assert linear.shape[:2] == (256, 256)
-        if "png" not in about:
+        if "png" not in info:
             continue
-        levels = read_image(place / f"{name}.png")
-        shown = _numbers(levels, about)
-        kept = np.clip(linear, 0.0, about.get("white", np.inf)) if about["png"] == "sRGB" else linear
-        step = 0.006 * max(float(np.abs(kept).max()), 1e-9)
-        assert np.abs(shown - kept).max() < step, name
+        levels = read_image(folder / f"{name}.png")
+        decoded = _decode_png(levels, info)
+        clipped = np.clip(linear, 0.0, info.get("white", np.inf)) if info["png"] == "sRGB" else linear
+        step = 0.006 * max(float(np.abs(clipped).max()), 1e-9)
+        assert np.abs(decoded - clipped).max() < step, name
 
 
-def _numbers(levels: NDArray[Any], about: dict[str, Any]) -> NDArray[Any]:
-    if about["png"] == "sRGB":
-        return decode_srgb_levels(levels) * about.get("white", 1.0)
-    share = levels / 65535
-    rules = {"value = 2 level / 65535 - 1": 2 * share - 1, "value = (level / 65535)^2": share**2}
-    if "black" in about:
-        return np.asarray(about["black"] + share * (about["white"] - about["black"]))
-    return np.asarray(rules.get(about["png"], share))
+def _decode_png(levels: NDArray[Any], info: dict[str, Any]) -> NDArray[Any]:
+    if info["png"] == "sRGB":
+        return decode_srgb_levels(levels) * info.get("white", 1.0)
+    fraction = levels / 65535
+    rules = {"value = 2 level / 65535 - 1": 2 * fraction - 1, "value = (level / 65535)^2": fraction**2}
+    if "black" in info:
+        return np.asarray(info["black"] + fraction * (info["white"] - info["black"]))
+    return np.asarray(rules.get(info["png"], fraction))
 
 
 def test_green_turns_for_directx() -> None:

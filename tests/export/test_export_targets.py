@@ -1,4 +1,4 @@
-"""Targets: their formulas go back to what was fitted, and their files are read as they are meant."""
+"""Export targets: inverse of their formulas, and the contents of their files."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ EVIL = '"; import os; os._exit(3) # \n'
 def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
     target = TARGETS[name].with_variant(None)
     for version in target.versions:
-        shown = target.predicted_curve(target.parameters(skin1, version), skin1, version)
-        np.testing.assert_allclose(fit_burley_width(shown), fit_burley_width(skin1.curve), rtol=1e-4)
+        predicted = target.predicted_curve(target.parameters(skin1, version), skin1, version)
+        np.testing.assert_allclose(fit_burley_width(predicted), fit_burley_width(skin1.curve), rtol=1e-4)
 
 
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])
@@ -49,11 +49,11 @@ def test_what_is_written_is_better_than_what_is_typed(name: str, dj3: Subject) -
 def test_unity_reads_its_asset_back(skin1: Subject, tmp_path: Path) -> None:
     report = export_skin(skin1, "unity", tmp_path / "skin.asset")
     text = (tmp_path / "skin.asset").read_text("utf-8").replace("!u!114 ", "").replace("%TAG", "#")
-    told = yaml.safe_load(text)["MonoBehaviour"]
-    own = told["profile"]
+    content = yaml.safe_load(text)["MonoBehaviour"]
+    own = content["profile"]
     distance = np.array([own["scatteringDistance"][c] for c in "rgb"]) * own["scatteringDistanceMultiplier"]
     np.testing.assert_allclose(distance, report.d_mm, rtol=1e-4)
-    assert (told["m_Version"], told["m_Name"], own["worldScale"], own["hash"]) == (2, "skin", 1, 0)
+    assert (content["m_Version"], content["m_Name"], own["worldScale"], own["hash"]) == (2, "skin", 1, 0)
 
 
 def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> None:
@@ -64,7 +64,7 @@ def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> No
 
 
 class _Settings:
-    """Fields that the editor's structure has, by its page; others are refused."""
+    """Settings of Unreal's editor, which refuse fields that its documentation does not name."""
 
     known = frozenset(KNOWN.split())
 
@@ -78,14 +78,14 @@ class _Settings:
 
 
 def _editor(settings: _Settings, saved: list[Any]) -> ModuleType:
-    """As much of the editor's module as the script may use; anything else raises AttributeError."""
+    """Return a stub of the module `unreal` with the functions that the script may use."""
     stored = {}
     profile = SimpleNamespace(
         get_editor_property={"settings": settings}.__getitem__,
         set_editor_property=stored.__setitem__,
         get_path_name=lambda: "/Game/Dermis/x",
     )
-    tools = SimpleNamespace(create_asset=lambda *words: saved.append(words) or profile)
+    tools = SimpleNamespace(create_asset=lambda *arguments: saved.append(arguments) or profile)
     unreal: Any = ModuleType("unreal")
     unreal.AssetToolsHelpers = SimpleNamespace(get_asset_tools=lambda: tools)
     unreal.EditorAssetLibrary = SimpleNamespace(
@@ -119,7 +119,9 @@ def test_unreal_runs_its_script(
 def test_names_do_no_harm(name: str, skin1: Subject, tmp_path: Path) -> None:
     evil = Subject(EVIL, skin1.curve, skin1.albedo, skin1.model, skin1.tissue)
     assert evil.identifier.isidentifier()
-    report = export_skin(evil, name, tmp_path / "made" if name != "renderman" else tmp_path / "made.json")
+    report = export_skin(
+        evil, name, tmp_path / "export" if name != "renderman" else tmp_path / "export_.json"
+    )
     for file in report.files:
         text = file.read_text("utf-8")
         if file.suffix == ".json":
@@ -133,27 +135,27 @@ def test_names_do_no_harm(name: str, skin1: Subject, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["renderman", "arnold"])
 def test_values_are_marked_as_not_run(name: str, skin1: Subject, tmp_path: Path) -> None:
     export_skin(skin1, name, tmp_path / "values.json")
-    told = json.loads((tmp_path / "values.json").read_text("utf-8"))
-    assert told["status"].startswith("not run") and told["parameters"]
-    assert all(row["unit"] and row["meaning"] for row in told["parameters"].values())
+    content = json.loads((tmp_path / "values.json").read_text("utf-8"))
+    assert content["status"].startswith("not run") and content["parameters"]
+    assert all(row["unit"] and row["meaning"] for row in content["parameters"].values())
 
 
 def test_a_folder_is_replaced_only_where_it_is_an_export(skin1: Subject, tmp_path: Path) -> None:
-    place = tmp_path / "made"
+    folder = tmp_path / "exported"
     for _ in range(2):
-        export_skin(skin1, "unity", place)
-    assert sorted(file.name for file in place.iterdir()) == ["README.md", "export.json", "skin1.asset"]
+        export_skin(skin1, "unity", folder)
+    assert sorted(file.name for file in folder.iterdir()) == ["README.md", "export.json", "skin1.asset"]
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "work.txt").write_text("mine")
     with pytest.raises(DermisError, match=r"of before that holds export\.json"):
         export_skin(skin1, "unity", tmp_path / "own")
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["made", "own"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["exported", "own"]
 
 
 def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Path) -> None:
     with pytest.raises(DermisError, match="target: expected one of arnold, "):
         export_skin(skin1, "quake", tmp_path / "x")
-    with pytest.raises(DermisError, match=r"Unity HDRP that is known: 12, 14, 17, but '3'"):
+    with pytest.raises(DermisError, match=r"a supported version of Unity HDRP: 12, 14, 17, but got '3'"):
         export_skin(skin1, "unity", tmp_path / "x", version="3")
     with pytest.raises(DermisError, match="variant: expected none for unity"):
         export_skin(skin1, "unity", tmp_path / "x", variant="thick")

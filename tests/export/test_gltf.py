@@ -1,4 +1,4 @@
-"""Skins and heads as glTF: what the numbers mean, that files keep the rules, and what is read back."""
+"""Export to glTF: formulas, validity of the files, and reading them back."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from dermis.apps.export.targets.gltf.volume import (
 from dermis.human.person_file import write_person_glb
 from dermis.optics.tissue import load_tissue
 
-NEW = {"KHR_materials_scatter", "KHR_materials_transmission", "KHR_materials_volume"}
-THROUGH = "KHR_materials_diffuse_transmission"
+SCATTER_EXTENSIONS = {"KHR_materials_scatter", "KHR_materials_transmission", "KHR_materials_volume"}
+TRANSMISSION = "KHR_materials_diffuse_transmission"
 
 
 @pytest.fixture(scope="module")
 def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """One as both variants; its name does harm where it is not quoted."""
+    """Return files of a head in both variants; its name contains quotes and code."""
     folder = tmp_path_factory.mktemp("glb")
     source = folder / 'x"; import os; <script>.glb'
     human = Human.drawn(7)
@@ -47,7 +47,7 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def brown(folder: Path) -> Path:
-    """A picture of one colour in its left half and another in its right."""
+    """Write a picture with one colour in its left half and another in its right."""
     from dermis.images.io import write_png
 
     picture = np.full((64, 64, 3), (188, 137, 113), np.uint8)
@@ -57,13 +57,13 @@ def brown(folder: Path) -> Path:
 
 
 def skin_of(file: Path) -> dict[str, Any]:
-    """The material of skin of a file that keeps the rules."""
+    """Return the skin material of a valid file."""
     (found,) = [one for one in check_rules(file).tree["materials"] if "dermis" in one.get("extras", {})]
     return dict(found)
 
 
 def test_the_inversion_is_van_de_hulsts() -> None:
-    """The draft prints one way, the other is the printed approximation's inverse."""
+    """The draft prints one direction; the other is the published inverse of the approximation."""
     albedo = np.array([0.3, 0.7, 0.9, 0.99, 0.999])
     np.testing.assert_allclose(single_scattering(multiscatter_colour(albedo)), albedo, atol=2e-5)
     s = np.sqrt(1 - 0.9)
@@ -72,7 +72,7 @@ def test_the_inversion_is_van_de_hulsts() -> None:
 
 
 def test_a_volume_keeps_its_paths() -> None:
-    """Whatever the ratio of the channels; colours stay within 0 and 1."""
+    """Colours stay within 0 and 1 for any ratio of the channels."""
     paths = np.array([1.3, 0.9, 0.05])
     volume = volume_from_paths(paths, (0.6, 0.4, 0.2))
     assert volume.distance_m == pytest.approx(1.3e-3) and ((volume.colour > 0) & (volume.colour < 1)).all()
@@ -81,7 +81,7 @@ def test_a_volume_keeps_its_paths() -> None:
 
 @pytest.mark.parametrize("name", ["skin1", "skin2", "marble"])
 def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
-    """The fit finds the tissue's own mean free path and albedo again."""
+    """The fit finds the mean free path and albedo of the tissue."""
     tissue, subject = load_tissue(name), load_subject(name)
     volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
     np.testing.assert_allclose(volume.mean_free_path_mm, layer.mean_free_path_mm, rtol=0.01)
@@ -91,7 +91,7 @@ def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
 
 
 def test_the_colour_itself_would_lose_light() -> None:
-    """Under a surface that refracts, half of the red of skin1: the finding in the documentation."""
+    """Below a refracting surface, half of the red light of skin1 would be lost, as the documentation says."""
     subject = load_subject("skin1")
     volume = fit_volume(subject.curve)
     found = curve_error(
@@ -107,12 +107,12 @@ def test_the_colour_itself_would_lose_light() -> None:
 def test_what_one_would_type_is_worse(name: str) -> None:
     subject = load_subject(name)
     target = TARGET.with_variant(None)
-    best, typed = (
+    best, naive = (
         curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
         for rows in (target.parameters(subject, "2.0"), target.naive_parameters(subject, "2.0"))
     )
-    assert np.abs(best.energy).max() < 0.005 < 0.3 < np.abs(typed.energy).min()
-    assert best.cdf.max() < (0.005 if name == "skin1" else 0.2) and best.cdf.sum() < typed.cdf.sum()
+    assert np.abs(best.energy).max() < 0.005 < 0.3 < np.abs(naive.energy).min()
+    assert best.cdf.max() < (0.005 if name == "skin1" else 0.2) and best.cdf.sum() < naive.cdf.sum()
 
 
 def test_nothing_spreads_without_scattering() -> None:
@@ -130,9 +130,9 @@ def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
     report = export_skin("skin1", "gltf", tmp_path / "ball.glb")
     document = check_rules(tmp_path / "ball.glb")
     tree, skin = document.tree, skin_of(tmp_path / "ball.glb")
-    places = document.read_floats(tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
-    np.testing.assert_allclose(np.linalg.norm(places, axis=1), 0.05, rtol=1e-5)
-    assert set(tree["extensionsUsed"]) >= NEW and "extensionsRequired" not in tree
+    positions = document.read_floats(tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
+    np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 0.05, rtol=1e-5)
+    assert set(tree["extensionsUsed"]) >= SCATTER_EXTENSIONS and "extensionsRequired" not in tree
     assert (
         tree["asset"]["extras"]["draft"] == DRAFT == skin["extras"]["draft"] and DRAFT in report.limitations
     )
@@ -144,7 +144,7 @@ def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
 
 
 def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
-    """Each texel of what scatters is the colour that gives back that of the map."""
+    """Each texel of the multiscatter texture is the colour that reproduces the reflectance in the map."""
     from io import BytesIO
 
     from PIL import Image
@@ -154,9 +154,9 @@ def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
     scatter = skin["extensions"]["KHR_materials_scatter"]
     assert scatter["multiscatterColorFactor"] == [1.0, 1.0, 1.0]
     image = document.tree["images"][scatter["multiscatterColorTexture"]["index"]]
-    shown = np.asarray(Image.open(BytesIO(document.read_view(image["bufferView"]))).convert("RGB"))
+    pixels = np.asarray(Image.open(BytesIO(document.read_view(image["bufferView"]))).convert("RGB"))
     linear = lambda levels: ((np.asarray(levels) / 255 + 0.055) / 1.055) ** 2.4  # noqa: E731
-    for texel, levels in ((shown[10, 10], (188, 137, 113)), (shown[10, 50], (120, 80, 60))):
+    for texel, levels in ((pixels[10, 10], (188, 137, 113)), (pixels[10, 50], (120, 80, 60))):
         np.testing.assert_allclose(linear(texel), multiscatter_for_reflectance(linear(levels)), atol=0.01)
     assert document.tree["meshes"][0]["extras"]["targetNames"][:1] and document.tree["skins"]
     assert {"left eye", "right eye"} <= {one["name"] for one in document.tree["materials"]}
@@ -164,8 +164,8 @@ def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
 
 def test_diffuse_transmission_has_the_usual_colours(person: dict[str, Path]) -> None:
     skin = skin_of(person[DIFFUSE])
-    assert "baseColorTexture" in skin["pbrMetallicRoughness"] and THROUGH in skin["extensions"]
-    assert not NEW & set(skin["extensions"]) and "draft" not in skin["extras"]
+    assert "baseColorTexture" in skin["pbrMetallicRoughness"] and TRANSMISSION in skin["extensions"]
+    assert not SCATTER_EXTENSIONS & set(skin["extensions"]) and "draft" not in skin["extras"]
     assert "draft" not in check_rules(person[DIFFUSE]).tree["asset"].get("extras", {})
 
 
@@ -183,11 +183,11 @@ def test_the_khronos_validator_finds_no_errors(person: dict[str, Path], variant:
     found = khronos_issues(person[variant])
     assert found["numErrors"] == 0
     unknown = {one["message"] for one in found["messages"] if one["code"] == "UNSUPPORTED_EXTENSION"}
-    assert all("KHR_materials_scatter" in one or THROUGH in one for one in unknown)
+    assert all("KHR_materials_scatter" in one or TRANSMISSION in one for one in unknown)
 
 
 def test_names_stay_words(person: dict[str, Path]) -> None:
-    """A head's name is a string of JSON, and nothing of where it lay is in the file."""
+    """The name of a head is a JSON string, and the file contains no path of its source."""
     data = person[SCATTER].read_bytes()
     tree = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
     assert tree["meshes"][0]["name"] == 'x"; import os; <script>'

@@ -1,4 +1,4 @@
-"""The scene for Mitsuba: what its XML says, and that Mitsuba itself renders it as was predicted."""
+"""Export to Mitsuba: contents of the XML, and renderings by Mitsuba against predictions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.mitsuba.meshes import subdivide_triangles
 from dermis.apps.export.targets.mitsuba.target import TARGET, SkinColours, fit_medium
-from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, element
+from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, xml_element
 from dermis.apps.truths.mitsuba_scene import mitsuba_variant
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import media
@@ -31,10 +31,10 @@ def mi() -> Any:
 
 @pytest.fixture(scope="module")
 def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ball of skin2, whose name would like to be more than a name."""
-    place = tmp_path_factory.mktemp("mitsuba") / "ball"
-    export_skin(load_subject("skin2"), "mitsuba", place)
-    return place
+    """Return the folder of an exported ball of skin2."""
+    folder = tmp_path_factory.mktemp("mitsuba") / "ball"
+    export_skin(load_subject("skin2"), "mitsuba", folder)
+    return folder
 
 
 def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
@@ -48,9 +48,9 @@ def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
 @pytest.mark.parametrize("boundary", TARGET.variants)
 def test_fitted_media_are_near_and_typed_ones_far(boundary: str) -> None:
     subject, target = load_subject("skin1"), TARGET.with_variant(boundary)
-    fit, typed = target.parameters(subject, "3"), target.naive_parameters(subject, "3")
+    fit, naive = target.parameters(subject, "3"), target.naive_parameters(subject, "3")
     near, far = (
-        curve_error(subject.curve, target.predicted_curve(rows, subject, "3")) for rows in (fit, typed)
+        curve_error(subject.curve, target.predicted_curve(rows, subject, "3")) for rows in (fit, naive)
     )
     assert near.edge.max() < 0.015
     assert np.abs(near.energy).max() < 1e-3
@@ -64,16 +64,16 @@ def test_dimmed_skin_has_a_brighter_medium() -> None:
     for boundary in TARGET.variants:
         before, after = (fit_medium(curve, one, boundary) for one in (plain, dimmed))  # type: ignore[arg-type]
         assert np.all(np.array(after.albedo) > np.array(before.albedo))
-        np.testing.assert_allclose(dimmed.passing(boundary), 1 / 1.3, rtol=1e-12)  # type: ignore[arg-type]
+        np.testing.assert_allclose(dimmed.transmittance(boundary), 1 / 1.3, rtol=1e-12)  # type: ignore[arg-type]
 
 
 def test_words_are_escaped_and_pictures_numbered() -> None:
-    words = XmlBackend()
-    made = element({"type": "ply", "filename": '"/><x a="&'}, "", words)
+    backend = XmlBackend()
+    made = xml_element({"type": "ply", "filename": '"/><x a="&'}, "", backend)
     assert ET.fromstring(ET.tostring(made))[0].attrib["value"] == '"/><x a="&'
     slide = {"type": "bitmap", "bitmap": Bitmap(np.zeros((1, 1, 3), np.float32)), "raw": True}
-    assert element(slide, "", words)[0].attrib == {"name": "filename", "value": "textures/light_0.exr"}
-    assert len(words.bitmaps) == 1
+    assert xml_element(slide, "", backend)[0].attrib == {"name": "filename", "value": "textures/light_0.exr"}
+    assert len(backend.bitmaps) == 1
 
 
 def test_transforms_are_those_of_mitsuba(mi: Any) -> None:
@@ -124,27 +124,27 @@ def test_an_edge_of_light_is_as_predicted(mi: Any) -> None:
 
     subject = load_subject("skin2")
     with mitsuba_variant(mi, "scalar_rgb"):
-        found = _edge(mi, bench, subject, "smooth", 0)
-        limitations = _typed(mi, bench, subject)
-    assert found < EDGE_NOISE < limitations
+        fitted_error = _fitted_error(mi, bench, subject, "smooth", 0)
+        naive_error = _naive_error(mi, bench, subject)
+    assert fitted_error < EDGE_NOISE < naive_error
 
 
-def _edge(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) -> float:
+def _fitted_error(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) -> float:
     target = TARGET.with_variant(boundary)
-    return _apart(mi, bench, subject, target.parameters(subject, "3"), boundary, channel)
+    return _edge_error(mi, bench, subject, target.parameters(subject, "3"), boundary, channel)
 
 
-def _typed(mi: Any, bench: Any, subject: Subject) -> float:
-    return _apart(
+def _naive_error(mi: Any, bench: Any, subject: Subject) -> float:
+    return _edge_error(
         mi, bench, subject, TARGET.with_variant("smooth").naive_parameters(subject, "3"), "smooth", 0
     )
 
 
-def _apart(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str, channel: int) -> float:
-    """Largest difference from the true curve."""
+def _edge_error(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str, channel: int) -> float:
+    """Return the largest error of a measured edge response."""
     sigma, albedo = (get_numbers(rows, name)[channel] for name in ("sigma_t", "albedo"))
     medium = bench.IsotropicMedium((sigma,) * 3, (albedo,) * 3)
     d = float(bench.fit_burley_width(subject.curve)[channel])
-    seen, _, _ = bench.measured_edge(mi, medium, boundary, d, 768)
+    measured, _, _ = bench.measured_edge(mi, medium, boundary, d, 768)
     curve: CumulativeProfile = subject.curve
-    return float(np.abs(seen - bench.pixel_averages(curve, channel, d)).max())
+    return float(np.abs(measured - bench.pixel_averages(curve, channel, d)).max())

@@ -1,4 +1,4 @@
-"""Skin for OpenPBR: radii whose walk is nearest, and what other readings of them would show."""
+"""Export to OpenPBR: radii of the closest random walk, and the error of other interpretations."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def test_a_walk_holds_homogeneous_skin_and_published_numbers_do_not() -> None:
     report = evaluate_export(subject, TARGET, "1.1.1")
     assert report.error.edge.max() < EDGE and report.error.cdf.max() < 0.04
     assert report.naive_error.edge[0] > 0.04
-    typed = get_radii_mm(report.naive_parameters, OPEN_PBR)
-    np.testing.assert_allclose(typed, [3.67, 1.37, 0.68], rtol=0.01)  # [Jensen2001], printed
+    naive = get_radii_mm(report.naive_parameters, OPEN_PBR)
+    np.testing.assert_allclose(naive, [3.67, 1.37, 0.68], rtol=0.01)  # [Jensen2001], printed
 
 
 def test_all_light_is_what_the_formula_returns() -> None:
@@ -46,7 +46,7 @@ def test_radii_grow_with_the_skin() -> None:
     )
     d = evaluate_export(subject, TARGET, "1.1.1").d_mm
     ratio = fitted_path_mm(subject) / d
-    # Walks counted elsewhere: d over the mean free path is 0.434 at a colour of 0.43 and 0.34 at 0.2.
+    # From other simulations: d over the mean free path is 0.434 at a colour of 0.43 and 0.34 at 0.2.
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
 
 
@@ -65,6 +65,6 @@ def test_the_document_has_what_was_told(variant: str, tmp_path: Path) -> None:
     MaterialX.readFromXmlFile(document, str(tmp_path / "skin.mtlx"))
     (node,) = [one for one in document.getNodes() if one.getType() == "surfaceshader"]
     for row in report.parameters:
-        told = get_numbers(report.parameters, row.name)
+        exported = get_numbers(report.parameters, row.name)
         value = node.getInput(row.name).getValue()
-        assert np.allclose(value if len(told) == 1 else value.asTuple(), told, rtol=1e-5)
+        assert np.allclose(value if len(exported) == 1 else value.asTuple(), exported, rtol=1e-5)

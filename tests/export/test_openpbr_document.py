@@ -1,4 +1,4 @@
-"""Materials as MaterialX documents: what the library makes of them."""
+"""MaterialX documents of materials, checked with the MaterialX library."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ pytest.importorskip("MaterialX")
 import MaterialX
 from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, PyMaterialXGenShader
 
-from dermis.apps.export.targets.openpbr.document import build_document, library
+from dermis.apps.export.targets.openpbr.document import build_document, standard_library
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     STANDARD,
@@ -30,25 +30,25 @@ GENERATORS = {
 HOSTILE = '"/><input name="x" /><!-- \n ; import os'
 
 
-def looks(name: str = "skin") -> list[OpenPbrMaterial]:
+def materials(name: str = "skin") -> list[OpenPbrMaterial]:
     skin = skin_material(
         name, Skin(), RADIUS_M, (0.4, 0.2, 0.1), ["colour", "roughness", "specular", "normal"]
     )
     return [skin, opaque_material(Material("left eye", "opaque"))]
 
 
-def read_back(made: Any) -> Any:
-    again = MaterialX.createDocument()
-    MaterialX.readFromXmlString(again, MaterialX.writeToXmlString(made))
-    again.setDataLibrary(library())
-    assert again.validate() == (True, "")
-    return again
+def read_back(document: Any) -> Any:
+    document_read = MaterialX.createDocument()
+    MaterialX.readFromXmlString(document_read, MaterialX.writeToXmlString(document))
+    document_read.setDataLibrary(standard_library())
+    assert document_read.validate() == (True, "")
+    return document_read
 
 
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
-    again = read_back(build_document(looks(), shader, "a_"))
-    nodes = {node.getName(): node for node in again.getNodes(shader)}
+    document_read = read_back(build_document(materials(), shader, "a_"))
+    nodes = {node.getName(): node for node in document_read.getNodes(shader)}
     assert set(nodes) == {"skin_surface", "left_eye_surface"}
     for node in nodes.values():
         for one in node.getInputs():
@@ -58,7 +58,7 @@ def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
 
 
 def test_pictures_have_their_colour_spaces() -> None:
-    graph = read_back(build_document(looks(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
+    graph = read_back(build_document(materials(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
     files = {one.getName(): one.getInput("file") for one in graph.getNodes("image")}
     assert files["colour_image"].getColorSpace() == "srgb_texture"
     assert not any(one.getColorSpace() for name, one in files.items() if name != "colour_image")
@@ -68,30 +68,33 @@ def test_pictures_have_their_colour_spaces() -> None:
 @pytest.mark.parametrize("language", GENERATORS)
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
-    code = generated(build_document(looks(), shader, "a_"), GENERATORS[language].create())
+    code = generated(build_document(materials(), shader, "a_"), GENERATORS[language].create())
     assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one
     assert "srgb_texture_to_lin_rec709" in code
 
 
 def test_a_hostile_name_is_text() -> None:
-    again = read_back(build_document(looks(HOSTILE), OPEN_PBR, "a_"))
-    named = [one for one in again.getMaterialNodes() if one.getAttribute("uiname")]
+    document_read = read_back(build_document(materials(HOSTILE), OPEN_PBR, "a_"))
+    named = [one for one in document_read.getMaterialNodes() if one.getAttribute("uiname")]
     assert HOSTILE in [one.getAttribute("uiname") for one in named]
-    assert [node.getCategory() for node in again.getNodes()] == [OPEN_PBR, "surfacematerial"] * 2
+    assert [node.getCategory() for node in document_read.getNodes()] == [OPEN_PBR, "surfacematerial"] * 2
 
 
-def generated(made: Any, generator: Any) -> str:
-    """A pixel shader of the first material, in a scene in centimetres."""
+def generated(document: Any, generator: Any) -> str:
+    """Return the pixel shader of the first material, for a scene in centimetres."""
     context = PyMaterialXGenShader.GenContext(generator)
     context.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())
     colours = PyMaterialXGenShader.DefaultColorManagementSystem.create(generator.getTarget())
-    colours.loadLibrary(library())
+    colours.loadLibrary(standard_library())
     generator.setColorManagementSystem(colours)
     units = PyMaterialXGenShader.UnitSystem.create(generator.getTarget())
-    units.loadLibrary(library())
-    registry, distance = MaterialX.UnitConverterRegistry.create(), library().getUnitTypeDef("distance")
+    units.loadLibrary(standard_library())
+    registry, distance = (
+        MaterialX.UnitConverterRegistry.create(),
+        standard_library().getUnitTypeDef("distance"),
+    )
     registry.addUnitConverter(distance, MaterialX.LinearUnitConverter.create(distance))
     units.setUnitConverterRegistry(registry)
     generator.setUnitSystem(units)
     context.getOptions().targetDistanceUnit = "centimeter"
-    return generator.generate("skin", made.getMaterialNodes()[0], context).getSourceCode("pixel")
+    return generator.generate("skin", document.getMaterialNodes()[0], context).getSourceCode("pixel")

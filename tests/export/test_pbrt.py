@@ -1,4 +1,4 @@
-"""Skin for pbrt: what the numbers mean there, and a scene that its grammar takes."""
+"""Export to pbrt: meaning of the parameters, and scenes against pbrt's grammar."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def test_a_skin_comes_on_a_ball(tmp_path: Path) -> None:
 
 
 def test_a_head_comes_with_lights_and_camera(tmp_path: Path) -> None:
-    made = load_subject(write_rigged_head(tmp_path / "face.glb"))
-    assert made.scene is not None
+    subject = load_subject(write_rigged_head(tmp_path / "face.glb"))
+    assert subject.scene is not None
     lights = [
         PointLight(position=(0.0, 300.0, 900.0)),
         RectangleLight(position=(500.0, 0.0, 900.0)),
@@ -64,8 +64,8 @@ def test_a_head_comes_with_lights_and_camera(tmp_path: Path) -> None:
         DirectionalLight(direction=(0.0, -1.0, 0.0)),
         StripeLight(direction=(0.0, 0.0, -1.0)),
     ]
-    scene = Scene(made.scene.head, lights=lights, environment=Environment(name="uniform"))
-    lit = Subject(made.name, made.curve, made.albedo, made.model, made.tissue, scene)
+    scene = Scene(subject.scene.head, lights=lights, environment=Environment(name="uniform"))
+    lit = Subject(subject.name, subject.curve, subject.albedo, subject.model, subject.tissue, scene)
     with pytest.warns(DermisWarning, match="stripe"):
         export_skin(lit, "pbrt", tmp_path / "face.pbrt")
     found = read((tmp_path / "face.pbrt").read_text())

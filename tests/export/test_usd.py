@@ -1,4 +1,4 @@
-"""The target USD: files of each kind, with pictures, read back."""
+"""Export to USD: files of each kind, read back."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def test_a_skin_comes_on_a_ball(suffix: str, tmp_path: Path) -> None:
     shader = surface(stage)
     for name in ("subsurface_radius", "subsurface_radius_scale"):
         value = shader.GetInput(name).Get()
-        told = get_numbers(report.parameters, name)
-        assert ((value,) if len(told) == 1 else tuple(value)) == pytest.approx(told)
+        exported = get_numbers(report.parameters, name)
+        assert ((value,) if len(exported) == 1 else tuple(value)) == pytest.approx(exported)
 
 
 def test_a_person_comes_in_one_package(tmp_path: Path) -> None:
@@ -56,14 +56,14 @@ def test_a_person_comes_in_one_package(tmp_path: Path) -> None:
     ]
     assert used and all(used)
     uv = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").ComputeFlattened())
-    eye = np.repeat(mesh_faces_of(stage, "left_eye"), np.array(mesh.GetFaceVertexCountsAttr().Get()))
+    eye = np.repeat(material_faces(stage, "left_eye"), np.array(mesh.GetFaceVertexCountsAttr().Get()))
     assert surface(stage, "left_eye").GetInput("base_color").HasConnectedSource()
     middle = np.hypot(*(uv[eye] - 0.5).T)  # of the picture, which shows the iris
     assert middle.min() < 0.05 and 0.48 < middle.max() < 0.5
 
 
-def mesh_faces_of(stage: Any, material: str) -> Any:
-    """Which faces a material is bound to."""
+def material_faces(stage: Any, material: str) -> Any:
+    """Return the mask of faces to which a material is bound."""
     counts = UsdGeom.Mesh(stage.GetPrimAtPath("/human/mesh")).GetFaceVertexCountsAttr().Get()
     found = np.zeros(len(counts), bool)
     for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(stage.GetPrimAtPath("/human/mesh"))):

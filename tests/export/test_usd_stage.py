@@ -1,4 +1,4 @@
-"""A head in a USD stage: its points, what moves them, and what the libraries say of it."""
+"""USD stages of a head: points, rig, and checks by the USD and MaterialX libraries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ pytest.importorskip("pxr")
 pytest.importorskip("MaterialX")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
-from dermis.apps.export.targets.openpbr.document import library
+from dermis.apps.export.targets.openpbr.document import standard_library
 from dermis.apps.export.targets.openpbr.materials import OpenPbrMaterial, skin_material
 from dermis.apps.export.targets.usd.geometry import valid_names
 from dermis.apps.export.targets.usd.stage import build_stage
@@ -25,7 +25,7 @@ from dermis.scene.heads import load_head
 from dermis.scene.skin import Skin
 
 HOSTILE = '"; import os\n)</x>@#usda {'
-SINGLE_MM = 1e-3  # places in single precision, in metres
+SINGLE_MM = 1e-3  # error of positions that are stored in metres in single precision
 
 
 @pytest.fixture(scope="module")
@@ -34,18 +34,20 @@ def rigged(tmp_path_factory: pytest.TempPathFactory) -> Head:
 
 
 def mesh_materials(head: Head, name: str = "skin") -> Mapping[int, OpenPbrMaterial]:
-    look = skin_material(name, Skin(), (1e-3, 4e-4, 2e-4), (0.4, 0.2, 0.1), ["colour", "roughness", "normal"])
-    return dict.fromkeys(range(len(head.mesh.materials)), look)
+    material = skin_material(
+        name, Skin(), (1e-3, 4e-4, 2e-4), (0.4, 0.2, 0.1), ["colour", "roughness", "normal"]
+    )
+    return dict.fromkeys(range(len(head.mesh.materials)), material)
 
 
-def written(head: Head, path: Path, name: str = "head") -> Any:
-    made = build_stage(head, name, mesh_materials(head, name), "a_")
-    made.GetRootLayer().Export(str(path))
+def write_stage(head: Head, path: Path, name: str = "head") -> Any:
+    stage = build_stage(head, name, mesh_materials(head, name), "a_")
+    stage.GetRootLayer().Export(str(path))
     return Usd.Stage.Open(str(path))
 
 
 def test_points_come_back_in_metres(rigged: Head, tmp_path: Path) -> None:
-    stage = written(rigged, tmp_path / "head.usdc")
+    stage = write_stage(rigged, tmp_path / "head.usdc")
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0 and UsdGeom.GetStageUpAxis(stage) == "Y"
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh"))
     points = np.array(mesh.GetPointsAttr().Get())
@@ -56,11 +58,11 @@ def test_points_come_back_in_metres(rigged: Head, tmp_path: Path) -> None:
     corner = np.array(mesh.GetFaceVertexIndicesAttr().Get())
     assert len(uv) == len(corner) == sum(mesh.GetFaceVertexCountsAttr().Get())
     mine_uv = rigged.mesh.uv * [1.0, -1.0] + [0.0, 1.0]
-    assert places_of(corner, uv) == places_of(rigged.mesh.point, mine_uv)
+    assert point_uv_set(corner, uv) == point_uv_set(rigged.mesh.point, mine_uv)
 
 
-def places_of(points: Any, uv: Any) -> set[tuple[float, ...]]:
-    """Points with their uv."""
+def point_uv_set(points: Any, uv: Any) -> set[tuple[float, ...]]:
+    """Return the set of points with their texture coordinates."""
     return set(map(tuple, np.round(np.column_stack([points, np.array(uv)]), 5).tolist()))
 
 
@@ -72,7 +74,7 @@ def test_quads_are_whole_again() -> None:
 
 
 def test_targets_and_bones_move_it_as_ours_do(rigged: Head, tmp_path: Path) -> None:
-    stage = written(rigged, tmp_path / "head.usda")
+    stage = write_stage(rigged, tmp_path / "head.usda")
     rest = UsdSkel.Animation(stage.GetPrimAtPath("/head/skeleton/rest"))
     names = list(rest.GetBlendShapesAttr().Get())
     weights = {"jawOpen": 0.7, "browInnerUp": 0.4}
@@ -84,17 +86,17 @@ def test_targets_and_bones_move_it_as_ours_do(rigged: Head, tmp_path: Path) -> N
     transforms[number] = turn * transforms[number]
     rest.SetTransforms(transforms)
     UsdSkel.BakeSkinning(Usd.PrimRange(stage.GetPrimAtPath("/head")))
-    moved = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetPointsAttr().Get(0.0))
+    deformed = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetPointsAttr().Get(0.0))
     pose = Pose(weights=weights, bones={"head": (0.0, 25.0, 0.0)})
     expected = rigged.control.points_mm(pose.motion(rigged.control))
     assert np.abs(expected - rigged.control.points_mm(rigged.control.rest)).max() > 10.0
-    np.testing.assert_allclose(1000.0 * moved, expected, atol=10 * SINGLE_MM)
+    np.testing.assert_allclose(1000.0 * deformed, expected, atol=10 * SINGLE_MM)
 
 
 def test_validators_find_nothing(rigged: Head, tmp_path: Path) -> None:
     for role in ("colour", "roughness", "normal"):
         (tmp_path / f"a_{role}.png").write_bytes(b"")
-    stage = written(rigged, tmp_path / "head.usda", HOSTILE)
+    stage = write_stage(rigged, tmp_path / "head.usda", HOSTILE)
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     found = UsdValidation.ValidationContext(validators).Validate(stage)
     # usd-core comes without MaterialX's plug-in, so that it knows none of its nodes: the next test does.
@@ -103,7 +105,7 @@ def test_validators_find_nothing(rigged: Head, tmp_path: Path) -> None:
 
 
 def test_nodes_are_materialx_own(rigged: Head, tmp_path: Path) -> None:
-    stage = written(rigged, tmp_path / "head.usda")
+    stage = write_stage(rigged, tmp_path / "head.usda")
     types = {"color3f": "color3", "float2": "vector2", "float3": "vector3", "asset": "filename"}
     kinds = set()
     for prim in stage.Traverse():
@@ -111,19 +113,19 @@ def test_nodes_are_materialx_own(rigged: Head, tmp_path: Path) -> None:
         if kind is None or not kind.startswith("ND_"):
             continue
         kinds.add(kind)
-        node = library().getNodeDef(kind)
+        node = standard_library().getNodeDef(kind)
         for attribute in prim.GetAttributes():
             name = attribute.GetName()
             if name.startswith("inputs:"):
                 known = node.getActiveInput(name.removeprefix("inputs:"))
                 assert known is not None, (kind, name)
-                told = str(attribute.GetTypeName())
-                assert types.get(told, told) == known.getType(), (kind, name)
+                usd_type = str(attribute.GetTypeName())
+                assert types.get(usd_type, usd_type) == known.getType(), (kind, name)
     assert {"ND_open_pbr_surface_surfaceshader", "ND_image_color3", "ND_normalmap_float"} <= kinds
 
 
 def test_a_hostile_name_is_a_name_alone(rigged: Head, tmp_path: Path) -> None:
-    stage = written(rigged, tmp_path / "head.usda", HOSTILE)
+    stage = write_stage(rigged, tmp_path / "head.usda", HOSTILE)
     top = stage.GetDefaultPrim()
     assert top.GetDisplayName() == HOSTILE and Sdf.Path.IsValidIdentifier(top.GetName())
     assert [prim.GetName() for prim in top.GetChildren()] == ["mesh", "skeleton", "materials"]

@@ -1,4 +1,4 @@
-"""Numbers and maps as a page holds them: what is undone is what was there."""
+"""Packing of buffers and maps of the web page, and its inverse."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def test_differences_and_planes_can_be_undone() -> None:
 
 def test_letters_of_seven_bits_stand_in_a_page() -> None:
     data = np.random.default_rng(0).integers(0, 256, 4096, np.uint8).tobytes()
-    letters = encode_seven_bits(data)
-    assert not {"\0", "\r", "<"} & set(letters)
-    bits = "".join(f"{ord(one) & 127:07b}" for one in letters)
+    text = encode_seven_bits(data)
+    assert not {"\0", "\r", "<"} & set(text)
+    bits = "".join(f"{ord(one) & 127:07b}" for one in text)
     assert bytes(int(bits[k : k + 8], 2) for k in range(0, 8 * len(data), 8)) == data
 
 

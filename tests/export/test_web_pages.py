@@ -1,4 +1,4 @@
-"""Pages with a head: what they may load, words of users, the numbers, and that browsers draw them."""
+"""Pages with a JavaScript library: policy, escaping, parameters, and rendering in a browser."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.base.errors import DermisError
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-WICKED = '"; import os</script><script>alert(1)</script>$head'
-NODE = {"babylon": "DERMIS_BABYLON", "three": "DERMIS_THREE"}
+HOSTILE = '"; import os</script><script>alert(1)</script>$head'
+LIBRARY_VARIABLES = {"babylon": "DERMIS_BABYLON", "three": "DERMIS_THREE"}
 
 
 @pytest.fixture(scope="module")
@@ -40,21 +40,21 @@ def target(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def text_of(subject: Subject, target: str, folder: Path) -> str:
+def page_text(subject: Subject, target: str, folder: Path) -> str:
     export_skin(subject, target, folder / "page.html")
     return (folder / "page.html").read_text("utf-8")
 
 
 def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp_path: Path) -> None:
-    text = text_of(skin, target, tmp_path)
+    text = page_text(skin, target, tmp_path)
     policy = re.search(r'Security-Policy" content="([^"]*)"', text)
     assert policy is not None
     allowed = policy[1].replace("&#x27;", "'")
     inside = re.findall(r'<script type="(?:module|importmap)">(.*?)</script>', text, re.DOTALL)
     assert inside and all(csp_hash(one) in allowed for one in inside)
     assert "unsafe" not in allowed and allowed.startswith("default-src 'none'")
-    known = TARGETS[target].with_variant(None)
-    urls = [one.url for one in known.library_files[known.versions[-1]]]  # type: ignore[attr-defined]
+    target_ = TARGETS[target].with_variant(None)
+    urls = [one.url for one in target_.library_files[target_.versions[-1]]]  # type: ignore[attr-defined]
     assert all(url in allowed for url in urls)
     assert text.count("sha384-") == len(urls) == len(set(re.findall(r"sha384-[\w+/]{64}", text)))
     assert set(re.findall(r"https?://[^/\"' ]+", text)) == {"https://cdn.jsdelivr.net"}
@@ -62,23 +62,25 @@ def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp
 
 def test_words_of_users_stay_words(target: str, tmp_path: Path) -> None:
     plain = load_subject("skin1")
-    named = Subject(WICKED, plain.curve, plain.albedo, plain.model, plain.tissue)
-    text = text_of(named, target, tmp_path)
+    named = Subject(HOSTILE, plain.curve, plain.albedo, plain.model, plain.tissue)
+    text = page_text(named, target, tmp_path)
     assert "<script>alert" not in text and "alert(1)" in text
     assert (
-        text.count("</script>") == text.count("<script") == text_of(plain, target, tmp_path).count("<script")
+        text.count("</script>")
+        == text.count("<script")
+        == page_text(plain, target, tmp_path).count("<script")
     )
 
 
 def test_the_page_holds_the_head_in_metres_and_the_parameters(
     skin: Subject, target: str, tmp_path: Path
 ) -> None:
-    text = text_of(skin, target, tmp_path)
+    text = page_text(skin, target, tmp_path)
     head = re.search(r'id="head">([^<]*)<', text)
-    told = re.search(r'id="settings">([^<]*)<', text)
-    assert head is not None and told is not None
+    settings_text = re.search(r'id="settings">([^<]*)<', text)
+    assert head is not None and settings_text is not None
     assert base64.b64decode(head[1]).startswith(b"glTF")
-    settings = json.loads(told[1])
+    settings = json.loads(settings_text[1])
     report = evaluate_export(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
     assert settings["skin"] == json.loads(
         json.dumps({r.name.rpartition(".")[2]: r.value for r in report.parameters})
@@ -112,12 +114,12 @@ def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> Non
 
 def test_three_spreads_nothing_and_says_so(skin: Subject) -> None:
     report = evaluate_export(skin, TARGETS["three"].with_variant(None), "0.187.0")
-    assert (report.error.edge > 0.45).all() and "Nothing spreads" in report.limitations
+    assert (report.error.edge > 0.45).all() and "no subsurface scattering" in report.limitations
 
 
 def test_a_library_of_another_version_is_refused_and_nothing_is_written(target: str, tmp_path: Path) -> None:
-    known = TARGETS[target].with_variant(None)
-    first = known.library_files[known.versions[-1]][0]  # type: ignore[attr-defined]
+    target_ = TARGETS[target].with_variant(None)
+    first = target_.library_files[target_.versions[-1]][0]  # type: ignore[attr-defined]
     file = tmp_path / first.package / first.path
     file.parent.mkdir(parents=True)
     file.write_text("alert(1)")
@@ -135,44 +137,46 @@ def test_an_embedded_script_does_not_end_early() -> None:
     assert "</script" not in escape_script('x = "</script><!--"').lower()
 
 
-def drawn(page: Path) -> NDArray[np.float64]:
-    """The page in Chromium, without network."""
+def screenshot(page: Path) -> NDArray[np.float64]:
+    """Return a screenshot of the page in Chromium, without network."""
     from playwright.sync_api import sync_playwright
 
-    faults: list[str] = []
+    errors: list[str] = []
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         one = browser.new_page(viewport={"width": 240, "height": 240}, offline=True)
-        one.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
         one.goto(page.as_uri())
         one.wait_for_selector("html[data-state]", state="attached", timeout=120_000)
         picture = np.asarray(Image.open(io.BytesIO(one.screenshot())).convert("RGB"), np.float64) / 255.0
         assert one.evaluate("document.documentElement.dataset.state") == "drawn"
         browser.close()
-    assert faults == []
+    assert errors == []
     return picture
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tmp_path: Path) -> None:
-    library = os.environ.get(NODE[target])
+    library = os.environ.get(LIBRARY_VARIABLES[target])
     if library is None:
-        pytest.skip(f"{NODE[target]} does not name the folder node_modules with the library")
+        pytest.skip(f"{LIBRARY_VARIABLES[target]} does not name the folder node_modules with the library")
     export_skin(skin, target, tmp_path / "page.html", library=library)
-    picture = drawn(tmp_path / "page.html")
+    picture = screenshot(tmp_path / "page.html")
     ball = picture[80:160, 100:140]
     assert (ball.mean(axis=(0, 1)) > 0.1).all() and ball[..., 0].mean() > 1.2 * ball[..., 2].mean()
     assert picture[200:, 200:].max() < 0.02
 
 
 def test_heads_are_seen_from_where_the_scene_is() -> None:
-    """Cameras are placed around the head's middle, which is not the origin of the file."""
+    """Cameras are placed relative to the centre of the head, which is not the origin of the file."""
     human = load_subject("human")
     assert human.scene is not None
-    where = page_camera(human.scene, human.scene.head.centre_mm)
+    exported = page_camera(human.scene, human.scene.head.centre_mm)
     centre = 1e-3 * np.array(human.scene.head.centre_mm)
     assert np.linalg.norm(centre) > 0.03
-    np.testing.assert_allclose(np.array(where["target"]) - centre, 1e-3 * np.array(human.scene.camera.target))
+    np.testing.assert_allclose(
+        np.array(exported["target"]) - centre, 1e-3 * np.array(human.scene.camera.target)
+    )
     babylon = TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(human, babylon.versions[-1])
-    assert babylon._settings(human, rows, babylon.versions[-1])["camera"] == where  # type: ignore[attr-defined]
+    assert babylon._settings(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]

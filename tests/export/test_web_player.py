@@ -1,4 +1,4 @@
-"""The page that plays frames: the same picture in Chromium, what runs again, hands, and what it may load."""
+"""The WebGPU page in Chromium: pictures, selection of passes, input, and policy."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ MODULES_FOLDER = Path(str(dermis.__file__)).parent / "apps/export/targets/web"
 SETTINGS = dermis.Settings(atlas=128, shadow_size=128, strands=False)
 SIDE = 96
 LIMIT = 0.005  # relative RMSE
-WICKED = "</script><script>alert(1)</script>"
+HOSTILE = "</script><script>alert(1)</script>"
 STATE = "document.documentElement.dataset.state"
 LINEAR = """async () => {
-  const page = dermis, frame = page.player.frame, device = page.made.device, [width, height] = frame.size;
+  const page = dermis, frame = page.player.frame, device = page.gpuScene.device, [width, height] = frame.size;
   const bytesPerRow = 16 * width;
   const buffer = device.createBuffer({ size: bytesPerRow * height, usage: 9 });
   const encoder = device.createCommandEncoder();
-  const texture = page.made.resource(frame.linear);
+  const texture = page.gpuScene.resource(frame.linear);
   encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow }, [width, height]);
   device.queue.submit([encoder.finish()]);
   await buffer.mapAsync(1);
@@ -48,8 +48,8 @@ LINEAR = """async () => {
 }"""
 
 
-class Shown(NamedTuple):
-    """A page in a browser, with what it holds, and a renderer whose maps are those that it decodes."""
+class OpenPage(NamedTuple):
+    """Page in a browser, with its scene and a renderer whose maps are those that the page decodes."""
 
     page: Any
     scene: dermis.Scene
@@ -57,20 +57,20 @@ class Shown(NamedTuple):
     sliders: tuple[Slider, ...]
 
     def linear(self) -> NDArray[np.float32]:
-        """(h, w, 3) what the page has drawn."""
+        """Return the linear picture (h, w, 3) that the page has drawn."""
         raw = base64.b64decode(self.page.evaluate(LINEAR))
         return np.frombuffer(raw, np.float32).reshape(SIDE, SIDE, 4)[..., :3]
 
-    def turn(self, script: str) -> list[str]:
-        """The stages that ran for a change."""
+    def run(self, script: str) -> list[str]:
+        """Run a script in the page and return the stages that were drawn for it."""
         self.page.evaluate(f"async () => {{ {script}; await dermis.idle(); }}")
         return list(self.page.evaluate("dermis.player.ran"))
 
     def error(self, scene: dermis.Scene) -> float:
-        """Relative RMSE against a scene."""
+        """Return the relative RMSE against a rendering of a scene."""
         settings = SETTINGS.model_copy(update={"size": (SIDE, SIDE)})
-        wanted = self.renderer.draw(scene, settings).linear()
-        return float(np.sqrt(((self.linear() - wanted) ** 2).mean() / (wanted**2).mean()))
+        expected = self.renderer.draw(scene, settings).linear()
+        return float(np.sqrt(((self.linear() - expected) ** 2).mean() / (expected**2).mean()))
 
 
 @pytest.fixture(scope="module")
@@ -84,48 +84,48 @@ def browser() -> Iterator[Any]:
         one.close()
 
 
-class Taken(NamedTuple):
-    """What a page holds, and the renderer that it was taken down with."""
+class CapturedPage(NamedTuple):
+    """Content of a page, and the renderer that captured it."""
 
-    made: PageContent
+    content: PageContent
     scene: dermis.Scene
     renderer: Renderer
     sliders: tuple[Slider, ...]
 
 
-def taken(scene: dermis.Scene, form: str, sliders: tuple[Slider, ...]) -> Taken:
+def capture_page(scene: dermis.Scene, form: str, sliders: tuple[Slider, ...]) -> CapturedPage:
     renderers: list[Renderer] = []
-    asked = PageRequest(
+    request = PageRequest(
         scene, sliders, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
     )
-    made = build_content(asked, lambda renderer, *_: renderers.append(renderer))
-    return Taken(made, scene, renderers[0], sliders)
+    content = build_content(request, lambda renderer, *_: renderers.append(renderer))
+    return CapturedPage(content, scene, renderers[0], sliders)
 
 
-def shown(browser: Any, one: Taken, folder: Path) -> Shown:
-    """A page, drawn once."""
+def open_page(browser: Any, one: CapturedPage, folder: Path) -> OpenPage:
+    """Return a page that has been drawn once."""
     file = folder / "head.html"
-    file.write_text(page_html(one.made, one.sliders, "head", ""), encoding="utf-8")
+    file.write_text(page_html(one.content, one.sliders, "head", ""), encoding="utf-8")
     page = browser.new_page(viewport={"width": SIDE, "height": SIDE}, offline=True)
     page.goto(file.as_uri())
     page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
     assert page.evaluate(f"{STATE} + document.getElementById('told').textContent") == "drawn"
-    return Shown(page, one.scene, one.renderer, one.sliders)
+    return OpenPage(page, one.scene, one.renderer, one.sliders)
 
 
 @pytest.fixture(scope="module")
-def rigged_taken(tmp_path_factory: pytest.TempPathFactory) -> Taken:
+def rigged_capture(tmp_path_factory: pytest.TempPathFactory) -> CapturedPage:
     file = write_rigged_head(tmp_path_factory.mktemp("rigged") / "rigged.glb")
     scene = dermis.Scene(dermis.load_head(file, subdivide=0))
-    return taken(scene, "gpu", scene_sliders(scene))
+    return capture_page(scene, "gpu", scene_sliders(scene))
 
 
 @pytest.fixture(scope="module")
-def rigged(browser: Any, rigged_taken: Taken, tmp_path_factory: pytest.TempPathFactory) -> Shown:
-    return shown(browser, rigged_taken, tmp_path_factory.mktemp("shown"))
+def rigged(browser: Any, rigged_capture: CapturedPage, tmp_path_factory: pytest.TempPathFactory) -> OpenPage:
+    return open_page(browser, rigged_capture, tmp_path_factory.mktemp("pages"))
 
 
-def test_a_browser_draws_the_same_picture(rigged: Shown) -> None:
+def test_a_browser_draws_the_same_picture(rigged: OpenPage) -> None:
     picture = rigged.linear()
     assert picture.mean() > 0.02
     assert rigged.error(rigged.scene) < LIMIT
@@ -135,14 +135,14 @@ def test_a_browser_draws_the_same_picture(rigged: Shown) -> None:
 def test_software_is_given_frames_of_its_own(browser: Any, name: str, tmp_path: Path) -> None:
     file = write_head(tmp_path / "head.obj")
     head = dermis.load_head(file if name == file.name else name, subdivide=0)
-    one = shown(browser, taken(dermis.Scene(head), "software", ()), tmp_path)
+    one = open_page(browser, capture_page(dermis.Scene(head), "software", ()), tmp_path)
     # The browser's rasteriser moves corners to sixteenths of a pixel: a sample more or less at outlines.
     assert one.error(one.scene) < 3.0 * LIMIT
     one.page.close()
 
 
-def test_a_camera_that_turns_leaves_the_light_alone(rigged: Shown) -> None:
-    ran = rigged.turn("dermis.state.yaw = 0.4; dermis.state.zoom = 0.8; dermis.touch()")
+def test_a_camera_that_turns_leaves_the_light_alone(rigged: OpenPage) -> None:
+    ran = rigged.run("dermis.state.yaw = 0.4; dermis.state.zoom = 0.8; dermis.touch()")
     assert set(ran) == {"visibility", "shade", "post"}
     x, y, z = np.subtract(rigged.scene.camera.position, rigged.scene.camera.target)
     around, level = np.arctan2(x, z) + 0.4, np.hypot(x, z)
@@ -152,12 +152,12 @@ def test_a_camera_that_turns_leaves_the_light_alone(rigged: Shown) -> None:
         update={"position": position, "frame_mm": 0.8 * rigged.scene.camera.frame_mm}
     )
     assert rigged.error(replace(rigged.scene, camera=camera)) < LIMIT
-    rigged.turn("dermis.state.yaw = 0; dermis.state.zoom = 1; dermis.touch()")
+    rigged.run("dermis.state.yaw = 0; dermis.state.zoom = 1; dermis.touch()")
     assert rigged.error(rigged.scene) < LIMIT
 
 
-def test_a_light_is_dragged_with_its_shadows(rigged: Shown) -> None:
-    ran = rigged.turn("dermis.state.lightYaw = 0.9; dermis.touch()")
+def test_a_light_is_dragged_with_its_shadows(rigged: OpenPage) -> None:
+    ran = rigged.run("dermis.state.lightYaw = 0.9; dermis.touch()")
     assert "shadows" in ran and "visibility" not in ran
     key, *others = rigged.scene.lights
     x, y, z = np.subtract(key.position, key.target)  # type: ignore[union-attr]
@@ -165,36 +165,36 @@ def test_a_light_is_dragged_with_its_shadows(rigged: Shown) -> None:
     position = tuple(np.array([level * np.sin(around), y, level * np.cos(around)]) + key.target)  # type: ignore[union-attr]
     lights = (key.model_copy(update={"position": position}), *others)
     assert rigged.error(replace(rigged.scene, lights=lights)) < LIMIT
-    rigged.turn("dermis.state.lightYaw = 0; dermis.touch()")
+    rigged.run("dermis.state.lightYaw = 0; dermis.touch()")
 
 
-def test_a_dial_is_exact_at_its_nodes(rigged: Shown) -> None:
+def test_a_dial_is_exact_at_its_nodes(rigged: OpenPage) -> None:
     rough = next(one for one in rigged.sliders if one.name == "roughness")
-    ran = rigged.turn(f"dermis.state.dials.roughness = {rough.values[-1]}; dermis.touch()")
+    ran = rigged.run(f"dermis.state.dials.roughness = {rough.values[-1]}; dermis.touch()")
     assert "shade" in ran and "stretch" not in ran
     scene = rough.scenes[-1]
     assert scene is not None and rigged.error(scene) < LIMIT < rigged.error(rigged.scene)
-    assert rigged.turn(f"dermis.state.dials.roughness = {rough.default_value}; dermis.touch()")
-    assert rigged.turn("dermis.touch()") == []
+    assert rigged.run(f"dermis.state.dials.roughness = {rough.default_value}; dermis.touch()")
+    assert rigged.run("dermis.touch()") == []
 
 
-def test_memory_stays_flat_in_motion(rigged: Shown) -> None:
-    made = "dermis.made.resources.filter(Boolean).length"
-    before = rigged.page.evaluate(made)
-    rigged.turn(
+def test_memory_stays_flat_in_motion(rigged: OpenPage) -> None:
+    count = "dermis.gpuScene.resources.filter(Boolean).length"
+    before = rigged.page.evaluate(count)
+    rigged.run(
         "for (let k = 0; k < 8; k++) { dermis.state.yaw += 0.01; dermis.touch(); await dermis.idle(); }"
     )
-    assert rigged.page.evaluate(made) == before
-    rigged.turn("dermis.state.yaw = 0; dermis.touch()")
+    assert rigged.page.evaluate(count) == before
+    rigged.run("dermis.state.yaw = 0; dermis.touch()")
 
 
-def test_a_lost_device_is_opened_again(rigged: Shown) -> None:
+def test_a_lost_device_is_opened_again(rigged: OpenPage) -> None:
     rigged.page.evaluate("dermis.reopen()")
     assert rigged.error(rigged.scene) < LIMIT
 
 
-def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_taken: Taken) -> None:
-    text = page_html(rigged_taken.made, rigged_taken.sliders, WICKED, WICKED)
+def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_capture: CapturedPage) -> None:
+    text = page_html(rigged_capture.content, rigged_capture.sliders, HOSTILE, HOSTILE)
     policy = html.unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
     script, style = (
         re.search(rf"<{tag}>(.*?)</", text, re.DOTALL)[1] for tag in ('script type="module"', "style")

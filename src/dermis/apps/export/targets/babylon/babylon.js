@@ -1,22 +1,22 @@
-// The head in Babylon.js, with its screen-space diffusion below the skin.
+// Head in Babylon.js, with its screen-space subsurface scattering.
 const colour = ([r, g, b]) => new BABYLON.Color3(r, g, b);
-const place = ([x, y, z]) => new BABYLON.Vector3(x, y, z);
+const vector = ([x, y, z]) => new BABYLON.Vector3(x, y, z);
 
 const addCamera = (scene) => {
   const {position, target, up, fov} = settings.camera;
-  const camera = new BABYLON.ArcRotateCamera("camera", 0, 0, 1, place(target), scene);
-  camera.upVector = place(up);
-  camera.setPosition(place(position));
+  const camera = new BABYLON.ArcRotateCamera("camera", 0, 0, 1, vector(target), scene);
+  camera.upVector = vector(up);
+  camera.setPosition(vector(position));
   Object.assign(camera, {fov, minZ: 0.02 * camera.radius, maxZ: 20 * camera.radius, wheelDeltaPercentage: 0.01});
   camera.lowerRadiusLimit = 0.2 * camera.radius;
   camera.attachControl(canvas, true);
 };
 
 const addLight = ({direction, irradiance}, scene) => {
-  const most = Math.max(...irradiance, 1e-6);
-  const light = new BABYLON.DirectionalLight("light", place(direction).normalize(), scene);
-  light.intensity = most;
-  light.diffuse = light.specular = colour(irradiance.map((x) => x / most));
+  const intensity = Math.max(...irradiance, 1e-6);
+  const light = new BABYLON.DirectionalLight("light", vector(direction).normalize(), scene);
+  light.intensity = intensity;
+  light.diffuse = light.specular = colour(irradiance.map((x) => x / intensity));
   return light;
 };
 
@@ -29,28 +29,28 @@ const addShadow = (light, scene) => {
   }
 };
 
-const scatterBelow = (skins, scene) => {
-  const below = scene.enableSubSurfaceForPrePass();
-  if (!below) { throw new Error("this device cannot draw into several float textures at once"); }
-  below.metersPerUnit = settings.skin.metersPerUnit;
+const enableScattering = (skins, scene) => {
+  const scattering = scene.enableSubSurfaceForPrePass();
+  if (!scattering) { throw new Error("this device cannot render to several float textures at once"); }
+  scattering.metersPerUnit = settings.skin.metersPerUnit;
   for (const skin of skins) {
     skin.subSurface.isScatteringEnabled = true;
     skin.subSurface.scatteringDiffusionProfile = colour(settings.skin.scatteringDiffusionProfile);
   }
-  return below;
+  return scattering;
 };
 
-const addPanel = (below, skins, light) => {
-  const rough = skins.map((skin) => skin.roughness), {intensity} = light;
+const addPanel = (scattering, skins, light) => {
+  const roughness = skins.map((skin) => skin.roughness), {intensity} = light;
   addSwitch("scattering", true, (on) => skins.forEach((skin) => { skin.subSurface.isScatteringEnabled = on; }));
-  addSlider("scattering width", 0.25, 4, 1, (x) => { below.metersPerUnit = settings.skin.metersPerUnit / x; });
-  addUsual(
+  addSlider("scattering width", 0.25, 4, 1, (x) => { scattering.metersPerUnit = settings.skin.metersPerUnit / x; });
+  addCommonSliders(
     {
       direction: light.direction.asArray(),
-      brighten: (x) => { light.intensity = x * intensity; },
-      turn: (way) => { light.direction = place(way); },
+      scaleIntensity: (x) => { light.intensity = x * intensity; },
+      setDirection: (direction) => { light.direction = vector(direction); },
     },
-    {roughen: (x) => skins.forEach((skin, i) => { skin.roughness = Math.min(1, x * rough[i]); })},
+    {scaleRoughness: (x) => skins.forEach((skin, i) => { skin.roughness = Math.min(1, x * roughness[i]); })},
   );
 };
 
@@ -66,10 +66,10 @@ const drawHead = async () => {
   lights.forEach((light) => addShadow(light, scene));
   scene.materials.forEach((material) => { material.maxSimultaneousLights = lights.length; });
   const skins = scene.materials.filter(isSkin);
-  const below = scatterBelow(skins, scene);
+  const scattering = enableScattering(skins, scene);
   if (settings.smooth) { new BABYLON.FxaaPostProcess("smooth", 1, scene.activeCamera); }
   await scene.whenReadyAsync();
-  addPanel(below, skins, lights[0]);
+  addPanel(scattering, skins, lights[0]);
   engine.runRenderLoop(() => scene.render());
   addEventListener("resize", () => engine.resize());
   for (let frame = 0; frame < settings.warm_frames; frame++) {

@@ -1,9 +1,9 @@
-// What both pages have: the settings, the head's bytes, the panel and messages.
+// Functions of all pages with a JavaScript library: settings, head, panel and messages.
 const canvas = document.getElementById("picture");
 const settings = JSON.parse(document.getElementById("settings").textContent);
 
-const tell = (words, state) => {
-  document.getElementById("told").textContent = words;
+const showMessage = (message, state) => {
+  document.getElementById("told").textContent = message;
   document.documentElement.dataset.state = state;
 };
 
@@ -15,53 +15,55 @@ const readHead = () => Uint8Array.from(atob(document.getElementById("head").text
 
 const isSkin = (material) => /skin/i.test(material.name);
 
-// The first light from another side [degrees around and upwards]: the way in which it travels.
-const turnedDirection = (around, up) => {
-  const [a, b] = [around * Math.PI / 180, up * Math.PI / 180];
+// Return the direction in which light travels from an azimuth and elevation [degrees].
+const directionFrom = (azimuth, elevation) => {
+  const [a, b] = [azimuth * Math.PI / 180, elevation * Math.PI / 180];
   return [-Math.sin(a) * Math.cos(b), -Math.sin(b), -Math.cos(a) * Math.cos(b)];
 };
 
-const sideOf = ([x, y, z]) => [
+// Return the azimuth and elevation [degrees] from which light travels in a direction.
+const anglesOf = ([x, y, z]) => [
   Math.atan2(-x, -z) * 180 / Math.PI, Math.asin(-y / Math.hypot(x, y, z)) * 180 / Math.PI];
 
-const addSlider = (words, least, most, value, change) => {
+const addSlider = (text, min, max, value, change) => {
   const label = document.createElement("label"), slider = document.createElement("input");
-  Object.assign(slider, {type: "range", min: least, max: most, step: (most - least) / 200});
+  Object.assign(slider, {type: "range", min, max, step: (max - min) / 200});
   slider.value = value;
   slider.addEventListener("input", () => change(Number(slider.value)));
-  label.append(words, slider);
+  label.append(text, slider);
   document.getElementById("panel").append(label);
 };
 
-const addSwitch = (words, value, change) => {
+const addSwitch = (text, value, change) => {
   const label = document.createElement("label"), box = document.createElement("input");
   Object.assign(box, {type: "checkbox", checked: value});
   box.addEventListener("change", () => change(box.checked));
-  label.append(box, ` ${words}`);
+  label.append(box, ` ${text}`);
   document.getElementById("panel").append(label);
 };
 
-// light: {direction: [x, y, z], brighten(factor), turn([x, y, z])}; skin: {roughen(factor)}
-const addUsual = (light, skin) => {
-  let [around, up] = sideOf(light.direction);
-  const turn = () => light.turn(turnedDirection(around, up));
-  addSlider("light from the side", -180, 180, around, (x) => { around = x; turn(); });
-  addSlider("light from above", -85, 85, up, (x) => { up = x; turn(); });
-  addSlider("brightness", 0, 2, 1, light.brighten);
-  addSlider("roughness", 0.3, 2, 1, skin.roughen);
+// Add the sliders of all pages and show the panel.
+// light: {direction: [x, y, z], scaleIntensity(factor), setDirection([x, y, z])}; skin: {scaleRoughness(factor)}
+const addCommonSliders = (light, skin) => {
+  let [azimuth, elevation] = anglesOf(light.direction);
+  const update = () => light.setDirection(directionFrom(azimuth, elevation));
+  addSlider("light azimuth", -180, 180, azimuth, (x) => { azimuth = x; update(); });
+  addSlider("light elevation", -85, 85, elevation, (x) => { elevation = x; update(); });
+  addSlider("light intensity", 0, 2, 1, light.scaleIntensity);
+  addSlider("roughness", 0.3, 2, 1, skin.scaleRoughness);
   document.getElementById("panel").hidden = false;
 };
 
 const start = async (draw) => {
   if (!hasWebGl()) {
-    tell("This browser has no WebGL 2, which draws the head: turn on hardware acceleration, or use another one.", "refused");
+    showMessage("This page needs WebGL 2: enable hardware acceleration, or use another browser.", "refused");
     return;
   }
   try {
     await draw();
-    tell("", "drawn");
-  } catch (fault) {
-    console.error(fault);
-    tell(`The head could not be drawn: ${fault.message ?? fault}`, "refused");
+    showMessage("", "drawn");
+  } catch (error) {
+    console.error(error);
+    showMessage(`The head could not be drawn: ${error.message ?? error}`, "refused");
   }
 };

@@ -1,9 +1,9 @@
-// The head in three.js, which spreads no light below a surface.
+// Head in three.js, which has no subsurface scattering.
 const load = async () => {
   try {
     return await Promise.all([import("three"), import("three/orbit"), import("three/gltf")]);
-  } catch (fault) {
-    throw new Error(`${settings.no_library} (${fault.message})`);
+  } catch (error) {
+    throw new Error(`${settings.no_library} (${error.message})`);
   }
 };
 
@@ -19,25 +19,25 @@ const addCamera = (THREE, OrbitControls) => {
   return {camera, controls};
 };
 
-// radius : of a ball around the head, which shadows are drawn of [m]
+// center, radius : ball that encloses the head, and that the shadow map covers [m]
 const addLight = (THREE, scene, {direction, irradiance}, {center, radius}) => {
-  const most = Math.max(...irradiance, 1e-6);
-  const light = new THREE.DirectionalLight(new THREE.Color(...irradiance.map((x) => x / most)), most);
-  const turn = (way) => {
-    const from = new THREE.Vector3(...way).normalize().multiplyScalar(-2 * radius);
-    light.position.copy(center).add(from);
+  const intensity = Math.max(...irradiance, 1e-6);
+  const light = new THREE.DirectionalLight(new THREE.Color(...irradiance.map((x) => x / intensity)), intensity);
+  const setDirection = (vector) => {
+    const offset = new THREE.Vector3(...vector).normalize().multiplyScalar(-2 * radius);
+    light.position.copy(center).add(offset);
     light.target.position.copy(center);
   };
-  turn(direction);
+  setDirection(direction);
   light.castShadow = true;
   light.shadow.mapSize.setScalar(settings.shadow_side);
   Object.assign(light.shadow.camera, {left: -radius, right: radius, top: radius, bottom: -radius, near: 0.5 * radius, far: 4 * radius});
   Object.assign(light.shadow, {bias: -0.0005, normalBias: 0.002});
   scene.add(light, light.target);
-  return {light, direction, turn, brighten: (x) => { light.intensity = x * most; }};
+  return {light, direction, setDirection, scaleIntensity: (x) => { light.intensity = x * intensity; }};
 };
 
-// A physical material, which alone has an index of refraction, for what the file calls skin.
+// Replace skin materials by physical ones, which have an index of refraction.
 const skinMaterials = (THREE, head) => {
   const skins = new Map();
   head.traverse((one) => {
@@ -48,8 +48,8 @@ const skinMaterials = (THREE, head) => {
     if (!skins.has(one.material)) {
       const {ior, specularIntensity, transmission} = settings.skin;
       const {color, map, normalMap, normalScale, roughness, roughnessMap, name} = one.material;
-      const told = {color, map, normalMap, normalScale, roughness, roughnessMap, name, metalness: 0};
-      skins.set(one.material, new THREE.MeshPhysicalMaterial({...told, ior, specularIntensity, transmission}));
+      const common = {color, map, normalMap, normalScale, roughness, roughnessMap, name, metalness: 0};
+      skins.set(one.material, new THREE.MeshPhysicalMaterial({...common, ior, specularIntensity, transmission}));
     }
     one.material = skins.get(one.material);
   });
@@ -67,15 +67,15 @@ const drawHead = async () => {
   scene.add(head);
   const ball = new THREE.Box3().setFromObject(head).getBoundingSphere(new THREE.Sphere());
   const lights = settings.lights.map((light) => addLight(THREE, scene, light, ball));
-  const skins = skinMaterials(THREE, head), rough = skins.map((skin) => skin.roughness);
-  const fit = () => {
+  const skins = skinMaterials(THREE, head), roughness = skins.map((skin) => skin.roughness);
+  const resize = () => {
     renderer.setSize(innerWidth, innerHeight, false);
     camera.aspect = innerWidth / innerHeight;
     camera.updateProjectionMatrix();
   };
-  fit();
-  addEventListener("resize", fit);
-  addUsual(lights[0], {roughen: (x) => skins.forEach((skin, i) => { skin.roughness = Math.min(1, x * rough[i]); })});
+  resize();
+  addEventListener("resize", resize);
+  addCommonSliders(lights[0], {scaleRoughness: (x) => skins.forEach((skin, i) => { skin.roughness = Math.min(1, x * roughness[i]); })});
   await renderer.compileAsync(scene, camera);
   renderer.setAnimationLoop(() => { controls.update(); renderer.render(scene, camera); });
   for (let frame = 0; frame < settings.warm_frames; frame++) {

@@ -1,7 +1,7 @@
-// Resources, pipelines and bind groups as the file describes them, in WebGPU's own words.
+// Creation of the resources, pipelines and bind groups that the file describes.
 
 import { makeSlot } from "./graph.js";
-import { unpacked } from "./packed.js";
+import { unpackRun } from "./packed.js";
 
 /** @typedef {import("./graph.js").Slot} Slot */
 /** @typedef {import("./packed.js").Run} Run */
@@ -9,7 +9,7 @@ import { unpacked } from "./packed.js";
  * @typedef {{kind: "buffer", size: number, usage: number, scratch?: boolean}
  *     | {kind: "texture", format: GPUTextureFormat, size: number[], mips: number, usage: number, scratch?: boolean}
  *     | {kind: "view", of: number, part: [number, number]}
- *     | {kind: "sampler", options: GPUSamplerDescriptor}} Described
+ *     | {kind: "sampler", options: GPUSamplerDescriptor}} ResourceDescription
  */
 /**
  * @typedef {{name: string, shader: number, constants: Record<string, number>,
@@ -21,16 +21,16 @@ import { unpacked } from "./packed.js";
  *     written: [number, number] | null, unit: number}} Pass
  */
 /**
- * What a node of a dial changes: record or pass, first word, and blob of differences.
+ * Changes at a node of a slider: number of the record or pass, first word, and byte run of the differences.
  * @typedef {{records: number[][], written: number[][]}} Change
  */
 /**
  * @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, linear: number,
  *     size: number[], moving: boolean, views: Record<string, number>, dials: Record<string, (Change | null)[]>}} Frame
  */
-/** A layer of a map: its picture, the blob of its curves, and how many channels are a colour. @typedef {number[]} Layer */
+/** Layer of a map: number of its picture, byte run of its value curves, number of colour channels. @typedef {number[]} Layer */
 /**
- * @typedef {{shaders: string[], programs: Program[], resources: Described[],
+ * @typedef {{shaders: string[], programs: Program[], resources: ResourceDescription[],
  *     contents: Record<string, number[]>, frames: Frame[], halved: Record<string, Pass[]>,
  *     maps: Record<string, Layer[][]>, hands: import("./camera.js").Hands,
  *     colours: {map: number, dials: Record<string, (Layer | null)[]>},
@@ -41,20 +41,20 @@ import { unpacked } from "./packed.js";
 /** @type {Record<string, number>} */
 const TEXEL_BYTES = { r: 1, rg: 2, rgba: 4 };
 
-/** @param {string} format as "rgba16float" */
-export function texelBytes(format) {
+/** @param {string} format such as "rgba16float" */
+export function bytesPerTexel(format) {
     if (format === "depth32float") return 4;
     const [, channels, bits] = /** @type {RegExpMatchArray} */ (format.match(/^(r|rg|rgba)(8|16|32)/));
     return (TEXEL_BYTES[channels] * Number(bits)) / 8;
 }
 
-/** Everything of a file on one device. */
-export class Made {
+/** Resources and pipelines of a file on one device, which are created when they are first used. */
+export class GpuScene {
     /** @param {GPUDevice} device @param {Scene} scene */
     constructor(device, scene) {
         this.device = device;
         this.scene = scene;
-        /** @type {Store} what it is filled from, which comes after what is compiled */
+        /** @type {Store} contents of the resources, which are read after compilation has started */
         this.store = { blobs: [], data: new Uint8Array(0), pictures: [] };
         /** @type {any[]} */
         this.resources = [];
@@ -72,7 +72,7 @@ export class Made {
 
     /** @param {number} blob */
     bytes(blob) {
-        return unpacked(this.store.data, this.store.blobs, blob);
+        return unpackRun(this.store.data, this.store.blobs, blob);
     }
 
     /** @param {number} blob */
@@ -81,21 +81,21 @@ export class Made {
         return /** @type {Float32Array} */ (this.changes.get(blob));
     }
 
-    /** A resource, made and filled when it is first asked for. @param {number} number @returns {any} */
+    /** Return a resource, which is created and filled on first use. @param {number} number @returns {any} */
     resource(number) {
-        return (this.resources[number] ??= this.#make(number));
+        return (this.resources[number] ??= this.#create(number));
     }
 
-    /** What a resource holds. @param {number} number @returns {Slot} */
+    /** Return the state of the content of a resource. @param {number} number @returns {Slot} */
     slot(number) {
-        const described = this.scene.resources[number];
-        const parent = described.kind === "view" ? this.slot(described.of) : null;
-        const scratch = parent ? parent.scratch : "scratch" in described && Boolean(described.scratch);
+        const description = this.scene.resources[number];
+        const parent = description.kind === "view" ? this.slot(description.of) : null;
+        const scratch = parent ? parent.scratch : "scratch" in description && Boolean(description.scratch);
         return (this.slots[number] ??= makeSlot(parent, scratch));
     }
 
     /** @param {number} number */
-    #make(number) {
+    #create(number) {
         const one = this.scene.resources[number];
         if (one.kind === "sampler") return this.device.createSampler(one.options);
         if (one.kind === "buffer") return this.#buffer(number, one);
@@ -107,24 +107,24 @@ export class Made {
 
     /** @param {number} number @param {{size: number, usage: number}} one */
     #buffer(number, { size, usage }) {
-        const made = this.device.createBuffer({ size, usage });
+        const created = this.device.createBuffer({ size, usage });
         const [blob] = this.scene.contents[number] ?? [];
-        if (blob !== undefined) this.device.queue.writeBuffer(made, 0, this.bytes(blob));
-        return made;
+        if (blob !== undefined) this.device.queue.writeBuffer(created, 0, this.bytes(blob));
+        return created;
     }
 
     /** @param {number} number @param {{format: GPUTextureFormat, size: number[], mips: number, usage: number}} one */
     #texture(number, { format, size, mips, usage }) {
-        const made = this.device.createTexture({ format, size, mipLevelCount: mips, usage });
+        const created = this.device.createTexture({ format, size, mipLevelCount: mips, usage });
         const blobs = this.scene.contents[number] ?? [];
         blobs.forEach((blob, mip) => {
-            if (blob < 0) return; // a picture
+            if (blob < 0) return; // filled from a picture
             const [width, height] = size.slice(0, 2).map((side) => Math.max(1, side >> mip));
-            const layout = { bytesPerRow: width * texelBytes(format), rowsPerImage: height };
-            const to = { texture: made, mipLevel: mip };
+            const layout = { bytesPerRow: width * bytesPerTexel(format), rowsPerImage: height };
+            const to = { texture: created, mipLevel: mip };
             this.device.queue.writeTexture(to, this.bytes(blob), layout, [width, height, size[2]]);
         });
-        return made;
+        return created;
     }
 
     /** @param {number} number of a program */
@@ -141,9 +141,9 @@ export class Made {
         return /** @type {Promise<any>} */ (this.pipelines.get(number));
     }
 
-    /** Begin to compile what maps and a frame need, in that order. @param {Frame} frame */
+    /** Start to compile the pipelines of maps and of a frame, in this order. @param {Frame} frame */
     compile(frame) {
-        for (const one of [...Object.values(this.scene.halved).flat(), ...frame.passes]) if (!one.written) this.pipeline(one.program).catch(() => {}); // told where it is drawn
+        for (const one of [...Object.values(this.scene.halved).flat(), ...frame.passes]) if (!one.written) this.pipeline(one.program).catch(() => {}); // errors are reported on use
     }
 
     /** @param {number} number */
@@ -167,8 +167,8 @@ export class Made {
         });
     }
 
-    /** What a binding gets. @param {any} entry @param {number} number @returns {GPUBindingResource} */
-    bound(entry, number) {
+    /** Return the resource of a binding. @param {any} entry @param {number} number @returns {GPUBindingResource} */
+    bindingResource(entry, number) {
         const one = this.resource(number);
         const dimension = (entry.texture ?? entry.storageTexture)?.viewDimension;
         if (this.scene.resources[number].kind === "texture") return one.createView({ dimension });
@@ -176,15 +176,15 @@ export class Made {
     }
 
     /**
-     * The bind group of a pass.
+     * Return the bind group of a pass.
      * @param {Pass} one
-     * @param {(k: number) => GPUBufferBinding} record binds the frame's record k
+     * @param {(k: number) => GPUBufferBinding} record returns the binding of record k of the frame
      */
     group(one, record) {
         const { bindings } = this.scene.programs[one.program];
         const entries = bindings.map(([binding, , entry], k) => ({
             binding,
-            resource: one.bound[k] < 0 ? record(-1 - one.bound[k]) : this.bound(entry, one.bound[k]),
+            resource: one.bound[k] < 0 ? record(-1 - one.bound[k]) : this.bindingResource(entry, one.bound[k]),
         }));
         return this.device.createBindGroup({ layout: this.layout(one.program), entries });
     }

@@ -1,19 +1,19 @@
-// Which passes of a frame have to run: the rule of the frame graph, with versions of what each resource holds.
+// Selection of the passes of a frame that must run, by versions of the contents of resources.
 
 /**
- * What a resource holds. A view is a part of its texture, and its content is then the texture's too.
- * @typedef {{parent: Slot | null, parts: Slot[], held: number, scratch: boolean}} Slot
+ * State of the content of a resource. A view is a part of its texture.
+ * @typedef {{parent: Slot | null, parts: Slot[], version: number, scratch: boolean}} Slot
  */
 /** @typedef {{reads: Slot[], writes: Slot[]}} Access */
 
 /** @param {Slot | null} parent @param {boolean} scratch @returns {Slot} */
 export function makeSlot(parent, scratch) {
-    const slot = { parent, parts: [], held: 0, scratch };
+    const slot = { parent, parts: [], version: 0, scratch };
     if (parent) parent.parts.push(slot);
     return slot;
 }
 
-/** A number from others, for which the same come only from the same, in all likelihood. */
+/** Hash of numbers. */
 export class Hash {
     constructor() {
         this.a = 0x9e3779b9;
@@ -32,24 +32,24 @@ export class Hash {
         this.add(Math.floor(value / 4294967296) | 0);
     }
 
-    /** Never 0, which stands for unknown content. */
+    /** Return the hash; never 0, which means unknown content. */
     value() {
         return (this.a >>> 0) * 2097152 + ((this.b >>> 11) | 1);
     }
 }
 
-/** The passes of one frame, in order, and what they read of each other. */
+/** Dependencies between the passes of a frame, which run in order. */
 export class Dependencies {
-    /** @param {Access[]} declared */
-    constructor(declared) {
-        this.declared = declared;
-        /** @type {[number, Slot][][]} what each pass reads, with the pass that left it there, or -1 */
+    /** @param {Access[]} accesses */
+    constructor(accesses) {
+        this.accesses = accesses;
+        /** @type {[number, Slot][][]} slots that each pass reads, with the pass that wrote them, or -1 */
         this.reads = [];
-        /** @type {Map<Slot, number>} the pass that writes a slot last, or what overlaps it */
-        this.last = new Map();
+        /** @type {Map<Slot, number>} last pass that writes a slot or an overlapping one */
+        this.lastWriter = new Map();
         /** @type {Map<Slot, number>} */
         const writers = new Map();
-        declared.forEach((one, index) => {
+        accesses.forEach((one, index) => {
             const found = one.reads.flatMap((slot) => sources(slot, writers));
             const former = found.filter((slot) => !writers.has(slot) && !one.writes.includes(slot));
             const read = found.filter((slot) => writers.has(slot) || former.includes(slot));
@@ -60,78 +60,78 @@ export class Dependencies {
 
     /** @param {Slot} slot @param {number} index @param {Map<Slot, number>} writers */
     #write(slot, index, writers) {
-        this.last.set(slot, index);
+        this.lastWriter.set(slot, index);
         writers.set(slot, index);
-        for (const part of slot.parts) if (writers.delete(part)) this.last.set(part, index);
-        if (slot.parent && writers.has(slot.parent)) this.last.set(slot.parent, index);
+        for (const part of slot.parts) if (writers.delete(part)) this.lastWriter.set(part, index);
+        if (slot.parent && writers.has(slot.parent)) this.lastWriter.set(slot.parent, index);
     }
 
     /**
-     * What each pass leaves: a number that follows from its key and the versions of what it reads.
+     * Return the version of the content that each pass writes: a hash of its key and of the versions it reads.
      * @param {number[]} keys
      */
     versions(keys) {
         /** @type {number[]} */
-        const made = [];
+        const computed = [];
         keys.forEach((key, index) => {
             const hash = new Hash();
             hash.addLarge(key);
             for (const [writer, slot] of this.reads[index]) {
-                hash.addLarge(writer < 0 ? slot.held : made[writer]);
+                hash.addLarge(writer < 0 ? slot.version : computed[writer]);
             }
-            made.push(hash.value());
+            computed.push(hash.value());
         });
-        return made;
+        return computed;
     }
 
     /**
-     * Which passes have to run for every resource to hold what all of them together leave.
+     * Return the mask of passes that must run so that all resources have their final contents.
      * @param {number[]} versions
      */
     due(versions) {
-        const kept = new Set([...this.last].filter(([slot, k]) => slot.held === versions[k]).map(([slot]) => slot));
+        const current = new Set([...this.lastWriter].filter(([slot, k]) => slot.version === versions[k]).map(([slot]) => slot));
         for (;;) {
-            const due = this.#dueWith(kept);
-            const spoilt = new Set();
+            const due = this.#dueWith(current);
+            const overwritten = new Set();
             due.forEach((now, index) => {
                 if (!now) return;
-                for (const slot of this.declared[index].writes) {
-                    if (!due[this.last.get(slot) ?? index] && kept.has(slot)) spoilt.add(slot);
+                for (const slot of this.accesses[index].writes) {
+                    if (!due[this.lastWriter.get(slot) ?? index] && current.has(slot)) overwritten.add(slot);
                 }
             });
-            if (!spoilt.size) return due;
-            for (const slot of spoilt) kept.delete(slot);
+            if (!overwritten.size) return due;
+            for (const slot of overwritten) current.delete(slot);
         }
     }
 
-    /** @param {Set<Slot>} kept */
-    #dueWith(kept) {
+    /** @param {Set<Slot>} current */
+    #dueWith(current) {
         /** @type {boolean[]} */
-        const due = new Array(this.declared.length).fill(false);
+        const due = new Array(this.accesses.length).fill(false);
         /** @type {Map<Slot, Set<number>>} */
-        const wanted = new Map();
+        const needed = new Map();
         for (let index = due.length - 1; index >= 0; index--) {
-            due[index] = this.declared[index].writes.some((slot) => {
-                const last = this.last.get(slot) === index;
-                if (last && kept.has(slot)) return false;
-                return (last && !slot.scratch) || wanted.get(slot)?.has(index);
+            due[index] = this.accesses[index].writes.some((slot) => {
+                const isLast = this.lastWriter.get(slot) === index;
+                if (isLast && current.has(slot)) return false;
+                return (isLast && !slot.scratch) || needed.get(slot)?.has(index);
             });
             if (!due[index]) continue;
             for (const [writer, slot] of this.reads[index]) {
-                wanted.set(slot, (wanted.get(slot) ?? new Set()).add(writer));
+                needed.set(slot, (needed.get(slot) ?? new Set()).add(writer));
             }
         }
         return due;
     }
 
     /**
-     * Note what the passes that ran have left.
+     * Record the versions written by the passes that ran.
      * @param {boolean[]} due
      * @param {number[]} versions
      */
     ran(due, versions) {
         due.forEach((now, index) => {
-            if (now) for (const slot of this.declared[index].writes) hold(slot, versions[index]);
+            if (now) for (const slot of this.accesses[index].writes) setVersion(slot, versions[index]);
         });
     }
 }
@@ -145,8 +145,8 @@ function sources(slot, writers) {
 }
 
 /** @param {Slot} slot @param {number} version */
-function hold(slot, version) {
-    slot.held = version;
-    for (const part of slot.parts) part.held = version;
-    if (slot.parent) slot.parent.held = 0;
+function setVersion(slot, version) {
+    slot.version = version;
+    for (const part of slot.parts) part.version = version;
+    if (slot.parent) slot.parent.version = 0;
 }

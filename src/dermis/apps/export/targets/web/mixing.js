@@ -1,25 +1,25 @@
-// The colour map between the nodes of dials that paint it: a mean of what their pictures stand for.
+// Interpolation of the colour map between nodes of sliders that change it.
 
-import { stepsOf, texelsOf } from "./maps.js";
-import { between } from "./turned.js";
+import { decodeLayer, toTexels } from "./maps.js";
+import { nodeWeights } from "./view_state.js";
 
-/** @typedef {import("./device.js").Made} Made */
-/** @typedef {import("./turned.js").Dial} Dial */
+/** @typedef {import("./device.js").GpuScene} GpuScene */
+/** @typedef {import("./view_state.js").Slider} Slider */
 
-/** The colour map's texels between dials' nodes. @param {Made} made @param {Dial[]} turned @param {Record<string, number>} values */
-export async function mixed(made, turned, values) {
-    const { map, dials } = made.scene.colours;
-    const { width, height } = made.resource(map);
-    const layer = made.scene.maps[map][0][0];
-    const at = async (/** @type {import("./device.js").Layer} */ one) => fromHalves(texelsOf(await stepsOf(made, one, width, height)));
-    const base = await at(layer);
+/** Return the texels of the colour map at values of sliders. @param {GpuScene} gpuScene @param {Slider[]} changed @param {Record<string, number>} values */
+export async function mixColourMap(gpuScene, changed, values) {
+    const { map, dials } = gpuScene.scene.colours;
+    const { width, height } = gpuScene.resource(map);
+    const layer = gpuScene.scene.maps[map][0][0];
+    const decode = async (/** @type {import("./device.js").Layer} */ one) => fromHalves(toTexels(await decodeLayer(gpuScene, one, width, height)));
+    const base = await decode(layer);
     const sum = base.slice();
-    for (const dial of turned) {
-        for (const [node, share] of between(dial, values[dial.name])) {
-            const one = dials[dial.name][node];
-            if (!one || !share) continue;
-            const other = await at(one);
-            for (let k = 0; k < sum.length; k++) sum[k] += share * (other[k] - base[k]);
+    for (const slider of changed) {
+        for (const [node, weight] of nodeWeights(slider, values[slider.name])) {
+            const one = dials[slider.name][node];
+            if (!one || !weight) continue;
+            const other = await decode(one);
+            for (let k = 0; k < sum.length; k++) sum[k] += weight * (other[k] - base[k]);
         }
     }
     return toHalves(sum);
@@ -27,18 +27,18 @@ export async function mixed(made, turned, values) {
 
 /** @param {Uint16Array} halves */
 function fromHalves(halves) {
-    const found = new Float32Array(halves.length);
+    const result = new Float32Array(halves.length);
     for (let k = 0; k < halves.length; k++) {
-        const [sign, rank, part] = [halves[k] >> 15, (halves[k] >> 10) & 31, halves[k] & 1023];
-        found[k] = (sign ? -1 : 1) * (rank ? 2 ** (rank - 15) * (1 + part / 1024) : part * 2 ** -24);
+        const [sign, exponent, mantissa] = [halves[k] >> 15, (halves[k] >> 10) & 31, halves[k] & 1023];
+        result[k] = (sign ? -1 : 1) * (exponent ? 2 ** (exponent - 15) * (1 + mantissa / 1024) : mantissa * 2 ** -24);
     }
-    return found;
+    return result;
 }
 
-/** @param {Float32Array} values from 0 to some thousand, as colours are */
+/** @param {Float32Array} values in [0, 65504) */
 function toHalves(values) {
     const words = new Uint32Array(values.buffer);
-    const found = new Uint16Array(values.length);
-    for (let k = 0; k < values.length; k++) found[k] = values[k] < 6.2e-5 ? 0 : ((words[k] + 0x1000 - 0x38000000) >>> 13) & 0x7fff;
-    return found;
+    const result = new Uint16Array(values.length);
+    for (let k = 0; k < values.length; k++) result[k] = values[k] < 6.2e-5 ? 0 : ((words[k] + 0x1000 - 0x38000000) >>> 13) & 0x7fff;
+    return result;
 }

@@ -1,37 +1,36 @@
-// What the file holds: one gzip of numbers as differences, byte column by byte column, seven bits to a letter.
+// Decompression of the data of the file, see packing.py: 7 bits per character, gzip, byte planes and differences.
 
 /**
- * A run of bytes: where it begins, how many there are, the bytes of a word, words of a row, how often
- * differences from row to row were taken, and of floats the step of each word of a row. Words of no bytes:
- * numbers of runs to join instead.
+ * Run of bytes: offset, size, bytes per word, words per row, order of the differences between rows, and the
+ * step of each float in a row. With 0 bytes per word, the steps are numbers of runs to concatenate.
  * @typedef {[number, number, number, number, number, number[]]} Run
  */
 
-/** Bytes of a text with seven bits in each letter, 256 more where it could not stand in a page. @param {string} text */
-export function bytesOf(text) {
-    const found = new Uint8Array((text.length * 7) >> 3);
-    const letter = (/** @type {number} */ k) => text.charCodeAt(k) & 127; // 0 beyond the end
-    for (let [k, end] = [0, 0]; end < found.length; k += 8, end += 7) {
-        for (let j = 0; j < 7; j++) found[end + j] = (letter(k + j) << (j + 1)) | (letter(k + j + 1) >> (6 - j));
+/** Return the bytes of a text with 7 bits per character. @param {string} text */
+export function decodeSevenBits(text) {
+    const result = new Uint8Array((text.length * 7) >> 3);
+    const code = (/** @type {number} */ k) => text.charCodeAt(k) & 127; // 0 beyond the end
+    for (let [k, end] = [0, 0]; end < result.length; k += 8, end += 7) {
+        for (let j = 0; j < 7; j++) result[end + j] = (code(k + j) << (j + 1)) | (code(k + j + 1) >> (6 - j));
     }
-    return found;
+    return result;
 }
 
 /** @param {Uint8Array} bytes @returns {Promise<Uint8Array>} */
-export async function inflated(bytes) {
+export async function gunzip(bytes) {
     const stream = new Blob([/** @type {any} */ (bytes)]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /** @param {Uint8Array} data @param {Run[]} runs @param {number} number of a run @returns {Uint8Array} */
-export function unpacked(data, runs, number) {
+export function unpackRun(data, runs, number) {
     const [start, size, word, row, order, steps] = runs[number];
-    if (!word) return inOne(size, steps.map((one) => unpacked(data, runs, one)));
+    if (!word) return concatenate(size, steps.map((one) => unpackRun(data, runs, one)));
     const columns = data.subarray(start, start + size);
     if (word * row === 1 && order === 0) return columns;
-    const bytes = inRows(columns, word * row);
+    const bytes = interleave(columns, word * row);
     const words = word === 4 ? new Uint32Array(bytes.buffer) : word === 2 ? new Uint16Array(bytes.buffer) : bytes;
-    for (let time = 0; time < order; time++) {
+    for (let pass = 0; pass < order; pass++) {
         for (let k = row; k < words.length; k++) words[k] += words[k - row];
     }
     if (!steps.length) return bytes;
@@ -40,23 +39,23 @@ export function unpacked(data, runs, number) {
     return new Uint8Array(floats.buffer);
 }
 
-/** Columns of bytes, one after the other, row by row. @param {Uint8Array} columns @param {number} across */
-function inRows(columns, across) {
-    const found = new Uint8Array(columns.length);
+/** Return byte planes, stored one after the other, row by row. @param {Uint8Array} columns @param {number} width */
+function interleave(columns, width) {
+    const result = new Uint8Array(columns.length);
     let from = 0;
-    for (let column = 0; column < across; column++) {
-        for (let to = column; to < found.length; to += across) found[to] = columns[from++];
+    for (let column = 0; column < width; column++) {
+        for (let to = column; to < result.length; to += width) result[to] = columns[from++];
     }
-    return found;
+    return result;
 }
 
 /** @param {number} size @param {Uint8Array[]} parts */
-function inOne(size, parts) {
-    const found = new Uint8Array(size);
+function concatenate(size, parts) {
+    const result = new Uint8Array(size);
     let end = 0;
     for (const one of parts) {
-        found.set(one, end);
+        result.set(one, end);
         end += one.length;
     }
-    return found;
+    return result;
 }

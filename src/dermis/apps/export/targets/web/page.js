@@ -1,60 +1,60 @@
-// The page: opens a device, plays the frame that fits, and listens to hands.
+// The page: opens a device, draws the frame that fits the window, and handles input.
 
-import { Made } from "./device.js";
-import { element, listen } from "./hands.js";
-import { fillMaps, halve, putTexels } from "./maps.js";
-import { mixed } from "./mixing.js";
-import { bytesOf, inflated } from "./packed.js";
+import { GpuScene } from "./device.js";
+import { addInputHandlers, element } from "./input.js";
+import { fillMaps, fillMips, writeTexels } from "./maps.js";
+import { mixColourMap } from "./mixing.js";
+import { decodeSevenBits, gunzip } from "./packed.js";
 import { Player } from "./player.js";
 import { Screen } from "./screen.js";
-import { apply, atRest } from "./turned.js";
+import { applyState, defaultState } from "./view_state.js";
 
-/** @typedef {import("./turned.js").Dial} Dial */
+/** @typedef {import("./view_state.js").Slider} Slider */
 /** @typedef {import("./device.js").Scene} Scene */
-/** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Dial[]}} File */
+/** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Slider[]}} File */
 
 const [BEFORE, AFTER] = ["none", "texture-space"];
 const REST_MS = 400;
-const NO_WEBGPU = "This head needs WebGPU: Chrome or Edge 113, Safari 26, Firefox 141 or later, on a device whose graphics driver they accept. Above is a still picture of it.";
+const NO_WEBGPU = "This head needs WebGPU: Chrome or Edge 113, Safari 26, Firefox 141 or later, with a supported graphics driver. A still picture is shown instead.";
 
-/** @param {string} words @param {string} state */
-function tell(words, state) {
-    element("told").textContent = words;
+/** @param {string} message @param {string} state */
+function showMessage(message, state) {
+    element("told").textContent = message;
     document.documentElement.dataset.state = state;
 }
 
 /** @param {string} id */
-const part = (id) => bytesOf(element(id).textContent);
+const readElement = (id) => decodeSevenBits(element(id).textContent);
 
-/** What there is to draw. @returns {Promise<File>} */
+/** Read the description of the frames. @returns {Promise<File>} */
 async function readFile() {
-    return JSON.parse(new TextDecoder().decode(await inflated(part("scene"))));
+    return JSON.parse(new TextDecoder().decode(await gunzip(readElement("scene"))));
 }
 
-/** Numbers and pictures of a file. @param {File} file @returns {Promise<import("./device.js").Store>} */
+/** Read the contents of buffers and maps. @param {File} file @returns {Promise<import("./device.js").Store>} */
 async function readStore(file) {
-    await new Promise((done) => setTimeout(done)); // what was asked of the device goes first
-    const data = inflated(part("data"));
-    const all = part("pictures");
+    await new Promise((done) => setTimeout(done)); // lets compilation start first
+    const data = gunzip(readElement("data"));
+    const pictureBytes = readElement("pictures");
     let end = 0;
-    const pictures = file.images.map((size) => all.subarray(end, (end += size)));
+    const pictures = file.images.map((size) => pictureBytes.subarray(end, (end += size)));
     return { blobs: file.blobs, data: await data, pictures };
 }
 
-/** The page at work on one device. */
+/** State of the page. */
 class Page {
     /** @param {File} file */
     constructor(file) {
         this.file = file;
         /** @type {import("./device.js").Store | null} */
         this.store = null;
-        this.state = atRest(file.dials);
+        this.state = defaultState(file.dials);
         this.technique = AFTER;
         /** @type {Map<import("./device.js").Frame, Player>} */
         this.players = new Map();
         this.dirty = true;
         this.busy = false;
-        this.painted = "";
+        this.paintedState = "";
         this.frames = 0;
         /** @type {Player | null} */
         this.player = null;
@@ -62,50 +62,50 @@ class Page {
         this.screen = null;
         this.soft = false;
         this.moving = false;
-        this.resting = 0;
+        this.restTimer = 0;
     }
 
-    /** Open a device, again after a loss. */
+    /** Open a device and draw; also called after a device was lost. */
     async open() {
         const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
-        if (!adapter) return tell(NO_WEBGPU, "without");
-        const wanted = new URLSearchParams(location.hash.slice(1));
+        if (!adapter) return showMessage(NO_WEBGPU, "without");
+        const options = new URLSearchParams(location.hash.slice(1));
         const soft = adapter.info.isFallbackAdapter || /swiftshader|llvmpipe/i.test(adapter.info.architecture + adapter.info.description);
-        const form = wanted.get("form") ?? (soft ? "software" : "gpu");
+        const form = options.get("form") ?? (soft ? "software" : "gpu");
         const scene = this.file.forms[form] ?? Object.values(this.file.forms)[0];
         const device = await adapter.requestDevice({ requiredLimits: limitsFor(scene, adapter.limits) });
         device.lost.then(async (info) => {
             if (info.reason !== "destroyed") await this.reopen();
         });
-        device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
-        const made = new Made(device, scene);
-        made.compile(this.#fitting(scene));
-        made.store = this.store ??= await readStore(this.file);
-        this.made = made;
+        device.addEventListener("uncapturederror", (event) => showMessage(`The graphics device reported an error: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
+        const gpuScene = new GpuScene(device, scene);
+        gpuScene.compile(this.#fitting(scene));
+        gpuScene.store = this.store ??= await readStore(this.file);
+        this.gpuScene = gpuScene;
         this.players.clear();
-        this.painted = "";
+        this.paintedState = "";
         this.soft = soft;
         this.screen = null;
-        const maps = fillMaps(made);
+        const maps = fillMaps(gpuScene);
         this.choose();
         await maps;
         this.dirty = true;
         await this.draw();
-        tell("", "drawn");
-        for (const one of scene.frames) if (one.moving && one.name === this.technique) made.compile(one);
+        showMessage("", "drawn");
+        for (const one of scene.frames) if (one.moving && one.name === this.technique) gpuScene.compile(one);
     }
 
     async reopen() {
-        tell("The graphics device was lost; it is opened again …", "loading");
-        await this.open().catch(failed);
+        showMessage("The graphics device was lost and is opened again …", "loading");
+        await this.open().catch(showError);
     }
 
-    /** When all is drawn. */
+    /** Wait until everything is drawn. */
     async idle() {
         while (this.dirty || this.busy) await new Promise((done) => setTimeout(done, 1));
     }
 
-    /** The frame for the technique, the size of the window and what hands do. @param {Scene} scene */
+    /** Return the frame for the technique, the window size, and whether there is interaction. @param {Scene} scene */
     #fitting(scene) {
         const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
         const fitting = scene.frames.filter((one) => one.name === this.technique);
@@ -114,78 +114,78 @@ class Page {
         return moving || (still.find((one) => one.size[0] >= 0.9 * side) ?? still[still.length - 1]);
     }
 
-    /** The player for it. */
+    /** Select the player of the frame that fits. */
     choose() {
-        const { made } = this;
-        if (!made) return;
-        const frame = this.#fitting(made.scene);
+        const { gpuScene } = this;
+        if (!gpuScene) return;
+        const frame = this.#fitting(gpuScene.scene);
         if (!this.players.has(frame)) {
-            const player = new Player(made, frame);
+            const player = new Player(gpuScene, frame);
             player.prepare();
             this.players.set(frame, player);
         }
         this.player = /** @type {Player} */ (this.players.get(frame));
         if (this.screen?.frame !== frame) {
             this.screen?.close();
-            this.screen = new Screen(element("picture"), made, frame, this.soft);
+            this.screen = new Screen(element("picture"), gpuScene, frame, this.soft);
         }
         this.dirty = true;
     }
 
-    /** Draw what is stale, and wait until it is there: one frame at a time. */
+    /** Draw if anything changed, and wait until it is shown; one frame at a time. */
     async draw() {
-        if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
+        if (!this.dirty || this.busy || !this.player || !this.gpuScene || !this.screen) return;
         [this.dirty, this.busy] = [false, true];
         try {
             if (this.soft) this.choose();
             this.dirty = false;
-            await this.#frame(this.player, this.made, /** @type {Screen} */ (this.screen));
+            await this.#frame(this.player, this.gpuScene, /** @type {Screen} */ (this.screen));
         } finally {
             this.busy = false;
         }
-        clearTimeout(this.resting);
-        if (this.moving) this.resting = setTimeout(() => this.rest(), REST_MS);
+        clearTimeout(this.restTimer);
+        if (this.moving) this.restTimer = setTimeout(() => this.rest(), REST_MS);
     }
 
-    /** @param {Player} player @param {Made} made @param {Screen} screen */
-    async #frame(player, made, screen) {
-        const began = performance.now();
-        apply(player, this.file.dials, this.state);
-        await this.#paint(made);
+    /** @param {Player} player @param {GpuScene} gpuScene @param {Screen} screen */
+    async #frame(player, gpuScene, screen) {
+        const start_ms = performance.now();
+        applyState(player, this.file.dials, this.state);
+        await this.#paint(gpuScene);
         const encoder = await player.draw();
         screen.copy(encoder);
-        made.device.queue.submit([encoder.finish()]);
+        gpuScene.device.queue.submit([encoder.finish()]);
         await screen.show();
         this.frames++;
-        element("time").textContent = `${(performance.now() - began).toFixed(0)} ms`;
+        element("time").textContent = `${(performance.now() - start_ms).toFixed(0)} ms`;
         element("poster").hidden = true;
     }
 
-    /** Mix the colour map where dials change it. @param {Made} made */
-    async #paint(made) {
-        const { map, dials } = made.scene.colours;
-        const turned = this.file.dials.filter((one) => dials?.[one.name] && this.state.dials[one.name] !== one.rest);
-        const key = turned.map((one) => `${one.name} ${this.state.dials[one.name]}`).join();
-        if (key === this.painted) return;
-        this.painted = key;
-        putTexels(made, map, await mixed(made, turned, this.state.dials));
-        await halve(made, map);
-        made.slot(map).held++;
+    /** Update the colour map for the values of sliders. @param {GpuScene} gpuScene */
+    async #paint(gpuScene) {
+        const { map, dials } = gpuScene.scene.colours;
+        const changed = this.file.dials.filter((one) => dials?.[one.name] && this.state.dials[one.name] !== one.rest);
+        const key = changed.map((one) => `${one.name} ${this.state.dials[one.name]}`).join();
+        if (key === this.paintedState) return;
+        this.paintedState = key;
+        writeTexels(gpuScene, map, await mixColourMap(gpuScene, changed, this.state.dials));
+        await fillMips(gpuScene, map);
+        gpuScene.slot(map).version++;
     }
 
     /** @param {string} technique */
-    async turnTo(technique) {
+    async setTechnique(technique) {
         this.technique = technique;
         this.choose();
         await this.draw();
     }
 
-    /** What hands do: software draws smaller pictures until they rest. */
+    /** Request a new frame after input; software adapters draw smaller pictures until input ends. */
     touch() {
         this.dirty = true;
         if (!this.soft) return;
         this.moving = true;
-        clearTimeout(this.resting);
+        clearTimeout(this.restTimer);
     }
 
     rest() {
@@ -194,7 +194,7 @@ class Page {
     }
 }
 
-/** The limits that a scene's resources need, if they are above those that every device has. @param {Scene} scene @param {GPUSupportedLimits} offered */
+/** Return the limits that the resources of a scene need beyond the defaults. @param {Scene} scene @param {GPUSupportedLimits} offered */
 function limitsFor(scene, offered) {
     const buffers = scene.resources.flatMap((one) => (one.kind === "buffer" ? [one.size] : []));
     const largest = Math.max(...buffers);
@@ -206,36 +206,36 @@ function limitsFor(scene, offered) {
 }
 
 /** @param {unknown} error */
-function failed(error) {
-    tell(`It could not be drawn: ${error instanceof Error ? error.message : error}`, "failed");
+function showError(error) {
+    showMessage(`The head could not be drawn: ${error instanceof Error ? error.message : error}`, "failed");
 }
 
-/** A slider for each dial. @param {Page} page */
-function addDials(page) {
-    for (const dial of page.file.dials) {
+/** Add the sliders to the panel. @param {Page} page */
+function addSliders(page) {
+    for (const slider of page.file.dials) {
         const label = document.createElement("label");
-        const slider = document.createElement("input");
-        const [least, most] = [dial.values[0], dial.values[dial.values.length - 1]];
-        Object.assign(slider, { type: "range", min: least, max: most, step: (most - least) / 200, value: dial.rest });
-        slider.addEventListener("input", () => {
-            page.state.dials[dial.name] = Number(slider.value);
+        const input = document.createElement("input");
+        const [min, max] = [slider.values[0], slider.values[slider.values.length - 1]];
+        Object.assign(input, { type: "range", min, max, step: (max - min) / 200, value: slider.rest });
+        input.addEventListener("input", () => {
+            page.state.dials[slider.name] = Number(input.value);
             page.touch();
         });
-        label.append(dial.name, slider);
+        label.append(slider.name, input);
         element("dials").append(label);
     }
-    element("after").addEventListener("change", () => page.turnTo(element("after").checked ? AFTER : BEFORE).catch(failed));
+    element("after").addEventListener("change", () => page.setTechnique(element("after").checked ? AFTER : BEFORE).catch(showError));
 }
 
 async function start() {
-    if (!navigator.gpu) return tell(NO_WEBGPU, "without");
+    if (!navigator.gpu) return showMessage(NO_WEBGPU, "without");
     const page = new Page(await readFile());
-    addDials(page);
-    listen(page, failed);
+    addSliders(page);
+    addInputHandlers(page, showError);
     await page.open();
-    const next = () => requestAnimationFrame(() => page.draw().catch(failed).finally(next));
+    const next = () => requestAnimationFrame(() => page.draw().catch(showError).finally(next));
     next();
     Object.assign(window, { dermis: page });
 }
 
-start().catch(failed);
+start().catch(showError);

@@ -1,41 +1,41 @@
-// Where a picture is shown: a canvas that the device fills, or where it is software one that the page fills.
+// Display of pictures on the canvas: written by the device, or by the page if the adapter is software.
 
-/** @typedef {import("./device.js").Made} Made */
+/** @typedef {import("./device.js").GpuScene} GpuScene */
 /** @typedef {import("./device.js").Frame} Frame */
 
-/** Shows pictures of one size. */
+/** Canvas with pictures of one size. */
 export class Screen {
-    /** @param {HTMLCanvasElement} canvas @param {Made} made @param {Frame} frame @param {boolean} soft */
-    constructor(canvas, made, frame, soft) {
+    /** @param {HTMLCanvasElement} canvas @param {GpuScene} gpuScene @param {Frame} frame @param {boolean} software */
+    constructor(canvas, gpuScene, frame, software) {
         const [width, height] = (this.size = frame.size);
         this.canvas = canvas;
-        if (!soft) [canvas.width, canvas.height] = frame.size;
-        this.made = made;
+        if (!software) [canvas.width, canvas.height] = frame.size;
+        this.gpuScene = gpuScene;
         this.frame = frame;
         this.layout = { bytesPerRow: Math.ceil((4 * width) / 256) * 256, rowsPerImage: height };
-        const usage = GPUBufferUsage.COPY_DST | (soft ? GPUBufferUsage.MAP_READ : GPUBufferUsage.COPY_SRC);
-        this.buffer = made.device.createBuffer({ size: this.layout.bytesPerRow * height, usage });
-        this.plain = soft ? canvas.getContext("2d") : null;
-        this.context = soft ? null : /** @type {GPUCanvasContext | null} */ (/** @type {unknown} */ (canvas.getContext("webgpu")));
+        const usage = GPUBufferUsage.COPY_DST | (software ? GPUBufferUsage.MAP_READ : GPUBufferUsage.COPY_SRC);
+        this.buffer = gpuScene.device.createBuffer({ size: this.layout.bytesPerRow * height, usage });
+        this.context2d = software ? canvas.getContext("2d") : null;
+        this.context = software ? null : /** @type {GPUCanvasContext | null} */ (/** @type {unknown} */ (canvas.getContext("webgpu")));
         this.context?.configure({
-            device: made.device,
+            device: gpuScene.device,
             format: "rgba8unorm",
             alphaMode: "opaque",
             usage: GPUTextureUsage.COPY_DST | GPUTextureUsage.RENDER_ATTACHMENT,
         });
     }
 
-    /** Copy the frame's picture. @param {GPUCommandEncoder} encoder */
+    /** Copy the picture of the frame to the canvas or a buffer. @param {GPUCommandEncoder} encoder */
     copy(encoder) {
         const from = { buffer: this.buffer, ...this.layout };
-        encoder.copyTextureToBuffer({ texture: this.made.resource(this.frame.picture) }, from, this.size);
+        encoder.copyTextureToBuffer({ texture: this.gpuScene.resource(this.frame.picture) }, from, this.size);
         if (this.context) encoder.copyBufferToTexture(from, { texture: this.context.getCurrentTexture() }, this.size);
     }
 
-    /** Wait until what was submitted is there. */
+    /** Wait for submitted work, and show the picture if the adapter is software. */
     async show() {
-        await this.made.device.queue.onSubmittedWorkDone();
-        if (!this.plain) return;
+        await this.gpuScene.device.queue.onSubmittedWorkDone();
+        if (!this.context2d) return;
         await this.buffer.mapAsync(GPUMapMode.READ);
         const [width, height] = this.size;
         if (this.canvas.width !== width) [this.canvas.width, this.canvas.height] = this.size;
@@ -47,10 +47,10 @@ export class Screen {
         }
         this.buffer.unmap();
         for (let k = 3; k < image.data.length; k += 4) image.data[k] = 255;
-        this.plain.putImageData(image, 0, 0);
+        this.context2d.putImageData(image, 0, 0);
     }
 
-    /** Give its memory back. */
+    /** Release the memory. */
     close() {
         this.buffer.destroy();
     }

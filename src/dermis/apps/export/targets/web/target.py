@@ -31,10 +31,10 @@ MODULES = (
     "player",
     "maps",
     "camera",
-    "turned",
+    "view_state",
     "screen",
     "mixing",
-    "hands",
+    "input",
     "page",
 )
 """Modules of the player, each after the modules that it imports."""

@@ -1,34 +1,34 @@
-// Hands: orbit, zoom, the light, by mouse, fingers and keys.
+// Input by mouse, touch and keys: orbit, zoom, and rotation of the light.
 
 /**
- * What hands turn.
- * @typedef {{state: import("./turned.js").Turned, touch: () => void, choose: () => void,
+ * Page that input controls.
+ * @typedef {{state: import("./view_state.js").ViewState, touch: () => void, choose: () => void,
  *     draw: () => Promise<void>}} Page
  */
 
 /** @param {string} id @returns {any} */
 export const element = (id) => document.getElementById(id);
 
-/** Let pointers, wheel and keys turn things. @param {Page} page @param {(error: unknown) => void} failed */
-export function listen(page, failed) {
+/** Add handlers of pointer, wheel, key and resize events. @param {Page} page @param {(error: unknown) => void} showError */
+export function addInputHandlers(page, showError) {
     const canvas = element("picture");
     /** @type {Map<number, {x: number, y: number}>} */
-    const fingers = new Map();
+    const pointers = new Map();
     canvas.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
         canvas.setPointerCapture(event.pointerId);
-        fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+        pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     });
     for (const name of ["pointerup", "pointercancel"]) {
-        canvas.addEventListener(name, (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId));
+        canvas.addEventListener(name, (/** @type {PointerEvent} */ event) => pointers.delete(event.pointerId));
     }
     canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
-        const last = fingers.get(event.pointerId);
+        const last = pointers.get(event.pointerId);
         if (!last) return;
         const now = { x: event.clientX, y: event.clientY };
-        const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+        const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
         if (other) pinch(page, other, last, now);
         else drag(page, event.shiftKey || event.buttons === 2, now.x - last.x, now.y - last.y);
-        fingers.set(event.pointerId, now);
+        pointers.set(event.pointerId, now);
     });
     canvas.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
     canvas.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
@@ -43,21 +43,21 @@ export function listen(page, failed) {
     });
     addEventListener("resize", () => {
         page.choose();
-        page.draw().catch(failed);
+        page.draw().catch(showError);
     });
 }
 
 /** @param {Page} page @param {boolean} light @param {number} x @param {number} y [pixel] */
 function drag(page, light, x, y) {
     const { state } = page;
-    const moved = light || element("light").checked;
-    const turn = 0.006;
-    if (moved) {
-        state.lightYaw += turn * x;
-        state.lightPitch = Math.max(-1.4, Math.min(1.4, state.lightPitch - turn * y));
+    const movesLight = light || element("light").checked;
+    const radiansPerPixel = 0.006;
+    if (movesLight) {
+        state.lightYaw += radiansPerPixel * x;
+        state.lightPitch = Math.max(-1.4, Math.min(1.4, state.lightPitch - radiansPerPixel * y));
     } else {
-        state.yaw -= turn * x;
-        state.pitch = Math.max(-1.4, Math.min(1.4, state.pitch + turn * y));
+        state.yaw -= radiansPerPixel * x;
+        state.pitch = Math.max(-1.4, Math.min(1.4, state.pitch + radiansPerPixel * y));
     }
     page.touch();
 }
@@ -70,6 +70,6 @@ function zoom(page, factor) {
 
 /** @param {Page} page @param {{x: number, y: number}} other @param {{x: number, y: number}} last @param {{x: number, y: number}} now */
 function pinch(page, other, last, now) {
-    const apart = (/** @type {{x: number, y: number}} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
-    zoom(page, apart(last) / apart(now));
+    const distance = (/** @type {{x: number, y: number}} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
+    zoom(page, distance(last) / distance(now));
 }
