@@ -116,7 +116,7 @@ PLY += "end_header\n"
 @pytest.mark.parametrize(
     ("header", "words"),
     [
-        (PLY.format(3, "property float x\n" * 100_000, 1), "does not begin or end"),
+        (PLY.format(3, "property float x\n" * 100_000, 1), "its header is invalid"),
         (PLY.format(3, "property float x\n" * 1000, 1), "at most 256 properties"),
         (PLY.format(4_000_000_000, "property float x\n", 1), "elements named 'vertex'"),
         (PLY.format(3, "property float x\n", 10**9), "elements named 'face'"),
@@ -187,7 +187,7 @@ def _far(file: GltfFile, node: int) -> list[int]:
         (_deep, "at most 1,024 nodes below each other"),
         (_targets, "more than 4,096"),
         (_joints, "at most 2,048 joints"),
-        (_values, "JSON of at most 2,097,152 values"),
+        (_values, "at most 2,097,152 values"),
         (_zeros, "at most 1,250,000 vertices"),
         (_sparse, "numbers? of bytes or values"),
         (_again_and_again, "134 million numbers"),

@@ -166,7 +166,7 @@ def test_damaged_file_in_the_cache_is_fetched_again(
 
 def test_changed_file_at_home_is_refused(cache: Path, home: str, monkeypatch: pytest.MonkeyPatch) -> None:
     _register(monkeypatch, _sample(f"{home}/tiny.hdr", content=b"what it was"))
-    with pytest.raises(DermisError, match="another file"):
+    with pytest.raises(DermisError, match="the file has changed"):
         fetch("tiny")
     assert not (cache / "env" / "tiny.hdr").exists()
 

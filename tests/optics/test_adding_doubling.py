@@ -54,5 +54,5 @@ def test_doubling_gives_all_depths_on_its_way(eta: float) -> None:
     least = np.array([0.3, 0.5])
     made = solve_doubled_slabs(0.9, least, 3, eta)
     one_by_one = solve_slabs(0.9, np.concatenate([least * 2.0**k for k in range(4)]), eta)
-    for name in ("back", "through"):
+    for name in ("reflected", "transmitted"):
         assert getattr(made, name) == pytest.approx(getattr(one_by_one, name), abs=1e-5)

@@ -101,7 +101,7 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_layers_must_agree() -> None:
-    with pytest.raises(DermisError, match="as many channels"):
+    with pytest.raises(DermisError, match="the same number of channels"):
         Medium("odd", (Layer(ONE, ONE, 1.0), Layer(np.ones(2), np.ones(2))))
 
 

@@ -50,7 +50,7 @@ def test_table_is_near_what_it_stands_for(thickness: float, least: float, worst:
     parameters = replace(FACE, epidermis_mm=thickness)
     rng = np.random.default_rng(1)
     melanin, blood = np.maximum(rng.random((2, 120)) ** 3, least)
-    error = np.abs(colour_table(parameters).read(melanin, blood) - computed(parameters, melanin, blood))
+    error = np.abs(colour_table(parameters).lookup(melanin, blood) - computed(parameters, melanin, blood))
     assert error.max() < worst
     assert error.mean() < 0.0005
 
@@ -59,7 +59,7 @@ def test_nodes_are_the_tissues_own_colours() -> None:
     table = colour_table(FACE)
     melanin, blood = (8 / 64) ** 2, (4 / 64) ** 2
     tissue = load_tissue("spectral", pigments={"melanin": melanin, "blood": blood})
-    assert table.read(np.array([melanin]), np.array([blood]))[0] == pytest.approx(
+    assert table.lookup(np.array([melanin]), np.array([blood]))[0] == pytest.approx(
         tissue.profile().total, abs=1e-9
     )
 
@@ -67,13 +67,14 @@ def test_nodes_are_the_tissues_own_colours() -> None:
 def test_pigments_darken_and_blood_reddens() -> None:
     table = colour_table(FACE)
     shares = np.linspace(0, 1, 50)
-    for colours in (table.read(shares, np.full(50, 0.01)), table.read(np.full(50, 0.01), shares)):
+    for colours in (table.lookup(shares, np.full(50, 0.01)), table.lookup(np.full(50, 0.01), shares)):
         assert (np.diff(colours.sum(axis=1)) < 0).all()
-    pale, flushed = table.read(np.array([0.015, 0.015]), np.array([0.005, 0.05]))
+    pale, flushed = table.lookup(np.array([0.015, 0.015]), np.array([0.005, 0.05]))
     assert flushed[0] / flushed[1] > 1.15 * pale[0] / pale[1]
 
 
 def test_shares_beyond_are_read_at_the_edge() -> None:
     table = colour_table(FACE)
-    outside, edge = table.read(np.array([-1.0, 2.0]), np.array([2.0, -1.0])), table.colours[[0, -1], [-1, 0]]
+    outside = table.lookup(np.array([-1.0, 2.0]), np.array([2.0, -1.0]))
+    edge = table.colours[[0, -1], [-1, 0]]
     assert outside == pytest.approx(edge)

@@ -37,7 +37,7 @@ def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
     layer, law = BODY.layers[0], oblique_transmittance(profile.albedo, 1.0)[:, 0]
     cosine = np.cos(np.radians([0.0, 30.0, 50.0, 70.0]))
     whole = solve_slabs(float(layer.alpha_prime[0]), 1e4, 1.0)
-    back = np.interp(cosine, whole.cosine, whole.back[0])
+    back = np.interp(cosine, whole.cosine, whole.reflected[0])
     slant = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, len(law)), law)
     for thickness in (1.0, 2.0, 4.0, 8.0):
         share = np.interp(thickness, DEPTH, made.transmitted[..., 0].sum(axis=1))
@@ -56,11 +56,11 @@ def test_amounts_are_those_of_slabs_cut_one_by_one(profile: GaussianSum, eta: fl
     for c in range(3):
         albedo, extinction = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c])
         cut, whole = solve_slabs(albedo, extinction * DEPTH[1:], eta), solve_slabs(albedo, 1e4, eta)
-        returned = whole.back @ whole.flux
+        returned = whole.reflected @ whole.flux
         assert made.transmitted[1:, :, c].sum(axis=1) == pytest.approx(
             cut.transmitted @ cut.flux / returned, abs=1e-3
         )
-        lost = 1.0 - cut.back @ cut.flux / returned
+        lost = 1.0 - cut.reflected @ cut.flux / returned
         assert made.lost[1:, :, c].sum(axis=1) == pytest.approx(lost, abs=1e-3)
 
 

@@ -63,7 +63,7 @@ def test_skin_of_a_file(tmp_path: Path) -> None:
         (SKIN + "oxygen = true\n", "oxygen: expected a number .*got True"),
         (SKIN.replace("biospec", "bark"), "a structure of dj2006.*got 'bark'"),
         (SKIN.replace("0.03", "3"), "--melanin"),
-        ("eta = 1\n" + SKIN, "a table .skin. and a name only"),
+        ("eta = 1\n" + SKIN, "only a table .skin. and a name"),
         ("skin = 4", "a table .skin."),
     ],
 )

@@ -72,11 +72,8 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
     try:
         target = Path(os.path.realpath(path))
         if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / marker).is_file())):
-            expected, actual = (
-                f"a free name, or a folder that holds {marker}",
-                "something else is there",
-            )
-            refuse(path, expected, actual, "Choose another name")
+            expected = f"a free name, or a folder that holds {marker}"
+            refuse(path, expected, "something else is there", "Choose another name")
     except (OSError, ValueError) as fault:
         refuse_output(path, fault)
     with temporary_folder(target) as temporary:

@@ -1,6 +1,6 @@
 """Bibliography of the package: BibTeX entries by author-year key.
 
-Entries are kept and printed as they are written, which libraries that parse BibTeX do not do.
+Entries keep their original text, which libraries that parse BibTeX would change.
 """
 
 from __future__ import annotations

@@ -78,9 +78,8 @@ def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | N
     try:
         code = run_app(app)
     except OSError as error:
-        code = print_failure(
-            name, f"{error.filename}: expected a usable file, but {error_text(error)}. Name another."
-        )
+        reason = f"expected a usable file, but {error_text(error)}"
+        code = print_failure(name, f"{error.filename}: {reason}. Name another.")
     sys.exit(code)
 
 
@@ -129,11 +128,8 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
     unused = (error.unused_tokens or ["?"])[0]
     match error:
         case UnknownOptionError():
-            return (
-                error.token.keyword or error.token.value,
-                f"an option of {command}",
-                "it has none of this name",
-            )
+            option = error.token.keyword or error.token.value
+            return option, f"an option of {command}", "it has none of this name"
         case CoercionError():
             value = error.token.value if error.token else "something else"
             return _option_name(error), _type_text(error.target_type), f"got {format_value(value)}"

@@ -49,7 +49,7 @@ def note(text: str) -> None:
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
     """Show a progress bar on stderr if it is a terminal, and yield a function that updates it.
 
     The function takes the number of finished steps and the number of all steps.
@@ -61,19 +61,19 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task_id = bar.add_task(task)
+        yield lambda done, total: bar.update(task_id, completed=done, total=total)
 
 
 @contextmanager
-def spinner(what: str) -> Iterator[None]:
+def spinner(task: str) -> Iterator[None]:
     """Show a spinner with the current preparation step on stderr if it is a terminal."""
     if not sys.stderr.isatty():
         yield
         return
     from rich.console import Console
 
-    text, level = _SpinnerText(what), LOGGER.level
+    text, level = _SpinnerText(task), LOGGER.level
     LOGGER.addHandler(text)
     LOGGER.setLevel(logging.DEBUG)
     try:
@@ -87,9 +87,9 @@ def spinner(what: str) -> Iterator[None]:
 class _SpinnerText(logging.Handler):
     """Text of a spinner: the task, and its current step once that has taken two seconds."""
 
-    def __init__(self, what: str) -> None:
+    def __init__(self, task: str) -> None:
         super().__init__()
-        self._what, self._step, self._began = what, "", 0.0
+        self._task, self._step, self._began = task, "", 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
         """Record the start or the end of a step."""
@@ -99,4 +99,4 @@ class _SpinnerText(logging.Handler):
     def __rich__(self) -> str:
         seconds = time.monotonic() - self._began
         slow = self._step and seconds >= SHOW_STEP_AFTER_S
-        return f"{self._what}: {self._step} ({seconds:.0f} s)" if slow else self._what
+        return f"{self._task}: {self._step} ({seconds:.0f} s)" if slow else self._task

@@ -207,14 +207,12 @@ def _blocks(arrays: Iterable[Array]) -> list[memoryview]:
     return [data[start : start + _BLOCK] for data in buffers for start in range(0, len(data), _BLOCK)]
 
 
-def _map_threaded(
-    function: Callable[..., str], blocks: list[memoryview], *arguments: Sequence[int]
-) -> list[str]:
+def _map_threaded(function: Callable[..., str], blocks: list[memoryview], *more: Sequence[int]) -> list[str]:
     """Return the results of a function for all blocks, in threads if the blocks are large."""
     if sum(map(len, blocks)) < _MIN_THREADED_BYTES:
-        return list(map(function, blocks, *arguments))
+        return list(map(function, blocks, *more))
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
-        return list(pool.map(function, blocks, *arguments))
+        return list(pool.map(function, blocks, *more))
 
 
 @contextlib.contextmanager

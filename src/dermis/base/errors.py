@@ -56,9 +56,9 @@ def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn
     actual : clause after "but", such as "got 3" or "it has none"
     advice : what to do, without a full stop
     """
-    named, what = shorten(str(culprit), _MAX_NAME), shorten(actual, _MAX_TEXT)
+    name, actual = shorten(str(culprit), _MAX_NAME), shorten(actual, _MAX_TEXT)
     end = "" if advice.endswith("?") else "."
-    raise DermisError(f"{named}: expected {expected}, but {what}. {advice}{end}")
+    raise DermisError(f"{name}: expected {expected}, but {actual}. {advice}{end}")
 
 
 def format_value(value: object, max_length: int = 60) -> str:

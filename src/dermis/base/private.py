@@ -75,9 +75,8 @@ def open_private_file(path: Path) -> io.FileIO:
     """
     descriptor = os.open(path, _READ_FLAGS)
     status = os.fstat(descriptor)
-    private = os.name != "posix" or (
-        status.st_uid in (0, os.geteuid()) and not status.st_mode & _WRITABLE_BY_OTHERS
-    )
+    shared = status.st_mode & _WRITABLE_BY_OTHERS
+    private = os.name != "posix" or (status.st_uid in (0, os.geteuid()) and not shared)
     if not stat.S_ISREG(status.st_mode) or not private:
         os.close(descriptor)
         raise ValueError(f"{path} is not a private file of this user")
@@ -117,6 +116,5 @@ def _is_shared(status: os.stat_result) -> bool:
         user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(status.st_gid)
     except KeyError:
         return True
-    return (
-        group.gr_gid != user.pw_gid or group.gr_name != user.pw_name or bool({*group.gr_mem} - {user.pw_name})
-    )
+    is_own = group.gr_gid == user.pw_gid and group.gr_name == user.pw_name
+    return not is_own or bool({*group.gr_mem} - {user.pw_name})

@@ -54,9 +54,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
     if size > max_bytes or len(data) > limit:
         actual = f"it has {_megabytes(size)}" if size > max_bytes else "it grows while it is read"
-        refuse(
-            culprit, f"{expected} of at most {_megabytes(max_bytes)}", actual, "Check its name or its size"
-        )
+        refuse(culprit, f"{expected} of at most {_megabytes(max_bytes)}", actual, "Check its name and size")
     return data
 
 

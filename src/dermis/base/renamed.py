@@ -14,10 +14,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
-NAMES: Mapping[str, str] = {
-    "profile": "side",
-    "scene.profile": "scene.side",
-}
+NAMES: Mapping[str, str] = {"profile": "side", "scene.profile": "scene.side"}
 """Old to new names of objects, both without the package's name."""
 
 MODULES: Mapping[str, str] = {

@@ -150,9 +150,9 @@ class Report:
             return []
         condition = "error against photons in rings, largest within a mean free path of r = 0"
         if len(error.tissues) == 1:
-            return [f"model      {_format_row(error.most)}  {condition}"]
-        lines = [f"model      {_format_row(error.least)}  at least, {condition},"]
-        return [*lines, f"           {_format_row(error.most)}  at most, on {', '.join(error.tissues)}"]
+            return [f"model      {_format_row(error.largest)}  {condition}"]
+        lines = [f"model      {_format_row(error.smallest)}  at least, {condition},"]
+        return [*lines, f"           {_format_row(error.largest)}  at most, on {', '.join(error.tissues)}"]
 
     def _other_fit_lines(self) -> list[str]:
         if self.other is None:

@@ -104,15 +104,13 @@ class DeformableMesh:
         changed = moves[mesh.triangles].any(axis=1)
         touched = np.zeros(int(mesh.point.max()) + 1, bool)
         touched[mesh.point[mesh.triangles[changed]]] = True
-        around = mesh.triangles[touched[mesh.point[mesh.triangles]].any(axis=1)]
-        if not len(around):
+        nearby = mesh.triangles[touched[mesh.point[mesh.triangles]].any(axis=1)]
+        if not len(nearby):
             return change
-        vertex, corner = np.unique(around, return_inverse=True)
+        vertex, corner = np.unique(nearby, return_inverse=True)
         point = np.unique(mesh.point[vertex], return_inverse=True)[1].astype(np.int32)
-        positions, triangles = (
-            self.positions_mm[vertex] + delta_mm[vertex],
-            corner.reshape(-1, 3).astype(np.int32),
-        )
+        positions = self.positions_mm[vertex] + delta_mm[vertex]
+        triangles = corner.reshape(-1, 3).astype(np.int32)
         change[vertex] = vertex_normals(positions, point, triangles) - self._smooth_normals[vertex]
         change[~touched[mesh.point] | (np.abs(change).max(axis=1) < _MIN_NORMAL_CHANGE)] = 0.0
         return change
@@ -192,9 +190,8 @@ def _fit_weights(
             )
             hessian += _PRIOR_MM2 * np.eye(len(bones))
             weights[rows] = 0.0
-            weights[rows[:, None], bones] = _best_weights(
-                hessian, gradient + _PRIOR_MM2 * interpolated[:, bones]
-            )
+            gradient += _PRIOR_MM2 * interpolated[:, bones]
+            weights[rows[:, None], bones] = _best_weights(hessian, gradient)
     return weights
 
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -110,9 +110,8 @@ def _load(
         point = weld(np.column_stack((positions, _separation_numbers(mesh_file.parts)))[used])
         if mesh_file.is_deformable:
             point = split_points(point, vertices, to_head[:3, :3], source)
-        mesh = build_mesh(
-            positions[used], uv[used], corners, material, materials, normals[used], point, part.quads
-        )
+        arrays = positions[used], uv[used], corners, material, materials, normals[used], point
+        mesh = build_mesh(*arrays, part.quads)
         check_mesh(mesh, source)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
@@ -138,9 +137,8 @@ def _materials(
     parts: list[MeshPart], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
 ) -> tuple[Ints, tuple[Material, ...]]:
     """Return the material index of each triangle (f,) and the materials, in the order of the file."""
-    groups = [
-        part.group if part.group.names else MaterialGroup((source.stem,), part.group.colour) for part in parts
-    ]
+    unnamed = (source.stem,)
+    groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
     is_opaque = _match_groups(groups, opaque, "opaque", source)
     is_eye = _match_groups(groups, eye_groups, "eye_groups", source)
     has_skin_group = any(group.name_contains("skin") for group in groups)

@@ -29,9 +29,7 @@ _GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a leve
 _MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 Load = Callable[[PathLike], Numbers]
 _MAX_PARALLEL_TEXELS = MAX_PIXELS  # of all maps together, so that they can be decoded in parallel
-_MIN_CACHED_BYTES = (
-    1 << 14
-)  # maps of larger files are cached on disk, because reading is faster than decoding
+_MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is faster than decoding
 _CACHE_VERSION = 1  # increment when the same files result in other maps
 
 
@@ -41,9 +39,8 @@ def check_finite(path: PathLike, values: A) -> A:
     Raises DermisError for infinite values and NaN.
     """
     if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
-        refuse(
-            path, "a map of finite numbers", "some are infinite or NaN", "Export it again, scaled to 0 to 1"
-        )
+        advice = "Export it again, scaled to 0 to 1"
+        refuse(path, "a map of finite numbers", "some are infinite or NaN", advice)
     return values
 
 
@@ -211,9 +208,7 @@ def load_maps(
         advice = "Skin maps have about 0.02 to 0.03; ask the author of the map"
         refuse(height, "a height map with height_mm, the mm per grey level, above 0", actual, advice)
     if normal is not None and normal_y not in ("up", "down"):
-        refuse(
-            "normal_y", '"up" or "down"', f"it is {normal_y!r}", "Use the other one if bumps look like dents"
-        )
+        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Use the other if bumps look like dents")
     roles: dict[str, tuple[PathLike | None, str, Load]] = {  # largest first
         "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
         "colour": (colour, "colour", colour_map),
@@ -225,9 +220,8 @@ def load_maps(
     files = [path for path, _, _ in roles.values() if path is not None]
     parallel = sum(_texel_count(path) for path in files) <= _MAX_PARALLEL_TEXELS
     with ThreadPoolExecutor(os.cpu_count() if parallel else 1) as pool:  # decoders release the GIL
-        return Maps(
-            **dict(zip(roles, pool.map(lambda role: _cached_map(*role), roles.values()), strict=True))
-        )
+        maps = pool.map(lambda role: _cached_map(*role), roles.values())
+        return Maps(**dict(zip(roles, maps, strict=True)))
 
 
 def load_labels(path: PathLike) -> Bytes:

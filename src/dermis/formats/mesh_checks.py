@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.formats import size_limits as limits
 from dermis.formats.parts import MeshPart, default_unit_mm
-from dermis.formats.size_limits import MAX_TRIANGLES, MAX_VERTICES
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
@@ -22,7 +22,6 @@ LIKELY_HEAD_HEIGHT_MM = (150.0, 500.0)
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 MIN_RELATIVE_AREA = 1e-6
 """Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
-_DAMAGED = "The file is damaged: export it again"
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
@@ -56,23 +55,21 @@ def check_arrays(
         refuse(culprit, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
     if triangles.min() < 0 or triangles.max() >= len(positions):
         actual = f"they run from {triangles.min()} to {triangles.max()}"
-        refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", actual, _DAMAGED)
+        refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", actual, limits.DAMAGED_ADVICE)
     for name, values in (("positions", positions), ("uv", uv)):
         _check_finite(name, values, culprit)
     farthest = float(np.abs(positions).max())
     if farthest > MAX_DISTANCE_MM:
-        expected, actual = (
-            f"positions within {MAX_DISTANCE_MM:g} mm of the origin",
-            f"one is {farthest:.3g} mm away",
-        )
-        refuse(culprit, expected, actual, f"{_UNIT_ADVICE}, or move the head to the origin")
+        expected = f"positions within {MAX_DISTANCE_MM:g} mm of the origin"
+        advice = f"{_UNIT_ADVICE}, or move the head to the origin"
+        refuse(culprit, expected, f"one is {farthest:.3g} mm away", advice)
 
 
 def _check_finite(name: str, values: NDArray[np.floating], culprit: object, items: str = "vertices") -> None:
     lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if len(lost):
         actual = f"{len(lost)} {items} are NaN or infinite, first {lost[0]}"
-        refuse(culprit, f"finite {name}", actual, _DAMAGED)
+        refuse(culprit, f"finite {name}", actual, limits.DAMAGED_ADVICE)
 
 
 def check_rig(rig: Rig, culprit: object) -> None:
@@ -87,13 +84,10 @@ def check_rig(rig: Rig, culprit: object) -> None:
 
 def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
     """Refuse parts with too many triangles or vertices before they are joined."""
-    for name, most, count in (
-        ("triangles", MAX_TRIANGLES, sum(len(part.triangles) for part in parts)),
-        ("vertices", MAX_VERTICES, sum(len(part.positions) for part in parts)),
-    ):
-        if count > most:
-            advice = "Decimate it (in Blender: Modifiers > Decimate)"
-            refuse(culprit, f"a mesh of at most {most:,} {name}", f"it has {count:,}", advice)
+    triangles = sum(len(part.triangles) for part in parts)
+    limits.check_limit(culprit, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
+    vertices = sum(len(part.positions) for part in parts)
+    limits.check_limit(culprit, vertices, limits.MAX_VERTICES, "vertices", limits.DECIMATE_ADVICE)
 
 
 def _check_uv_range(mesh: Mesh, culprit: object) -> None:
@@ -155,9 +149,8 @@ def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> Non
     if HEAD_HEIGHT_MM[0] <= height <= HEAD_HEIGHT_MM[1]:
         return
     unit_mm = default_unit_mm(str(culprit)) if unit_mm is None else unit_mm
-    fitting = [
-        u for u in UNITS_MM if LIKELY_HEAD_HEIGHT_MM[0] <= height / unit_mm * u <= LIKELY_HEAD_HEIGHT_MM[1]
-    ]
+    low, high = LIKELY_HEAD_HEIGHT_MM
+    fitting = [unit for unit in UNITS_MM if low <= height / unit_mm * unit <= high]
     advice = _UNIT_ADVICE
     if fitting:
         advice += f": {fitting[0]:g} would make it {height / unit_mm * fitting[0]:.4g} mm high"

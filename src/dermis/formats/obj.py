@@ -11,9 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dermis.base.arrays import Bytes, Floats, Index
+from dermis.base.arrays import Bytes, Index
 from dermis.base.errors import DermisError, refuse
 from dermis.base.reading import read_file
+from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.parts import (
     GREY,
@@ -25,15 +26,6 @@ from dermis.formats.parts import (
     trimesh_parts,
 )
 from dermis.formats.referenced_files import find_referenced_file
-from dermis.formats.size_limits import (
-    MAX_CORNERS,
-    MAX_FILE_BYTES,
-    MAX_GROUPS,
-    MAX_LIBRARIES,
-    MAX_MTL_BYTES,
-    MAX_TRIANGLES,
-    MAX_VERTICES,
-)
 from dermis.images.io import read_image, read_size
 from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
@@ -72,7 +64,7 @@ def read_obj_text(path: Path) -> str:
 
     Raises DermisError when it cannot be read or is too large.
     """
-    text = read_file(path, "an OBJ file", MAX_FILE_BYTES).decode("utf-8", errors="replace")
+    text = read_file(path, "an OBJ file", limits.MAX_FILE_BYTES).decode("utf-8", errors="replace")
     return text.replace("\r\n", "\n")
 
 
@@ -93,12 +85,10 @@ def _check_lines(path: Path, data: Bytes) -> None:
     length = np.diff(starts, append=len(data) + 1)
     vertex = data[np.minimum(starts, len(data) - 1)] == ord("v") if len(data) else np.zeros(1, bool)
     if length.max() > _MAX_LINE or length[vertex].max(initial=0) > _MAX_VERTEX_LINE:
-        actual, advice = f"one has {length.max():,}", "The file is damaged: export it again"
         expected = f"lines of at most {_MAX_LINE:,} characters, {_MAX_VERTEX_LINE} for vertices"
-        refuse(path, expected, actual, advice)
-    if int(vertex.sum()) > 3 * MAX_VERTICES:
-        actual, advice = f"it has {int(vertex.sum()):,}", "Decimate it (in Blender: Modifiers > Decimate)"
-        refuse(path, f"at most {3 * MAX_VERTICES:,} lines of vertices, uv and normals", actual, advice)
+        refuse(path, expected, f"one has {length.max():,}", limits.DAMAGED_ADVICE)
+    items = "lines of vertices, uv and normals"
+    limits.check_limit(path, int(vertex.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE)
 
 
 def face_groups(text: str) -> Iterator[tuple[str, str]]:
@@ -125,9 +115,9 @@ def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
         return f"usemtl {numbers.setdefault(key, len(numbers))}"
 
     marked = _GROUP_LINE.sub(number, text)
-    if len(numbers) > MAX_GROUPS:
-        actual, advice = f"it has {len(numbers):,}", "Export it with fewer, or without groups"
-        refuse(path, f"at most {MAX_GROUPS:,} groups", actual, advice)
+    limits.check_limit(
+        path, len(numbers), limits.MAX_GROUPS, "groups", "Export it with fewer, or without groups"
+    )
     return f"mtllib marked.mtl\nusemtl 0\n{marked}", list(numbers)
 
 
@@ -136,32 +126,27 @@ def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
 
     Raises DermisError for relative indices, for indices of 0, and for too many corners.
     """
-    sides: list[list[int]] = [[] for _ in range(groups)]
-    current, triangles = sides[0], 0
+    corner_counts: list[list[int]] = [[] for _ in range(groups)]
+    current, triangles = corner_counts[0], 0
     for line in _FACE_OR_NUMBER.finditer(text):
         number, face = line.groups()
         if number:
-            current = sides[int(number)]
+            current = corner_counts[int(number)]
             continue
         if "-" in face:
-            actual = "it has relative (negative) ones"
-            refuse(path, "faces by absolute index", actual, "Export it again, in Blender")
+            actual = "it has negative ones"
+            refuse(path, "absolute indices in faces", actual, "Export it again, in Blender")
         if (" 0" in face or "/0" in face or "\t0" in face) and _ZERO.search(face):
-            refuse(path, "faces by indices from 1", "it has a 0", "The file is damaged: export it again")
+            refuse(path, "faces by indices from 1", "it has a 0", limits.DAMAGED_ADVICE)
         count = len(face.split())
         current.append(count)
         triangles += max(count - 2, 0)
-        if count > MAX_CORNERS or triangles > MAX_TRIANGLES:
-            _refuse_faces(path, count)
-    return [np.array(one, dtype=np.int64) for one in sides]
-
-
-def _refuse_faces(path: Path, corners: int) -> None:
-    if corners > MAX_CORNERS:
-        actual = f"one has {corners:,}"
-        refuse(path, f"faces of at most {MAX_CORNERS:,} corners", actual, "Divide it into smaller ones")
-    actual, advice = "it has more", "Decimate it (in Blender: Modifiers > Decimate)"
-    refuse(path, f"a mesh of at most {MAX_TRIANGLES:,} triangles", actual, advice)
+        if count > limits.MAX_CORNERS or triangles > limits.MAX_TRIANGLES:
+            limits.check_limit(
+                path, count, limits.MAX_CORNERS, "corners of a face", "Divide it into smaller ones"
+            )
+            limits.check_limit(path, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
+    return [np.array(one, dtype=np.int64) for one in corner_counts]
 
 
 def read_obj(path: Path) -> MeshFile:
@@ -175,15 +160,14 @@ def parse_obj(path: Path, text: str) -> MeshFile:
     materials = read_materials(path, text).materials
     colours = {name: parse_colour(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
     text, pairs = number_groups(path, text)
-    sides = face_corner_counts(path, text, len(pairs))
+    corner_counts = face_corner_counts(path, text, len(pairs))
     names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in pairs]
-    groups = [
-        MaterialGroup(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)
-    ]
+    pairs_of_names = zip(names, pairs, strict=True)
+    groups = [MaterialGroup(name, colours.get(pair[0], GREY)) for name, pair in pairs_of_names]
     numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end; this restores the order of the file
     parts = list(trimesh_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
-    corners = {id(group): counts for group, counts in zip(groups, sides, strict=True)}
+    corners = {id(group): counts for group, counts in zip(groups, corner_counts, strict=True)}
     parts = [replace(part, quads=find_quads(corners[id(part.group)], part.triangles)) for part in parts]
     used, none = [part.group for part in parts], np.empty((0, 3))
     empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in used]
@@ -251,23 +235,15 @@ def _unused_files_note(path: Path, faults: list[str]) -> str:
 def _load_map(
     role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
-    """Load the map in a file by its role."""
-    if role == "roughness":
-        root = load_maps(roughness=file).roughness
-        return {} if root is None else {role: root * root}
-    if role == "bump" and _is_grey(file):
-        height = load_maps(height=file, height_mm=height_mm).height
-        return {} if height is None else {"height": _scaled(height, texture, file)}
-    if role in ("bump", "normal"):
-        normal = load_maps(normal=file, normal_y=normal_y).normal
-        return {} if normal is None else {"normal": _scaled(normal, texture, file)}
-    return {role: getattr(load_maps(**{role: file}), role)}  # type: ignore[arg-type]
-
-
-def _scaled(relief: Floats, texture: Texture, file: Path) -> Floats:
-    """Return a relief scaled by the factor of its material."""
+    """Load the map in a file by its role; reliefs are scaled by the factor of their material."""
+    if role == "bump":
+        role = "height" if _is_grey(file) else "normal"
+    if role not in _RELIEF_ROLES:
+        values = getattr(load_maps(**{role: file}), role)  # type: ignore[arg-type]
+        return {role: values * values if role == "roughness" else values}
+    maps = load_maps(**{role: file}, height_mm=height_mm, normal_y=normal_y)
     with np.errstate(over="ignore", invalid="ignore"):
-        return check_finite(file, relief * np.float32(texture.factor))
+        return {role: check_finite(file, getattr(maps, role) * np.float32(texture.factor))}
 
 
 def _is_grey(file: Path) -> bool:
@@ -329,9 +305,10 @@ def read_materials(path: Path, text: str) -> Library:
 
     text : of the OBJ file
     """
-    library, remaining = Library(), MAX_MTL_BYTES
-    for listed in library_names(text)[:MAX_LIBRARIES]:
-        names = [listed] if find_referenced_file(path, listed) else listed.split(".mtl ")[:MAX_LIBRARIES]
+    library, remaining = Library(), limits.MAX_MTL_BYTES
+    for listed in library_names(text)[: limits.MAX_LIBRARIES]:
+        found = find_referenced_file(path, listed)
+        names = [listed] if found else listed.split(".mtl ")[: limits.MAX_LIBRARIES]
         for name in names:
             file = find_referenced_file(path, name) or find_referenced_file(path, f"{name}.mtl")
             if file is None:

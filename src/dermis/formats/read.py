@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file, parsing, read_file
+from dermis.formats import size_limits as limits
 from dermis.formats.gltf.triangles import read_gltf
 from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, trimesh_parts
-from dermis.formats.size_limits import MAX_FILE_BYTES, MAX_TRIANGLES, MAX_VERTICES
 
 _MAX_HEADER = 1 << 16  # bytes
-_MAX_ELEMENTS = {"vertex": MAX_VERTICES, "face": MAX_TRIANGLES}
+_MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
 _MAX_PROPERTIES = 256
-_DAMAGED = "The file is damaged: export it again"
 MAX_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
@@ -39,12 +38,11 @@ def check_ply(path: Path, data: bytes) -> bytes:
     """
     end = data.find(b"end_header", 0, _MAX_HEADER)
     if not data.startswith(b"ply") or end < 0:
-        refuse(path, "a PLY file", "it cannot be read (its header is invalid)", _DAMAGED)
+        refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
     header = data[:end]
     lines = [line.split() for line in header.splitlines()]
     properties = sum(line[:1] == [b"property"] for line in lines)
-    if properties > _MAX_PROPERTIES:
-        refuse(path, f"a PLY file of at most {_MAX_PROPERTIES} properties", f"it has {properties}", _DAMAGED)
+    limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
     for line in lines:
         if line[:1] == [b"element"]:
             _check_element(path, line, len(data) - end)
@@ -55,23 +53,21 @@ def _check_element(path: Path, line: list[bytes], remaining_bytes: int) -> None:
     """Refuse an element count that is too large for a mesh or for the size of the file."""
     name, count = (line[1].decode("latin-1"), line[2]) if len(line) == 3 else ("", b"")
     if not (count.isdigit() and len(count) < 12):
-        refuse(path, "elements with a name and a number", f"got {b' '.join(line)[:80]!r}", _DAMAGED)
-    limit = min(_MAX_ELEMENTS.get(name, MAX_TRIANGLES), remaining_bytes)
-    if int(count) > limit:
-        actual, advice = f"its header says {int(count):,}", "Decimate it (in Blender: Modifiers > Decimate)"
-        refuse(path, f"at most {limit:,} elements named {name!r}", actual, advice)
+        actual = f"got {b' '.join(line)[:80]!r}"
+        refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
+    limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
+    limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
 
 
 def read_ply(path: Path) -> MeshFile:
     """Read a .ply file; uv are vertex properties s, t or u, v or texture_u, texture_v, or face properties."""
-    data = read_file(path, "a PLY file", MAX_FILE_BYTES)
+    data = read_file(path, "a PLY file", limits.MAX_FILE_BYTES)
     header = check_ply(path, data)
     # uv coordinates by face corner require split vertices, for which the file's normals may be wrong;
     # for uv by vertex, splitting would drop the normals of files with unused vertices
     by_corner = b"texcoord" in header
-    parts = list(
-        trimesh_parts(data, "ply", [MaterialGroup((path.stem,))], fix_texture=by_corner, skip_materials=True)
-    )
+    groups = [MaterialGroup((path.stem,))]
+    parts = list(trimesh_parts(data, "ply", groups, fix_texture=by_corner, skip_materials=True))
     return MeshFile([replace(part, normals=None) for part in parts] if by_corner else parts)
 
 
@@ -123,9 +119,8 @@ def select_vertices(part: MeshPart, used: Index) -> MeshPart:
 def _transposed(
     rows: dict[str, list[tuple[Index, Doubles]]],
 ) -> dict[str, tuple[list[Index], list[Doubles]]]:
-    return {
-        name: ([first for first, _ in pairs], [second for _, second in pairs]) for name, pairs in rows.items()
-    }
+    items = rows.items()
+    return {name: ([first for first, _ in own], [second for _, second in own]) for name, own in items}
 
 
 def _part_normals(part: MeshPart) -> Doubles:
@@ -150,7 +145,7 @@ def _part_uv(part: MeshPart, source: Path) -> Doubles:
         refuse(source, "uv at every vertex", f"{name!r} has none", advice)
     if not np.abs(part.uv).max() <= MAX_UV:
         actual = f"{name!r} has some that are NaN, infinite or beyond {MAX_UV:g}"
-        refuse(source, "finite uv", actual, "The file is damaged: export it again")
+        refuse(source, "finite uv", actual, limits.DAMAGED_ADVICE)
     return part.uv
 
 

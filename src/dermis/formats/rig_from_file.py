@@ -9,6 +9,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.base.errors import refuse
 from dermis.formats.parts import Bones, MeshPart
+from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
 SPLIT_TOLERANCE_MM = 0.01
@@ -31,7 +32,7 @@ def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) 
     while len(remaining):
         if number > _MAX_COINCIDENT:
             actual = f"{number} of them move differently"
-            refuse(culprit, "a few coincident vertices", actual, "The file is damaged: export it again")
+            refuse(culprit, "a few coincident vertices", actual, DAMAGED_ADVICE)
         groups, first = np.unique(point[remaining], return_index=True)
         other = remaining[first[np.searchsorted(groups, point[remaining])]]
         apart = _targets_differ(part, remaining, other, linear) | _weights_differ(part, remaining, other)
@@ -95,19 +96,19 @@ def _targets(
         return no_targets()
     is_first = np.zeros(len(point), bool)
     is_first[first] = True
-    moved, deltas = [], []
+    points, deltas = [], []
     for vertex, delta in part.targets.values():
         delta_mm = (delta @ to_head[:3, :3].T).astype(np.float32)
         used = np.flatnonzero(is_first[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
         used = used[np.argsort(point[vertex[used]])]
-        moved.append(point[vertex[used]])
+        points.append(point[vertex[used]])
         deltas.append(delta_mm[used])
-    start = np.cumsum([0, *map(len, moved)]).astype(np.int32)
+    start = np.cumsum([0, *map(len, points)]).astype(np.int32)
     rest = np.array([weights.get(name, 0.0) for name in part.targets], np.float32)
     return MorphTargets(
         tuple(part.targets),
         start,
-        np.concatenate(moved),
+        np.concatenate(points),
         np.concatenate(deltas),
         rest if rest.any() else None,
     )
@@ -126,6 +127,5 @@ def _skeleton(part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culp
         actual = f"{bones.names[unusable[0]]!r} has a scale of 0 at rest"
         refuse(culprit, "bones with a scale above 0", actual, "Export it with another scale")
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bones.world))
-    return Skeleton(
-        bones.names, bones.parent, bones.local, np.asarray(inverse, np.float64), to_head, bone, weight
-    )
+    inverse_bind = np.asarray(inverse, np.float64)
+    return Skeleton(bones.names, bones.parent, bones.local, inverse_bind, to_head, bone, weight)

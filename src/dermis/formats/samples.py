@@ -97,12 +97,7 @@ def is_available(name: str) -> bool:
 
 def _find(name: str) -> Sample:
     if name not in SAMPLES:
-        refuse(
-            f"sample {name!r}",
-            f"one of {', '.join(SAMPLES)}",
-            "there is none of this name",
-            "Choose one of them",
-        )
+        refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them")
     return SAMPLES[name]
 
 
@@ -136,16 +131,15 @@ def _sha256(path: Path, size: int, mtime_ns: int) -> str:
 def _download(sample: Sample, roles: list[str]) -> None:
     import pooch
 
+    folder = _folder(sample)
     for count, role in enumerate(roles):
         file, progress = sample.files[role], _Progress(sample.files[role].name)
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
         try:
-            make_private_folder(_folder(sample))
-            if not (path := _folder(sample) / file.name).is_file():
+            make_private_folder(folder)
+            if not (path := folder / file.name).is_file():
                 path.unlink(missing_ok=True)  # pooch would read from a pipe
-            pooch.retrieve(
-                file.url, f"sha256:{file.sha256}", file.name, _folder(sample), downloader=downloader
-            )
+            pooch.retrieve(file.url, f"sha256:{file.sha256}", file.name, folder, downloader=downloader)
         except (OSError, ValueError) as fault:  # no network, no permission; another hash
             _refuse_download(sample, roles[count:], fault)
         finally:

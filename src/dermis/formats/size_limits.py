@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from dermis.base.errors import refuse
+
+DAMAGED_ADVICE = "The file is damaged: export it again"
+DECIMATE_ADVICE = "Decimate it (in Blender: Modifiers > Decimate)"
+
 MAX_FILE_BYTES = 512 << 20
 """Largest mesh file, and largest total size of the buffers of a glTF file."""
 MAX_TRIANGLES = 1_250_000
@@ -30,3 +35,9 @@ MAX_MTL_BYTES = 4 << 20
 """Largest total size of the .mtl files of an OBJ file."""
 MAX_LIBRARIES = 64
 """Largest number of .mtl files of an OBJ file."""
+
+
+def check_limit(culprit: object, count: int, limit: int, items: str, advice: str) -> None:
+    """Refuse more than `limit` items."""
+    if count > limit:
+        refuse(culprit, f"at most {limit:,} {items}", f"it has {count:,}", advice)

@@ -29,9 +29,7 @@ _UP_FILTER = 2  # number of PNG's filter that stores differences from the row ab
 _PILLOW_LOCK = threading.Lock()
 _STRIP_PIXELS = 1 << 20  # pixels converted at a time
 _JPEG_SCAN = b"\xff\xda"
-_MAX_SCANNED_PIXELS = (
-    1 << 30
-)  # pixels in all scans of a progressive JPEG: sixteen scans of the largest picture
+_MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
 _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
@@ -95,10 +93,8 @@ def _open_checked(data: bytes) -> Image:
     check_size(picture.width, picture.height)
     if picture.format == "PNG":
         _open_header(data).verify()  # the checksums, which Pillow does not check when it decodes
-    if (
-        picture.format == "JPEG"
-        and data.count(_JPEG_SCAN) * picture.width * picture.height > _MAX_SCANNED_PIXELS
-    ):
+    scanned = data.count(_JPEG_SCAN) * picture.width * picture.height
+    if picture.format == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
         raise ValueError("it was stored in too many scans")
     return picture
 

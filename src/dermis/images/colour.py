@@ -94,9 +94,8 @@ def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
     grey = C1 * C2 == 0.0
     turn = np.where(grey, 0.0, (h2 - h1 + 180.0) % 360.0 - 180.0)
     wraps = np.abs(h1 - h2) > 180.0
-    hue = np.where(
-        grey, h1 + h2, 0.5 * (h1 + h2) + np.where(wraps, np.where(h1 + h2 < 360.0, 180.0, -180.0), 0.0)
-    )
+    opposite = np.where(wraps, np.where(h1 + h2 < 360.0, 180.0, -180.0), 0.0)
+    hue = np.where(grey, h1 + h2, 0.5 * (h1 + h2) + opposite)
     L, C = 0.5 * (L1 + L2), 0.5 * (C1 + C2)
     lightness = (L2 - L1) / (1.0 + 0.015 * (L - 50.0) ** 2 / np.sqrt(20.0 + (L - 50.0) ** 2))
     chroma = (C2 - C1) / (1.0 + 0.045 * C)
@@ -111,6 +110,5 @@ def _chroma_term(chroma: Doubles) -> Doubles:
 
 def _hue_weight(hue: Doubles) -> Doubles:
     terms = ((-0.17, 1.0, -30.0), (0.24, 2.0, 0.0), (0.32, 3.0, 6.0), (-0.20, 4.0, -63.0))
-    return np.asarray(
-        1.0 + sum(weight * np.cos(np.radians(factor * hue + shift)) for weight, factor, shift in terms)
-    )
+    cosines = (weight * np.cos(np.radians(factor * hue + shift)) for weight, factor, shift in terms)
+    return np.asarray(1.0 + sum(cosines))

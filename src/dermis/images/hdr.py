@@ -98,9 +98,8 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """
     import OpenEXR
 
-    channels = {
-        name: np.ascontiguousarray(picture[..., k]) for k, name in enumerate(_NAMES[picture.shape[2]])
-    }
+    names = _NAMES[picture.shape[2]]
+    channels = {name: np.ascontiguousarray(picture[..., k]) for k, name in enumerate(names)}
     header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage}
     file = io.BytesIO()
     OpenEXR.File(header, channels).write(file)

@@ -131,9 +131,8 @@ def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
     """
     if not isinstance(path, str | os.PathLike):
         actual = f"got a {type(path).__name__} first"
-        refuse(
-            "write_image", "the file's name, then the picture", actual, 'Call write_image("face.png", image)'
-        )
+        advice = 'Call write_image("face.png", image)'
+        refuse("write_image", "the file's name, then the picture", actual, advice)
     linear = np.asarray(linear)
     if linear.ndim not in (2, 3) or linear.dtype.kind not in "fu":
         actual = f"got shape {linear.shape} and type {linear.dtype}"

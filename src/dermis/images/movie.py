@@ -9,8 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ _MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
 _BT709, _LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
 _QUEUE_LENGTH = 8
 _MAX_SIDE = 1 << 14  # of a frame in H.264
-_NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
+_NTSC = tuple(Fraction(1000 * rate, 1001) for rate in (24, 30, 48, 60, 120))
 _NTSC_TOLERANCE = Fraction(5, 1000)
 _RATE = re.compile(
     r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?"
@@ -132,11 +131,9 @@ class MovieWriter:
         self._context.__enter__()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *exception: Any) -> None:
         """Finish the movie and close the file; after an error no file is left."""
-        self._context.__exit__(kind, error, trace)
+        self._context.__exit__(*exception)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -180,12 +177,8 @@ class MovieWriter:
         width, height = self.size
         if picture.shape != (height, width, 3) or picture.dtype != np.uint8:
             actual = f"they have shape {picture.shape} and type {picture.dtype}"
-            refuse(
-                self.path,
-                f"pixels ({height}, {width}, 3) of uint8",
-                actual,
-                "Use the renderer's sRGB picture",
-            )
+            expected = f"pixels ({height}, {width}, 3) of uint8"
+            refuse(self.path, expected, actual, "Use the renderer's sRGB picture")
         self._queue.append(self._pool.submit(self._encode, self._count, picture))
         self._count += 1
         while len(self._queue) > _QUEUE_LENGTH or (self._queue and self._queue[0].done()):

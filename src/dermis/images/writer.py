@@ -59,12 +59,8 @@ class ImageWriter:
         if is_exr and not np.issubdtype(picture.dtype, np.floating):
             refuse(path, "linear floats", actual, "Use the renderer's linear picture, or write .png")
         if not is_exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4)):
-            refuse(
-                path,
-                "pixels (H, W, 3 or 4) of uint8",
-                actual,
-                "Use the renderer's sRGB picture, or write .exr",
-            )
+            advice = "Use the renderer's sRGB picture, or write .exr"
+            refuse(path, "pixels (H, W, 3 or 4) of uint8", actual, advice)
         write = partial(write_exr, fast=True) if is_exr else partial(write_png, effort=_FAST_COMPRESSION)
         self._queue.append(self._pool.submit(write, path, picture))
         while len(self._queue) > self._max_queued or (self._queue and self._queue[0].done()):
@@ -121,12 +117,8 @@ class FrameFiles:
         """
         name = self.pattern.name
         if len(_NUMBER.findall(name)) != 1 or name.count("%") != 1:
-            refuse(
-                self.pattern,
-                "one placeholder for the number",
-                f"the name is {name!r}",
-                "Write frames/%05d.png",
-            )
+            actual = f"the name is {name!r}"
+            refuse(self.pattern, "one placeholder for the number", actual, "Write frames/%05d.png")
         if self.pattern.suffix.lower() not in OUTPUT_SUFFIXES:
             actual = f"the suffix is {self.pattern.suffix!r}"
             refuse(self.pattern, f"frames as {' or '.join(OUTPUT_SUFFIXES)}", actual, "Choose one of them")

@@ -31,6 +31,12 @@ def interpolate_table(column: Callable[[float], Floats], position: float) -> Flo
     return np.asarray((1.0 - weight) * column(low / TABLE_STEPS) + weight * column((low + 1) / TABLE_STEPS))
 
 
+def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
+    """Return `interpolate_table` at positions (c,), with the columns in the last axis."""
+    values = np.atleast_1d(np.asarray(positions, np.float64)).tolist()
+    return np.stack([interpolate_table(column, value) for value in values], axis=-1)
+
+
 @dataclass(frozen=True)
 class AngularResponse:
     """Angular dependence of the reflectance of a half-space, relative to a diffuse surface.
@@ -63,13 +69,9 @@ def angular_response(total: ArrayLike, eta: float) -> AngularResponse:
     Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for the
     separation of single scattering.
     """
-    totals = np.atleast_1d(np.asarray(total, np.float64))
-    found = np.stack(
-        [interpolate_table(partial(_response_column, eta), float(value)) for value in totals], axis=-1
-    )
-    return AngularResponse(
-        eta, found[:DIRECTION_ROWS], found[DIRECTION_ROWS], found[DIRECTION_ROWS + 1], _mean_kernel(eta)
-    )
+    columns = interpolate_columns(partial(_response_column, eta), total)
+    table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
+    return AngularResponse(eta, table, diffuse, single_scattering, _mean_kernel(eta))
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:

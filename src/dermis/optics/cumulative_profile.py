@@ -34,17 +34,15 @@ class CumulativeProfile:
     energy: Floats
 
     @classmethod
-    def from_function(
-        cls, fraction_within: Callable[[Floats], Floats], energy: ArrayLike
-    ) -> CumulativeProfile:
+    def from_function(cls, within: Callable[[Floats], Floats], energy: ArrayLike) -> CumulativeProfile:
         """Return the profile of a function in closed form.
 
-        fraction_within : function from radii (n,) [mm] to the fraction of all emerging light within them, (n,
+        within : function from radii (n,) [mm] to the fraction of all emerging light within them, (n,
             3)
         energy : (3,) emerging light per light that enters [-]
         """
         grid = radii()
-        return cls(grid, np.asarray(fraction_within(grid), np.float64), np.asarray(energy, np.float64))
+        return cls(grid, np.asarray(within(grid), np.float64), np.asarray(energy, np.float64))
 
     @classmethod
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
@@ -55,9 +53,8 @@ class CumulativeProfile:
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])
         fraction = energy_within / np.maximum(total, TINY)
-        return cls.from_function(
-            lambda r: interpolate_cumulative(r, profile.edges_mm, fraction), total / entering_fraction
-        )
+        energy = total / entering_fraction
+        return cls.from_function(lambda r: interpolate_cumulative(r, profile.edges_mm, fraction), energy)
 
     def fraction_within(self, radius_mm: ArrayLike) -> Floats:
         """Return the fraction of all emerging light within radii, (..., 3) [-]."""

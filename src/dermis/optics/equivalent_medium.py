@@ -110,9 +110,8 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
     from scipy.optimize import brentq
 
     total = transform(float(hankel.ZERO_FREQUENCY[0]))
-    return float(
-        np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOG_FREQUENCY_RANGE))
-    )
+    excess = lambda log: transform(float(np.exp(log))) - 0.5 * total  # noqa: E731
+    return float(np.exp(brentq(excess, *_LOG_FREQUENCY_RANGE)))
 
 
 def oblique_offset_mm(medium: Medium) -> float:

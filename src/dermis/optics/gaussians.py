@@ -63,9 +63,7 @@ class GaussianSum:
             refuse(self.name, "weights of 0 or more, some above 0 in each channel", "they are not", _ADVICE)
         if weight.max() > MAX_WEIGHT:
             actual = f"got {weight.max():g}"
-            refuse(
-                self.name, f"weights up to {MAX_WEIGHT:g}, as they are fractions of light", actual, _ADVICE
-            )
+            refuse(self.name, f"weights up to {MAX_WEIGHT:g}, fractions of light", actual, _ADVICE)
 
     @property
     def albedo(self) -> Floats:

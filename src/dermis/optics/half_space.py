@@ -28,10 +28,7 @@ _SCALAR_COLUMNS = ("kind", "albedo", "total")
 CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
 """Name of the model of tabulated photon counts."""
-_MIN_STEP, _MAX_STEP = (
-    0.05,
-    0.4,
-)  # of log r for the slope of the cumulative profile: larger where few photons leave
+_MIN_STEP, _MAX_STEP = 0.05, 0.4  # of log r for slopes: larger where few photons leave
 _STEP = 0.02  # times the root of the mean free path over r
 
 

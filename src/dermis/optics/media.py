@@ -26,10 +26,7 @@ _DJ3_NOTE = (
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
 _ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
-_MIN_SCATTERING, _MAX_COEFFICIENT = (
-    1e-6,
-    1e6,
-)  # from clear water to ten times the absorption of a metal [1/mm]
+_MIN_SCATTERING, _MAX_COEFFICIENT = 1e-6, 1e6  # clear water, ten times the absorption of a metal [1/mm]
 _MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
 _KEYS = ("absorption_per_mm", "scattering_per_mm")
 
@@ -132,9 +129,7 @@ def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
     a, s = layer.sigma_a, layer.sigma_s_prime
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         actual = f"got shapes {a.shape} and {s.shape}"
-        refuse(
-            culprit, "one absorption and one scattering coefficient per channel", actual, "Correct the lists"
-        )
+        refuse(culprit, "one absorption and scattering coefficient per channel", actual, "Correct the lists")
     if not ((a >= 0) & (a <= _MAX_COEFFICIENT) & (s >= _MIN_SCATTERING) & (s <= _MAX_COEFFICIENT)).all():
         actual = f"got absorption {a.tolist()} and scattering {s.tolist()}"
         expected = f"absorption from 0 and scattering from {_MIN_SCATTERING:g} to {_MAX_COEFFICIENT:g} /mm"
@@ -168,9 +163,7 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     tables = document.get("layers")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         refuse(path, "[[layers]] with absorption_per_mm and scattering_per_mm", "it has none", "Add them")
-    layers = tuple(
-        _layer_from_table(f"{path}, layer {count}", table) for count, table in enumerate(tables, 1)
-    )
+    layers = tuple(_layer_from_table(f"{path}, layer {k}", table) for k, table in enumerate(tables, 1))
     unknown = sorted(set(document) - {"name", "eta", "layers"})
     if unknown:
         refuse(path, "name, eta and [[layers]]", f"got {', '.join(unknown)}", "Take them out")
@@ -193,9 +186,8 @@ def _layer_from_table(culprit: str, table: Mapping[str, Any]) -> Layer:
 
 
 def _rgb_coefficients(culprit: str, table: Mapping[str, Any], key: str) -> Floats:
-    return checked_array(
-        f"{culprit}: {key}", table.get(key), (3,), 0.0, _MAX_COEFFICIENT, "1/mm in red, green and blue"
-    )
+    unit = "1/mm in red, green and blue"
+    return checked_array(f"{culprit}: {key}", table.get(key), (3,), 0.0, _MAX_COEFFICIENT, unit)
 
 
 def _read_media(table: str) -> dict[str, list[Layer]]:
@@ -218,15 +210,3 @@ def albedo_from_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
     s = 4.09712 + 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2)
     s = np.clip(s, 0.0, 1.0)
     return np.asarray((1.0 - s**2) / (1.0 - g * s**2))
-
-
-def colour_from_albedo(albedo: ArrayLike, g: float = 0.0) -> Floats:
-    """Return the diffuse reflectance of a half-space by its single-scattering albedo, in its shape [-].
-
-    g : mean cosine of the scattering angle [-]
-
-    Source: van de Hulst's formula, [dEon2016].
-    """
-    alpha = np.asarray(albedo, np.float64)
-    s = np.sqrt((1.0 - alpha) / (1.0 - alpha * g))
-    return np.asarray((1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s))

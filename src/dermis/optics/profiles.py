@@ -84,9 +84,9 @@ def load_profile(
     table = find_gaussians(name)
     if table is not None:
         return table
-    return (
-        _fit_preset(str(name)) if str(name) in tissue_names() else fit_profile(load_tissue(Path(name)), name)
-    )
+    if str(name) in tissue_names():
+        return _fit_preset(str(name))
+    return fit_profile(load_tissue(Path(name)), name)
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
@@ -188,17 +188,14 @@ def _fit_rings(rings: RingTarget, model: str, name: str, initial: GaussianSum | 
 
 @cache
 def _published() -> GaussianSum:
-    return _parse_csv(
-        PUBLISHED_PRESET,
-        resources.files("dermis.optics").joinpath(f"data/{PUBLISHED_PRESET}.csv").read_text("utf-8"),
-    )
+    file = resources.files("dermis.optics").joinpath(f"data/{PUBLISHED_PRESET}.csv")
+    return _parse_csv(PUBLISHED_PRESET, file.read_text("utf-8"))
 
 
 def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
     name = f"profile {path}"
-    variances = checked_array(
-        f"{name}: variances_mm2", document["variances_mm2"], (0,), 0.0, MAX_VARIANCE_MM2
-    )
+    key = "variances_mm2"
+    variances = checked_array(f"{name}: {key}", document[key], (0,), 0.0, MAX_VARIANCE_MM2)
     weights = checked_array(f"{name}: weights", document.get("weights"), (0, 3), 0.0, MAX_WEIGHT)
     return replace(_rgb_sum(path, variances, weights), from_photons=document.get("model") in PHOTON_MODELS)
 

@@ -85,9 +85,8 @@ def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> 
     rate = 2.0 * np.pi * grid_mm[:, None] ** 2 * reflectance  # per unit of log r
     inner = 0.5 * rate[:1]  # R is nearly constant within the first radius of the grid
     within = inner + cumulative_simpson(rate, x=np.log(grid_mm), axis=0, initial=0.0)
-    return np.where(
-        radius_mm[:, None] > 0.0, resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within), 0.0
-    )
+    energy = resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within)
+    return np.where(radius_mm[:, None] > 0.0, energy, 0.0)
 
 
 def missing_light_warnings(total: Floats, ring_energy: Floats) -> list[str]:

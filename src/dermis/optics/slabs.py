@@ -18,7 +18,7 @@ from dermis.optics.angular_response import (
     critical_cosine,
     gauss_legendre,
     internal_reflectance,
-    interpolate_table,
+    interpolate_columns,
     mean_single_scattering_kernel,
     refracted_cosine,
 )
@@ -141,9 +141,8 @@ def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tupl
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
-    *_, (R, T, unscattered) = _doubling_steps(
-        transport, np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings]), doublings
-    )
+    tau = np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings])
+    *_, (R, T, unscattered) = _doubling_steps(transport, tau, doublings)
     reflected, _ = _add_faces(R * transport.flux, T * transport.flux, unscattered, transport.internal, R, T)
     leaving = (transport.flux * (1.0 - transport.internal))[transport.escapes]
     radiance = reflected[0][np.ix_(transport.escapes, transport.escapes)] * leaving.sum()
@@ -269,22 +268,12 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
     isotropic = angular_response(total, eta)
     if g == 0.0:
         return isotropic
-    totals = np.atleast_1d(np.asarray(total, np.float64))
-    table, isotropic_table = (
-        np.stack(
-            [
-                interpolate_table(partial(_response_column, eta, mean_cosine), float(value))
-                for value in totals
-            ],
-            axis=-1,
-        )
-        for mean_cosine in (g, 0.0)
+    columns, isotropic_columns = (
+        interpolate_columns(partial(_response_column, eta, mean_cosine), total) for mean_cosine in (g, 0.0)
     )
-    change = table[DIRECTION_ROWS + 1] - isotropic_table[DIRECTION_ROWS + 1]
-    single_scattering = isotropic.single_scattering + change
-    return AngularResponse(
-        eta, table[:DIRECTION_ROWS], table[DIRECTION_ROWS], single_scattering, isotropic.mean_kernel
-    )
+    table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
+    single_scattering = isotropic.single_scattering + single_scattering - isotropic_columns[-1]
+    return AngularResponse(eta, table, diffuse, single_scattering, isotropic.mean_kernel)
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -297,10 +286,8 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
         return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
     table = _extrapolated(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    kernel, deviation = (
-        1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta),
-        radiance - reflectance,
-    )
+    kernel = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
+    deviation = radiance - reflectance
     weight = np.outer(fraction, fraction)
     single_scattering = (weight * kernel * deviation).sum() / (weight * kernel**2).sum()
     return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
@@ -311,11 +298,8 @@ def _extrapolated(known: Floats, values: Floats, cosine: Floats) -> Floats:
     order = np.argsort(known)
     x, y = known[order], values[order]
     found = np.interp(cosine, x, y)
-    for end, outside in (
-        (slice(_EXTRAPOLATION_POINTS), cosine < x[0]),
-        (slice(-_EXTRAPOLATION_POINTS, None), cosine > x[-1]),
-    ):
-        found = np.where(
-            outside, np.polyval(np.polyfit(x[end], y[end], _EXTRAPOLATION_POINTS - 1), cosine), found
-        )
+    first, last = slice(_EXTRAPOLATION_POINTS), slice(-_EXTRAPOLATION_POINTS, None)
+    for end, outside in ((first, cosine < x[0]), (last, cosine > x[-1])):
+        polynomial = np.polyfit(x[end], y[end], _EXTRAPOLATION_POINTS - 1)
+        found = np.where(outside, np.polyval(polynomial, cosine), found)
     return np.asarray(found)

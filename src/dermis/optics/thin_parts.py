@@ -10,7 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.optics.angular_response import CACHE_SIZE, DIRECTION_ROWS, interpolate_table, refracted_cosine
+from dermis.optics.angular_response import (
+    CACHE_SIZE,
+    DIRECTION_ROWS,
+    interpolate_columns,
+    interpolate_table,
+    refracted_cosine,
+)
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
@@ -90,10 +96,7 @@ def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False,
     from_photons : whether the profile comes from photon counts, as in `GaussianSum`
     g : as in `solve_thin_parts`
     """
-    return np.stack(
-        [interpolate_table(partial(_oblique_column, eta, from_photons, g), float(value)) for value in total],
-        axis=-1,
-    )
+    return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total)
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -112,8 +115,8 @@ def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tupl
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
     """Return the transmittance of slabs by direction, (n, m), scaled as in `oblique_transmittance`."""
-    reflected = half_space.reflected[0] / _uniform_mean(half_space, half_space.reflected)
-    transmitted = np.maximum(_uniform_mean(slabs, slabs.transmitted), _MIN_TRANSMITTANCE)[:, None]
+    reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
+    transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
     return np.asarray(slabs.transmitted / transmitted / reflected)
 
 
@@ -146,25 +149,17 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _totals_column(eta: float, g: float, root: float) -> Floats:
-    """Return the totals at all `_DEPTHS`, (n, 4), by the square root of 1 minus the albedo."""
-    return np.stack(_solve_depths(min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO), eta, g), axis=-1)
-
-
-def _solve_depths(albedo: float, eta: float, g: float) -> _SlabTotals:
-    """Compute the totals of slabs of all `_DEPTHS`."""
+    """Return `_SlabTotals` of all `_DEPTHS`, (n, 4), by the square root of 1 minus the albedo."""
+    albedo = min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO)
     slabs = solve_doubled_slabs(albedo, _MIN_DEPTHS, _DOUBLINGS, eta, _UNIFORM_NODES, g)
     half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
-    reflectance, change = _uniform_mean(half_space, half_space.reflected), deep - 1.0
+    reflectance, change = half_space.reflected @ half_space.flux, deep - 1.0
     weight = half_space.flux * half_space.reflected[0]
     own_change = _relative_transmittance(slabs, half_space) - 1.0
     directionality = own_change @ (weight * change) / (weight * change**2).sum()
-    transmittance = _uniform_mean(slabs, slabs.transmitted)
-    lost = np.maximum(1.0 - _uniform_mean(slabs, slabs.reflected) / reflectance, 0.0)
-    return _SlabTotals(transmittance, transmittance / reflectance, lost, directionality)
-
-
-def _uniform_mean(slabs: Slabs, by_direction: Floats) -> Floats:
-    return np.asarray(by_direction @ slabs.flux)
+    transmittance = slabs.transmitted @ slabs.flux
+    lost = np.maximum(1.0 - slabs.reflected @ slabs.flux / reflectance, 0.0)
+    return np.stack([transmittance, transmittance / reflectance, lost, directionality], axis=-1)
 
 
 def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) -> Floats:
@@ -176,11 +171,8 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
     frequency = np.concatenate([hankel.ZERO_FREQUENCY, s])
     transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1
-    gaussians = np.vstack(
-        [np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), np.full((1, len(variance_mm2)), stiffness)]
-    )
-    spread = transform[:, 1:] / np.maximum(
-        transform[:, :1], _MIN_TRANSMITTANCE
-    )  # thick dark slabs are opaque
+    ones = np.full((1, len(variance_mm2)), stiffness)
+    gaussians = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), ones])
+    spread = transform[:, 1:] / np.maximum(transform[:, :1], _MIN_TRANSMITTANCE)
     weight = np.stack([nnls(gaussians, np.append(row, stiffness))[0] for row in spread])
     return np.asarray(weight / weight.sum(axis=1, keepdims=True))

@@ -223,6 +223,5 @@ def _from_skin_table(
         parameters = SkinParameters(**values)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
-    return _spectral_tissue(
-        str(document.get("name", path.stem)), structure or own_structure, parameters, overrides
-    )
+    name, structure = str(document.get("name", path.stem)), structure or own_structure
+    return _spectral_tissue(name, structure, parameters, overrides)

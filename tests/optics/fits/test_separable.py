@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -27,6 +29,12 @@ def rings_of(profile: GaussianSum) -> RingTarget:
     return RingTarget(EDGES, np.diff(profile.energy_within(EDGES), axis=0), profile.albedo)
 
 
+def line_profile(kernel: SeparableKernel, offset_mm: Any) -> np.ndarray:
+    """Return a(x) of one pass, (..., c) [1/mm]."""
+    x, v = np.asarray(offset_mm)[..., None, None], kernel.variance_mm2
+    return (kernel.weight * np.exp(-(x**2) / (2.0 * v)) / np.sqrt(2.0 * np.pi * v)).sum(axis=-2)
+
+
 def one(variance: float) -> GaussianSum:
     return GaussianSum("one", np.array([variance]), np.array([[0.7]]))
 
@@ -45,7 +53,7 @@ def test_cells_are_the_integral_of_the_kernel() -> None:
     def column(x: float) -> float:
         height = np.sqrt(radius**2 - x**2)
         under = 0.5 * sum(2 * ndtr(height / s) - 1 for s in (0.2, 2.0))
-        return float(CROSS.line_profile(x)[0] * under)
+        return float(line_profile(CROSS, x)[0] * under)
 
     disc = 4 * 0.8 * quad(column, 0, radius, epsabs=1e-12)[0] / 2
     assert CROSS.sector_energy(np.array([0.0, radius])).sum() == pytest.approx(disc, rel=1e-7)
@@ -56,7 +64,8 @@ def test_sectors_near_the_axes_get_the_light_of_the_cross() -> None:
     ring = np.array([1.99, 2.01])
     cells = CROSS.sector_energy(ring)[0, :, 0]
     theta = (np.arange(SECTORS) + 0.5) * np.pi / 2 / SECTORS
-    density = 0.8 * CROSS.line_profile(2 * np.cos(theta))[:, 0] * CROSS.line_profile(2 * np.sin(theta))[:, 0]
+    along_x, along_y = (line_profile(CROSS, 2 * f(theta))[:, 0] for f in (np.cos, np.sin))
+    density = 0.8 * along_x * along_y
     area = np.pi * (ring[1] ** 2 - ring[0] ** 2) / SECTORS
     assert cells[0] > 3 * cells[7]
     assert np.allclose(cells[3:-3], (area * density)[3:-3], rtol=0.02)  # the middle stands for the sector
@@ -79,7 +88,7 @@ def test_preintegrated_kernel_is_the_profile_from_its_side() -> None:
             2 * quad(lambda y, i=i, x=x: profile.radiant_exitance(np.hypot(x, y))[i], 0, 30)[0]
             for i in range(2)
         ]
-        assert np.allclose(kernel.albedo * kernel.line_profile(x), side, rtol=1e-6)
+        assert np.allclose(kernel.albedo * line_profile(kernel, x), side, rtol=1e-6)
 
 
 def test_preintegrated_kernel_is_not_round() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -14,12 +14,10 @@ from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
 from dermis.formats.gltf.document import Document, Tree, checked_index, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
-from dermis.formats.size_limits import MAX_CHANNELS
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_CHANNELS, check_limit
 from dermis.mesh.rotations import slerp
 
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
-_KINDS = ("STEP", "LINEAR", "CUBICSPLINE")
-_DAMAGED = "The file is damaged: export it again"
 Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
 _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
@@ -44,11 +42,6 @@ class _Keys(NamedTuple):
     times_s: Doubles
     values: Doubles
     kind: Interpolation
-
-    @property
-    def plain(self) -> Doubles:
-        """Return the values without tangents, (k, n)."""
-        return self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
@@ -83,9 +76,8 @@ def _names(document: Document) -> tuple[str, ...]:
 def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
     """Return the tracks of a clip; curves of the same kind with the same keys are merged."""
     clip, nodes = document.item("animations", index), read_nodes(document)
-    if len(clip["channels"]) > MAX_CHANNELS:
-        actual = f"{name!r} has {len(clip['channels']):,}"
-        refuse(document.path, f"clips of at most {MAX_CHANNELS:,} channels", actual, "Export it again")
+    culprit = f"{document.path}: clip {name!r}"
+    check_limit(culprit, len(clip["channels"]), MAX_CHANNELS, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
@@ -98,8 +90,9 @@ def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
             tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
         keys = _read_keys(document, sampler, _WIDTH[target["path"]], culprit)
-        if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
-            refuse(culprit, "unit quaternions as rotations", "one is 0", _DAMAGED)
+        rotations = keys.values[:, _VALUE] if keys.kind == "CUBICSPLINE" else keys.values
+        if target["path"] == "rotation" and not rotations.any(axis=-1).all():
+            refuse(culprit, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
         groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
     return tracks + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
@@ -107,7 +100,7 @@ def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
 
 def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
     if not 0 <= node < len(nodes.names):
-        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node}", _DAMAGED)
+        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node}", DAMAGED_ADVICE)
 
 
 def _weight_track(
@@ -123,7 +116,7 @@ def _weight_track(
     names = () if mesh is None else known[mesh]
     if not names:
         actual = f"node {node} has no morph targets"
-        refuse(culprit, "weights of a mesh with morph targets", actual, _DAMAGED)
+        refuse(culprit, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)
     keys = _read_keys(document, sampler, len(names), culprit)
     curve = AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
     return AnimationTrack("weights", names, curve)
@@ -139,19 +132,20 @@ def _merge_tracks(path: str, members: list[tuple[str, _Keys]]) -> AnimationTrack
 def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
     """Read times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
     kind = sampler.get("interpolation", "LINEAR")
-    if kind not in _KINDS:
-        refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"got {kind!r}", _DAMAGED)
+    if kind not in get_args(Interpolation):
+        kinds = ", ".join(get_args(Interpolation))
+        refuse(culprit, f"an interpolation of {kinds}", f"got {kind!r}", DAMAGED_ADVICE)
     times, values = document.read_floats(sampler["input"]).ravel(), document.read_floats(sampler["output"])
     shape = (len(times), 3, width) if kind == "CUBICSPLINE" else (len(times), width)
     if len(times) == 0 or values.size != np.prod(shape):
         actual = f"got {len(times)} and {values.size}"
-        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", actual, _DAMAGED)
+        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", actual, DAMAGED_ADVICE)
     if not (np.isfinite(times).all() and np.isfinite(values).all()):
-        refuse(culprit, "finite keys", "some are NaN or infinite", _DAMAGED)
+        refuse(culprit, "finite keys", "some are NaN or infinite", DAMAGED_ADVICE)
     if (np.diff(times) < 0).any():
         early = int(np.flatnonzero(np.diff(times) < 0)[0])
         actual = f"key {early + 1} at {times[early + 1]:g} s comes after {times[early]:g} s"
-        refuse(culprit, "keys in temporal order", actual, _DAMAGED)
+        refuse(culprit, "keys in temporal order", actual, DAMAGED_ADVICE)
     return _Keys(times, values.reshape(shape), kind)
 
 

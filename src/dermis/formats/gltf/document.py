@@ -19,7 +19,7 @@ from dermis.base.errors import refuse
 from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, parsing, read_file
 from dermis.formats.parts import to_floats
 from dermis.formats.referenced_files import resolve_uri
-from dermis.formats.size_limits import MAX_ACCESSOR_NUMBERS, MAX_FILE_BYTES, MAX_JSON_VALUES
+from dermis.formats.size_limits import MAX_ACCESSOR_NUMBERS, MAX_FILE_BYTES, MAX_JSON_VALUES, check_limit
 
 Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
@@ -30,7 +30,7 @@ _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _MIN_READ_COST = 512  # numbers to which the overhead of reading an accessor corresponds
-_LISTS = (
+_LISTS = [
     "accessors",
     "animations",
     "buffers",
@@ -43,7 +43,7 @@ _LISTS = (
     "scenes",
     "skins",
     "textures",
-)
+]
 
 
 @dataclass
@@ -96,12 +96,8 @@ class Document:
         if self._numbers_read > MAX_ACCESSOR_NUMBERS:
             actual = f"accessor {index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
-            refuse(
-                self.path,
-                f"accessors of at most {MAX_ACCESSOR_NUMBERS / 1e6:.0f} million numbers",
-                actual,
-                advice,
-            )
+            limit = f"accessors of at most {MAX_ACCESSOR_NUMBERS / 1e6:.0f} million numbers"
+            refuse(self.path, limit, actual, advice)
         if "bufferView" in accessor:
             stride = _checked_size(self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0))
             values = self._rows(accessor, shape, kind, stride)
@@ -192,9 +188,8 @@ def read_document(path: Path) -> Document:
 def _parse_tree(path: Path, text: bytes) -> Tree:
     """Parse the JSON of a file and check that its lists contain objects."""
     values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
-    if values > MAX_JSON_VALUES:
-        actual, advice = f"it has {values:,}", "Export it with fewer nodes, materials or clips"
-        refuse(path, f"JSON of at most {MAX_JSON_VALUES:,} values", actual, advice)
+    advice = "Export it with fewer nodes, materials or clips"
+    check_limit(path, values, MAX_JSON_VALUES, "values in its JSON", advice)
     tree = parse_json(text, path, "a glTF file")
     if not isinstance(tree, dict):
         raise ValueError("its JSON is not an object")

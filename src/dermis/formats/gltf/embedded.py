@@ -36,13 +36,9 @@ def embedded_maps(path: Path) -> Tree:
         width, height = read_size(picture)
         texels += width * height
     if texels > MAX_TOTAL_PIXELS:
-        actual, advice = (
-            f"they have {texels / 1e6:.0f} million",
-            "Resize them, or set them by options (--colour, ...)",
-        )
-        refuse(
-            path, f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together", actual, advice
-        )
+        advice = "Resize them, or set them by options (--colour, ...)"
+        limit = f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
+        refuse(path, limit, f"they have {texels / 1e6:.0f} million", advice)
     return options
 
 
@@ -71,15 +67,10 @@ def _checked_relief(height_mm: object) -> float | None:
     """Return the relief of one grey level in a file, after checking it [mm]."""
     if height_mm is None:
         return None
-    if (
-        isinstance(height_mm, bool)
-        or not isinstance(height_mm, int | float)
-        or not 0 < height_mm <= MAX_RELIEF_MM
-    ):
-        raise ValueError(
-            f"height_mm is {str(height_mm)[:40]!r}, not a number above 0 and up to {MAX_RELIEF_MM:g}"
-        )
-    return float(height_mm)
+    number = height_mm if isinstance(height_mm, int | float) and not isinstance(height_mm, bool) else 0
+    if not 0 < number <= MAX_RELIEF_MM:
+        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not above 0 and up to {MAX_RELIEF_MM:g}")
+    return float(number)
 
 
 def _picture(document: Document, source: int) -> EmbeddedPicture | Path | None:

@@ -44,10 +44,8 @@ class SkinAdditions:
     def applied_to(self, material: FrozenTree) -> Tree:
         """Return a material with the additions; a replaced colour picture is kept in the extras."""
         extended = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
-        surface, extras = (
-            dict(material["pbrMetallicRoughness"]),
-            {**material.get("extras", {}), **self.extras},
-        )
+        surface = dict(material["pbrMetallicRoughness"])
+        extras = {**material.get("extras", {}), **self.extras}
         if self.surface:
             colours = surface.pop("baseColorTexture", None)
             surface |= self.surface
@@ -97,9 +95,8 @@ def surface_material(
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
-        rough = next(
-            (value for word, value in _ROUGH.items() if word in material.name.casefold()), _ROUGH_ELSE
-        )
+        words = (value for word, value in _ROUGH.items() if word in material.name.casefold())
+        rough = next(words, _ROUGH_ELSE)
         return {"name": material.name, "pbrMetallicRoughness": _base_material(material, rough)}
     surface = _base_material(material, float(np.sqrt(roughness)))
     if "colour" in pictures:

@@ -9,7 +9,7 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, checked_index
-from dermis.formats.size_limits import MAX_NODE_DEPTH, MAX_NODES
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_NODE_DEPTH, MAX_NODES, check_limit
 from dermis.mesh.rotations import quaternion_matrix
 
 
@@ -45,9 +45,7 @@ def read_nodes(document: Document) -> Nodes:
     Raises DermisError when they form a cycle, or are too many or too deep.
     """
     nodes = document.items("nodes")
-    if len(nodes) > MAX_NODES:
-        actual = f"it has {len(nodes):,}"
-        refuse(document.path, f"a scene of at most {MAX_NODES:,} nodes", actual, "Export the head alone")
+    check_limit(document.path, len(nodes), MAX_NODES, "nodes", "Export the head alone")
     names, parent = node_names(nodes), _parents(nodes)
     order = _order(document, names, parent)
     local = np.array([_local_matrix(node) for node in nodes]).reshape(-1, 4, 4)
@@ -56,9 +54,8 @@ def read_nodes(document: Document) -> Nodes:
         if parent[index] >= 0:
             world[index] = world[parent[index]] @ local[index]
             depth[index] = depth[parent[index]] + 1
-    if max(depth, default=0) > MAX_NODE_DEPTH:
-        actual = f"it has {max(depth):,}"
-        refuse(document.path, f"at most {MAX_NODE_DEPTH:,} nodes below each other", actual, "Export it again")
+    deepest = max(depth, default=0)
+    check_limit(document.path, deepest, MAX_NODE_DEPTH, "nodes below each other", "Export it again")
     return Nodes(names, parent, order, local, world, _scene_nodes(document, nodes))
 
 
@@ -95,7 +92,7 @@ def _order(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) 
     cyclic = sorted(set(range(len(parent))) - set(order))
     if cyclic:
         actual = f"{', '.join(repr(names[k]) for k in cyclic[:5])} are their own ancestors"
-        refuse(document.path, "nodes that form a tree", actual, "The file is damaged: export it again")
+        refuse(document.path, "nodes that form a tree", actual, DAMAGED_ADVICE)
     return tuple(order)
 
 

@@ -22,9 +22,7 @@ _METRES_PER_MM = 1e-3
 HAIR_COLOURS = 64
 """Number of colours into which the hairs of a head are sorted."""
 _SIDES = 3
-_RADIUS_FACTOR = (
-    2.0 * np.pi / (_SIDES * np.sqrt(3.0))
-)  # makes the mean width of a triangle equal to that of a circle
+_RADIUS_FACTOR = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # the mean width equals that of a circle
 _MIN_DISPLACEMENT_MM = 0.01  # smaller displacements count as 0
 _ALBEDO = 5.89  # of fibres of roughness 0.3 in hair: [Chiang2016] equation 9
 _TINY = 1e-9
@@ -69,10 +67,8 @@ class SurfacePrimitive:
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
         attributes = _attributes(binary, self.points.positions_mm[used], self.points.normals[used], uv)
-        primitive: Tree = {
-            "attributes": attributes | _bone_attributes(binary, self.points, used),
-            "indices": index,
-        }
+        attributes |= _bone_attributes(binary, self.points, used)
+        primitive: Tree = {"attributes": attributes, "indices": index}
         flags = {"quads": self._has_quads(), "alone": self._is_separate()}
         extras = {key: True for key, value in flags.items() if value}
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
@@ -228,14 +224,11 @@ class FibreTubes:
             side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), _TINY)
             basis = np.stack([side, np.cross(tangent[:, k], side)], axis=1)
             outward = np.einsum("sj,njc->nsc", np.stack([np.cos(angle), np.sin(angle)], axis=1), basis)
-            positions.append(
-                knots[:, k, None] + _RADIUS_FACTOR * self.strands.radius_mm[:, k, None, None] * outward
-            )
+            radius_mm = _RADIUS_FACTOR * self.strands.radius_mm[:, k, None, None]
+            positions.append(knots[:, k, None] + radius_mm * outward)
             normals.append(outward)
-        return (
-            np.concatenate([*positions, knots[:, -1:]], axis=1),
-            np.concatenate([*normals, tangent[:, -1:]], axis=1),
-        )
+        all_positions = np.concatenate([*positions, knots[:, -1:]], axis=1)
+        return all_positions, np.concatenate([*normals, tangent[:, -1:]], axis=1)
 
     def posed(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
         """Return positions [mm] and normals of all vertices, (n m, 3) each, for mesh points (p, 3)."""
@@ -269,9 +262,8 @@ class FibreTubes:
             a, b = _SIDES * k + side, _SIDES * k + following
             faces += [np.stack([a, b, b + _SIDES], axis=1), np.stack([a, b + _SIDES, a + _SIDES], axis=1)]
         last = _SIDES * (self._knots - 2)
-        faces.append(
-            np.stack([last + side, last + following, np.full(_SIDES, self.vertices_per_hair - 1)], axis=1)
-        )
+        tip = np.full(_SIDES, self.vertices_per_hair - 1)
+        faces.append(np.stack([last + side, last + following, tip], axis=1))
         start = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 

@@ -13,13 +13,12 @@ from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, checked_index
 from dermis.formats.gltf.nodes import Nodes, node_names
 from dermis.formats.parts import Bones, to_floats
-from dermis.formats.size_limits import MAX_BONES, MAX_INFLUENCES, MAX_TARGETS
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_BONES, MAX_INFLUENCES, MAX_TARGETS, check_limit
 from dermis.mesh.rig import INFLUENCES
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
 _BATCH = 1 << 16  # vertices
-_DAMAGED = "The file is damaged: export it again"
 
 
 class SkinInfluences(NamedTuple):
@@ -46,10 +45,8 @@ class Armature:
 
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
         """Return the bone of a mesh without skin: that of its node or of the nearest ancestor."""
-        return next(
-            (self.bone_of_node[one] for one in nodes.ancestors(node) if one in self.bone_of_node),
-            self.static_bone,
-        )
+        bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
+        return next(bones, self.static_bone)
 
 
 def read_armature(document: Document, nodes: Nodes) -> Armature | None:
@@ -63,18 +60,16 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
     bone_nodes = {node for k in moving for node in nodes.ancestors(k)}
     if not bone_nodes:
         return None
-    if len(bone_nodes) > MAX_BONES:
-        actual = f"it has {len(bone_nodes):,}"
-        refuse(document.path, f"at most {MAX_BONES:,} bones", actual, "Export it with fewer")
+    check_limit(document.path, len(bone_nodes), MAX_BONES, "bones", "Export it with fewer")
     has_static = any(bone_nodes.isdisjoint(nodes.ancestors(k)) for k in rigid)
     ordered = [k for k in nodes.order if k in bone_nodes]
     bone_of_node = {node: number + has_static for number, node in enumerate(ordered)}
     names = [nodes.names[k] for k in ordered]
     parent = [bone_of_node.get(nodes.parent[k], 0 if has_static else -1) for k in ordered]
     bones = Bones(tuple(names), np.array(parent, np.int32), nodes.local[ordered], nodes.world[ordered])
-    return Armature(
-        _with_static_root(bones) if has_static else bones, bone_of_node, 0 if has_static else None
-    )
+    if has_static:
+        return Armature(_with_static_root(bones), bone_of_node, 0)
+    return Armature(bones, bone_of_node, None)
 
 
 def _with_static_root(bones: Bones) -> Bones:
@@ -94,9 +89,7 @@ def _animated(document: Document) -> set[int]:
 def _skin(document: Document, node: int) -> Tree:
     skin = document.item("skins", document.items("nodes")[node]["skin"])
     joints = skin["joints"]
-    if len(joints) > MAX_BONES:
-        actual = f"it has {len(joints):,}"
-        refuse(document.path, f"a skin of at most {MAX_BONES:,} joints", actual, "Export it with fewer")
+    check_limit(document.path, len(joints), MAX_BONES, "joints of a skin", "Export it with fewer")
     for joint in joints:
         checked_index(joint, len(document.items("nodes")), "nodes")
     return skin
@@ -111,13 +104,12 @@ def read_influences(
     """
     skin, attributes = _skin(document, node), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in attributes))
-    if 4 * count > MAX_INFLUENCES:
-        actual, advice = f"{nodes.names[node]!r} has {count} sets of four", "Export it with fewer"
-        refuse(document.path, f"at most {MAX_INFLUENCES} joints of a vertex", actual, advice)
+    culprit = f"{document.path}: {nodes.names[node]!r}"
+    check_limit(culprit, 4 * count, MAX_INFLUENCES, "joints of a vertex", "Export it with fewer")
     sets = [k for k in range(count) if f"JOINTS_{k}" in attributes and f"WEIGHTS_{k}" in attributes]
     if not sets:
         actual = f"the mesh of {nodes.names[node]!r} has none"
-        refuse(document.path, "joints and weights of each vertex of a mesh with a skin", actual, _DAMAGED)
+        refuse(document.path, "joints and weights of a mesh with a skin", actual, DAMAGED_ADVICE)
     joint = np.hstack([document.read_values(attributes[f"JOINTS_{k}"]).astype(np.int64) for k in sets])
     weight = np.hstack([to_floats(document.read_values(attributes[f"WEIGHTS_{k}"])) for k in sets])
     _check_weights(document, nodes.names[node], joint, weight, len(skin["joints"]))
@@ -137,16 +129,14 @@ def read_influences(
 def _check_weights(document: Document, name: str, joint: Index, weight: Doubles, count: int) -> None:
     if joint.shape != weight.shape:
         actual = f"{name!r} has {joint.shape} of joints and {weight.shape} of weights"
-        refuse(document.path, "as many joints as weights", actual, _DAMAGED)
+        refuse(document.path, "as many joints as weights", actual, DAMAGED_ADVICE)
     invalid = np.flatnonzero(~(np.isfinite(weight) & (weight >= 0)).all(axis=1))
     if len(invalid):
-        actual = (
-            f"those of {name!r} are negative, NaN or infinite at {len(invalid)} vertices, first {invalid[0]}"
-        )
-        refuse(document.path, "skin weights of 0 and more", actual, _DAMAGED)
+        actual = f"those of {name!r} are invalid at {len(invalid)} vertices, first {invalid[0]}"
+        refuse(document.path, "skin weights of 0 and more", actual, DAMAGED_ADVICE)
     if joint[weight > 0].max(initial=0) >= count:
         actual = f"{name!r} names joint {joint[weight > 0].max()}"
-        refuse(document.path, f"joints of a skin from 0 to {count - 1}", actual, _DAMAGED)
+        refuse(document.path, f"joints of a skin from 0 to {count - 1}", actual, DAMAGED_ADVICE)
 
 
 def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:
@@ -203,7 +193,7 @@ def read_targets(
             refuse(document.path, f"targets of {count} vertices", actual, "Export the file again")
         if not np.isfinite(delta).all():
             actual = f"{name!r} of mesh {mesh.get('name', '')!r} has some that are NaN or infinite"
-            refuse(document.path, "finite displacements", actual, "The file is damaged: export it again")
+            refuse(document.path, "finite displacements", actual, DAMAGED_ADVICE)
         vertex = np.flatnonzero(delta.any(axis=1))
         displacements[name] = VertexDisplacements(vertex, delta[vertex])
     return displacements

@@ -10,6 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
+from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import (
@@ -24,14 +25,13 @@ from dermis.formats.gltf.rigs import (
     target_names,
 )
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads, parse_colour, to_floats
-from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_GROUPS, MAX_TRIANGLES, MAX_VERTICES
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_COUNTS = {
-    "primitives": MAX_GROUPS,
-    "triangles": MAX_TRIANGLES,
-    "vertices": MAX_VERTICES,
-    "displacements by targets": MAX_DISPLACEMENTS,
+    "primitives": limits.MAX_GROUPS,
+    "triangles": limits.MAX_TRIANGLES,
+    "vertices": limits.MAX_VERTICES,
+    "displacements by targets": limits.MAX_DISPLACEMENTS,
 }
 _SUPPORTED_EXTENSIONS = (
     "KHR_materials_",
@@ -57,11 +57,8 @@ def read_gltf(path: Path) -> MeshFile:
 
 def _refuse_extensions(document: Document) -> None:
     """Refuse files that require extensions with encoded geometry."""
-    unsupported = [
-        name
-        for name in document.items("extensionsRequired")
-        if not str(name).startswith(_SUPPORTED_EXTENSIONS)
-    ]
+    required = map(str, document.items("extensionsRequired"))
+    unsupported = [name for name in required if not name.startswith(_SUPPORTED_EXTENSIONS)]
     if unsupported:
         actual = f"the file requires {', '.join(map(str, unsupported))}"
         refuse(document.path, "plain glTF geometry", actual, "Export without compression")
@@ -78,21 +75,19 @@ class _Reader:
 
     def parts(self) -> Iterator[MeshPart]:
         """Yield the parts of the scene while checking their total size."""
-        counts = {"primitives": 0, "triangles": 0, "vertices": 0, "displacements by targets": 0}
+        counts = dict.fromkeys(_MAX_COUNTS, 0)
         for part in self._all_parts():
             displaced = sum(len(vertex) for vertex, _ in part.targets.values())
-            for name, count in zip(
-                counts, (1, len(part.triangles), len(part.positions), displaced), strict=True
-            ):
+            added = 1, len(part.triangles), len(part.positions), displaced
+            for name, count in zip(counts, added, strict=True):
                 counts[name] += count
                 self._check_count(name, counts[name])
             yield part
 
     def _check_count(self, name: str, count: int) -> None:
         """Refuse a scene that is too large before all of it is built; each instance of a mesh counts."""
-        if count > _MAX_COUNTS[name]:
-            actual, advice = "it has more", "Export the head alone, or decimated"
-            refuse(self.document.path, f"a scene of at most {_MAX_COUNTS[name]:,} {name}", actual, advice)
+        advice = "Export the head alone, or decimated"
+        limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
 
     def _all_parts(self) -> Iterator[MeshPart]:
         nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
@@ -116,10 +111,8 @@ class _Reader:
         if node is None:
             return _transformed(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
-            skin_influences, matrices = read_influences(
-                self.document, self.nodes, self.armature, node, primitive
-            )
-            return _skin_part(part, targets, skin_influences, matrices)
+            influences, matrices = read_influences(self.document, self.nodes, self.armature, node, primitive)
+            return _skin_part(part, targets, influences, matrices)
         transformed = _transformed(part, targets, _nearest_rigid(self.nodes.world[node]))
         bone = self.armature.bone_for_node(self.nodes, node) if self.armature else None
         if bone is None:
@@ -172,9 +165,10 @@ class _Reader:
         return strip
 
     def _group(self, mesh: Tree, primitive: Tree) -> MaterialGroup:
-        item = self.document.item
-        material: Tree = item("materials", primitive["material"]) if "material" in primitive else {}
-        names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
+        material: Tree = {}
+        if "material" in primitive:
+            material = self.document.item("materials", primitive["material"])
+        names = tuple(str(item["name"]) for item in (material, mesh) if item.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return MaterialGroup(names, parse_colour(factor) if factor else GREY)
 

@@ -78,9 +78,8 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
     """Raise the error of a motion whose names do not match the head."""
-    actual = (
-        f"it has {_short_list(names)} and the head {_short_list(head.targets) if head.targets else 'none'}"
-    )
+    targets = _short_list(head.targets) if head.targets else "none"
+    actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
     refuse(culprit, "names of targets or bones of the head", actual, advice)
 
@@ -185,9 +184,8 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
     """Return angles (k, 3) of each bone [degrees] that rotate the head by quaternions (k, 4)."""
-    return {
-        name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in bones.head.items()
-    }
+    parts = bones.head.items()
+    return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}
 
 
 def unwrap_degrees(degrees: Doubles) -> Doubles:

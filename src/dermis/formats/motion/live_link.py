@@ -152,12 +152,8 @@ def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps
     if len(backwards):
         row = int(backwards[0]) + 1
         actual = f"this line is {times[row - 1] - times[row]:.3f} s before the previous one"
-        refuse(
-            f"{path}, line {lines[row]}",
-            "increasing Timecodes",
-            actual,
-            "Sort the lines, or remove this one",
-        )
+        culprit = f"{path}, line {lines[row]}"
+        refuse(culprit, "increasing Timecodes", actual, "Sort the lines, or remove this one")
     return times
 
 
@@ -178,9 +174,8 @@ def _bone_angles(table: _Table, bones: RotationBones) -> tuple[dict[str, Doubles
         part_columns = {angle: columns.get(f"{part}{angle}") for angle in ("pitch", "yaw", "roll")}
         if all(column is None for column in part_columns.values()):
             continue
-        rows = np.degrees(
-            [[0.0 if k is None else row[k] for k in part_columns.values()] for row in table.values]
-        )
+        used = part_columns.values()
+        rows = np.degrees([[0.0 if k is None else row[k] for k in used] for row in table.values])
         eye = bones.eyes.get(part.removesuffix("eye")) if part != "head" else None
         if eye is not None:
             angles[eye] = unwrap_degrees(rows)

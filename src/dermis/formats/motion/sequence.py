@@ -38,12 +38,8 @@ _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 def is_sequence(path: Path) -> bool:
     """Return whether a path is a folder, a pattern, or a mesh file that could be one frame."""
-    return (
-        _is_folder(path)
-        or bool(_NUMBER.search(path.name))
-        or "*" in path.name
-        or path.suffix.lower() in SUFFIXES
-    )
+    is_pattern = bool(_NUMBER.search(path.name)) or "*" in path.name
+    return is_pattern or _is_folder(path) or path.suffix.lower() in SUFFIXES
 
 
 def frame_files(path: Path) -> list[Path]:
@@ -221,9 +217,9 @@ class FrameReader:
         if self._pattern is not None and self._first is not None and is_file(path):
             positions = _parse_positions(read_file(path, "an OBJ file", MAX_FILE_BYTES), self._pattern)
             if positions is not None:
-                moved = self._in_head(unit * positions)
-                check_arrays(moved, self._first.uv, self._first.triangles, path)
-                return self._first._replace(positions_mm=moved)
+                positions_mm = self._in_head(unit * positions)
+                check_arrays(positions_mm, self._first.uv, self._first.triangles, path)
+                return self._first._replace(positions_mm=positions_mm)
         vertices = self._parsed(path, unit)
         if self._first is None:
             self._first = vertices

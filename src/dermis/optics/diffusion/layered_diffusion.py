@@ -142,9 +142,9 @@ def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
         d, sigma_t = layer.thickness_mm, layer.sigma_t_prime
         deep = depth + sigma_t * d >= 1.0
         # A thinner slab has its source in the middle of its last layer.
-        here = (depth < 1.0) & (deep | (i == len(medium.layers) - 1))
+        has_source = (depth < 1.0) & (deep | (i == len(medium.layers) - 1))
         middle = 0.5 * d if np.isfinite(d) else 1.0
-        above = np.where(here & deep, (1.0 - depth) / sigma_t, middle)
-        yield _Sublayer(layer, above, zero, np.where(here, layer.alpha_prime, 0.0))
+        above = np.where(has_source & deep, (1.0 - depth) / sigma_t, middle)
+        yield _Sublayer(layer, above, zero, np.where(has_source, layer.alpha_prime, 0.0))
         yield _Sublayer(layer, d - above, zero, zero)
         depth = depth + sigma_t * d

@@ -131,9 +131,8 @@ def _closed_form(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) 
         return dipole.better_dipole_reflectance(radius_mm, layer, medium.eta)
     if model == "dipole":
         return dipole.reflectance(radius_mm, layer, boundary_mismatch(medium.eta))
-    return multipole.reflectance(
-        radius_mm, multipole.layer_slabs(medium, boundary_mismatch(medium.eta), clamp)[0]
-    )
+    slab = multipole.layer_slabs(medium, boundary_mismatch(medium.eta), clamp)[0]
+    return multipole.reflectance(radius_mm, slab)
 
 
 def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
@@ -144,9 +143,7 @@ def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
         if model == "multipole" and thin.any():
             lost = "its source is below it and light is lost"
             effect = lost if clamp == "none" else "its source is moved into it"
-            warnings.append(
-                f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {effect}"
-            )
+            warnings.append(f"layer {number} ({layer.name}) is thinner than a mean free path: {effect}")
     worst = float(_first_event_albedo(medium).min())
     if worst < _ABSORBING:
         warnings.append(
@@ -211,14 +208,12 @@ def slab_transmittance(
         if model == "layered":
             depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
             unscattered = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
-            diffuse = layered_diffusion.solve(
-                hankel.ZERO_FREQUENCY, slab, boundary_mismatch(medium.eta, "exact")
-            )[1][0]
+            A = boundary_mismatch(medium.eta, "exact")
+            diffuse = layered_diffusion.solve(hankel.ZERO_FREQUENCY, slab, A)[1][0]
             transmittances.append(diffuse + unscattered)
         else:
-            transmittances.append(
-                multipole.stack_response(hankel.ZERO_FREQUENCY, slab, boundary_mismatch(medium.eta)).T_down[0]
-            )
+            A = boundary_mismatch(medium.eta)
+            transmittances.append(multipole.stack_response(hankel.ZERO_FREQUENCY, slab, A).T_down[0])
     return np.stack(transmittances)
 
 
@@ -239,12 +234,12 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 class ModelError:
     """Error of a model in the ring energies, relative to Monte Carlo [-].
 
-    least, most : (3,) smallest and largest error over the tissues, in red, green and blue
+    smallest, largest : (3,) smallest and largest error over the tissues, in red, green and blue
     tissues : on which the error was measured
     """
 
-    least: Floats
-    most: Floats
+    smallest: Floats
+    largest: Floats
     tissues: tuple[str, ...]
 
 

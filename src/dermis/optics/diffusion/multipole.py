@@ -176,10 +176,8 @@ def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp 
 def layer_slabs(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
     """Return the layers of a medium as slabs with their boundary mismatches."""
     last = len(medium.layers) - 1
-    return [
-        Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp)
-        for i, layer in enumerate(medium.layers)
-    ]
+    layers = enumerate(medium.layers)
+    return [Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp) for i, layer in layers]
 
 
 def _slab_response(frequency: ArrayLike, slab: Slab) -> Response:

@@ -183,9 +183,5 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
 
 def _check_rgb(profile: BurleyProfile) -> None:
     if profile.shape.shape != (3,):
-        refuse(
-            "engine parameters",
-            "red, green and blue",
-            f"got {profile.shape.size} channels",
-            "Fit three channels",
-        )
+        actual = f"got {profile.shape.size} channels"
+        refuse("engine parameters", "red, green and blue", actual, "Fit three channels")

@@ -24,9 +24,7 @@ _STARTS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
 # For fits that start from a similar fit: ring energies differ from those of the converged fit by at most 0.06
 # % of the brightest ring, and errors by at most 0.0001.
 _INITIAL_FIT_TOLERANCE = 3e-6
-_STIFFNESS = (
-    1e4  # weight of the energy equation relative to the others; its square bounds the error of the energy
-)
+_STIFFNESS = 1e4  # weight of the energy equation; its square bounds the error of the energy
 SHARED_TERMS = 6
 """Number of Gaussians that several profiles share, the same as for one profile."""
 _EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
@@ -105,9 +103,7 @@ def _fit_group(
         return minimise(design, samples / norm, np.clip(start, *bounds), bounds, tolerance)
 
     best = None if initial is None else run(np.log(initial), _INITIAL_FIT_TOLERANCE)
-    if (
-        best is None or not best.weight.any(axis=1).all()
-    ):  # a Gaussian of weight 0 may be used from another start
+    if best is None or not best.weight.any(axis=1).all():  # another start may use all Gaussians
         best = min((run(start) for start in _initial_variances(target, terms)), key=lambda fit: fit.cost)
     weight = best.weight * norm
     if not weight.any(axis=0).all():
@@ -172,9 +168,8 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
     from scipy.optimize import minimize_scalar
 
     def candidate(log_variance: float) -> GaussianSum:
-        return GaussianSum(
-            f"{profile.name}, one blur", np.exp([log_variance]), profile.albedo[None], profile.from_photons
-        )
+        name, variance = f"{profile.name}, one blur", np.exp([log_variance])
+        return GaussianSum(name, variance, profile.albedo[None], profile.from_photons)
 
     def misfit(log_variance: float) -> float:
         gaussian = candidate(log_variance)
@@ -187,21 +182,14 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
 def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
     """Fit several profiles with the same Gaussians; profiles that already share them are returned unchanged.
 
-    Totals are preserved. `shared_errors` returns the errors of the fit.
+    Totals are preserved.
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
     fitted = _fit_shared(tuple(map(_table, profiles)), terms)
-    return tuple(
-        replace(one, from_photons=own.from_photons) for one, own in zip(fitted, profiles, strict=True)
-    )
-
-
-def shared_errors(profiles: Sequence[GaussianSum], shared: Sequence[GaussianSum]) -> Floats:
-    """Return the error E_b of each shared sum relative to its profile, by profile and channel, (p, 3) [-]."""
-    pairs = zip(profiles, shared, strict=True)
-    return np.array([_rings([one]).error(other.variance_mm2, other.weight) for one, other in pairs])
+    pairs = zip(fitted, profiles, strict=True)
+    return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
 @lru_cache(_CACHED_FITS)
@@ -213,9 +201,8 @@ def _fit_shared(tables: tuple[_Table, ...], terms: int) -> tuple[GaussianSum, ..
     fit = fit_gaussians(_rings(profiles), terms, keep_energy=True, name="shared profiles").profile
     ends = np.cumsum([one.weight.shape[1] for one in profiles])[:-1]
     parts = np.split(fit.weight, ends, axis=1)
-    return tuple(
-        GaussianSum(one.name, fit.variance_mm2, part) for one, part in zip(profiles, parts, strict=True)
-    )
+    pairs = zip(profiles, parts, strict=True)
+    return tuple(GaussianSum(profile.name, fit.variance_mm2, part) for profile, part in pairs)
 
 
 def _table(profile: GaussianSum) -> _Table:

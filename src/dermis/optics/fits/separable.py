@@ -33,12 +33,6 @@ class SeparableKernel:
     variance_mm2: Floats
     weight: Floats
 
-    def line_profile(self, offset_mm: ArrayLike) -> Floats:
-        """Return a(x) of one pass, (..., c) [1/mm]."""
-        x = np.asarray(offset_mm, dtype=np.float64)[..., None, None]
-        v = self.variance_mm2
-        return np.asarray((self.weight * np.exp(-(x**2) / (2.0 * v)) / np.sqrt(2.0 * np.pi * v)).sum(axis=-2))
-
     def half_line_integral(self, offset_mm: ArrayLike) -> Floats:
         """Return the integral of a(x) from 0 to an offset, (..., c), at most 1/2 [-]."""
         from scipy.special import erf
@@ -52,9 +46,8 @@ class SeparableKernel:
         edges_mm : (n + 1,) of the rings
         """
         channels = zip(self.variance_mm2.T, self.weight.T, strict=True)
-        return np.asarray(
-            self.albedo * np.stack([_sector_fractions(edges_mm, v, w) for v, w in channels], axis=2)
-        )
+        sectors = np.stack([_sector_fractions(edges_mm, v, w) for v, w in channels], axis=2)
+        return np.asarray(self.albedo * sectors)
 
 
 @dataclass(frozen=True)

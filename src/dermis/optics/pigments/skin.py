@@ -55,12 +55,8 @@ def spectral_medium(
     Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
     """
     if structure not in _STRUCTURES:
-        refuse(
-            "structure",
-            ", ".join(get_args(Structure)),
-            f"got {format_value(structure)}",
-            "Choose one of them",
-        )
+        known = ", ".join(get_args(Structure))
+        refuse("structure", known, f"got {format_value(structure)}", "Choose one of them")
     wavelengths = visible_wavelengths(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
@@ -118,9 +114,8 @@ def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, nam
 
 
 def _dermal_absorption(p: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats) -> Floats:
-    return np.asarray(
-        blood_fraction * blood(wavelength_nm, p.oxygen) + (1.0 - blood_fraction) * baseline(wavelength_nm)
-    )
+    vessels = blood_fraction * blood(wavelength_nm, p.oxygen)
+    return np.asarray(vessels + (1.0 - blood_fraction) * baseline(wavelength_nm))
 
 
 def mixed_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:
@@ -128,12 +123,10 @@ def mixed_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, 
     column, scattering = fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
     dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
-    epidermis, dermis = (
-        np.broadcast_to(k * scattering, epidermal.shape) for k in (1.0, DERMIS_SCATTERING_RATIO)
-    )
-    return Layer(epidermal, epidermis, parameters.epidermis_mm, "epidermis"), Layer(
-        dermal, dermis, name="dermis"
-    )
+    ratios = 1.0, DERMIS_SCATTERING_RATIO
+    upper, lower = (np.broadcast_to(ratio * scattering, epidermal.shape) for ratio in ratios)
+    epidermis = Layer(epidermal, upper, parameters.epidermis_mm, "epidermis")
+    return epidermis, Layer(dermal, lower, name="dermis")
 
 
 _STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {

@@ -48,9 +48,8 @@ def interpolate_spectrum(table: str, column: str, wavelength_nm: ArrayLike) -> F
     wavelength_nm : (...) from 380 to 780 [nm]
     """
     columns = _read(table)
-    return np.asarray(
-        np.interp(visible_wavelengths(wavelength_nm), columns["wavelength_nm"], columns[column])
-    )
+    wavelength = visible_wavelengths(wavelength_nm)
+    return np.asarray(np.interp(wavelength, columns["wavelength_nm"], columns[column]))
 
 
 def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
