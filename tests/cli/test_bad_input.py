@@ -51,7 +51,7 @@ MAPS = {
     "a float out of range": Bad("head.obj --colour bright.exr", "bright.exr", "to 9"),
     "grey for colour": Bad("head.obj --colour grey.png", "grey.png", "grey"),
     "colour for grey": Bad("head.obj --specular-map red.png", "red.png", "differ"),
-    "colour for normals": Bad("head.obj --normal red.png", "red.png", "no unit vectors"),
+    "colour for normals": Bad("head.obj --normal red.png", "red.png", "not unit vectors"),
     "height without mm": Bad("head.obj --height grey.png", "grey.png", "it is not set"),
     "mm without height": Bad("head.obj --height-mm 0.02", "height_mm", "without a height map"),
     "negative mm": Bad("head.obj --height grey.png --height-mm -1", "--height-mm", "-1"),

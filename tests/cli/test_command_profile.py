@@ -119,7 +119,7 @@ def test_photons_are_reproducible_and_carry_their_error(told: Callable[..., dict
 
 
 def test_photons_that_nothing_traces_are_noted(run: Run) -> None:
-    assert "no photons are traced" in run("profile", "skin1", "--photons", 1000).stderr
+    assert "have no effect without --model montecarlo" in run("profile", "skin1", "--photons", 1000).stderr
     assert "traced" not in run("profile", "skin1").stderr
 
 
@@ -143,7 +143,7 @@ def test_skin_of_pigments(told: Callable[..., dict[str, Any]]) -> None:
 def test_colour_through_a_thickness(run: Run, told: Callable[..., dict[str, Any]]) -> None:
     through = told("dj3", "--through", "0.5,2,8")["transmission"]
     assert through["thickness_mm"] == [0.5, 2, 8]
-    assert "8 mm, by its slab" in run("profile", "dj3", "--through", "0.5,2,8").stdout
+    assert "8 mm, by slab" in run("profile", "dj3", "--through", "0.5,2,8").stdout
     for way in ("gaussians", "slab"):
         colour = np.array(through[way])
         assert colour.shape == (3, 3) and (np.diff(colour, axis=0) <= 0.0).all()

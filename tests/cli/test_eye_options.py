@@ -48,7 +48,7 @@ def test_eyes_that_cannot_be_fitted_are_told_of(run, tmp_path: Path, folder: Pat
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png")
     assert outcome.code == 0 and "eyes" not in outcome.stderr
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png", "--eyes", "fitted")
-    assert outcome.code == 0 and "eyes: none found by name; --eye-groups" in outcome.stderr
+    assert outcome.code == 0 and "eyes: no group has a name of an eye" in outcome.stderr
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png", "--look-at", "camera")
     assert outcome.code == 2 and "--eye-groups" in outcome.stderr
 

@@ -63,6 +63,6 @@ def test_hex_colours_are_encoded_ones(render: Run) -> None:
 def test_a_clipped_head_is_told(render: Run) -> None:
     ended = render("head.obj", "-o", "a.png", "--exposure", "50")
     assert ended.code == 0 and ended.stderr.count("\n") == 1
-    assert ended.stderr.startswith("note: ") and "brighter than the picture can show" in ended.stderr
+    assert ended.stderr.startswith("note: ") and "of the head is overexposed" in ended.stderr
     assert "--exposure 50" in ended.stderr
     assert render("head.obj", "-o", "a.png").stderr == ""

@@ -53,7 +53,7 @@ def test_peaks_are_told(render: Run, sky: str) -> None:
     ended = render("head.obj", "--env", sky, "-o", "a.exr", "--exposure", "0.1")
     assert (ended.code, ended.stderr) == (
         0,
-        "note: a sun-like peak of sky.exr shines as a light with shadows, the rest from all around\n",
+        "note: a sun-like peak of sky.exr is rendered as a light with shadows\n",
     )
     assert render("head.obj", "--env", "uniform", "-o", "a.exr", "--exposure", "0.1").stderr == ""
 

@@ -115,6 +115,6 @@ def test_options_and_files_say_what_picture_it_is_for(
     assert levels(scene) == levels(path, 64) == 0
     assert not capsys.readouterr().err
     assert levels(scene, 1024) == levels(path, 1024) == 2
-    assert "--subdivide 2: 8,448 triangles, for a smooth outline" in capsys.readouterr().err
+    assert "--subdivide 2 for a smooth outline in this picture: 8,448 triangles" in capsys.readouterr().err
     assert levels(path, 64, subdivide=1) == 1
     assert not capsys.readouterr().err

@@ -35,7 +35,7 @@ class _TimedMessage(_StrictModel):
 
 
 class Touch(_StrictModel):
-    """Position of one finger."""
+    """Position and pressure of one finger."""
 
     x: Coordinate
     y: Coordinate
@@ -61,7 +61,7 @@ class Pointer(_InputMessage):
 
 
 class Wheel(_InputMessage):
-    """Rotation of the mouse wheel, in pixels of the browser."""
+    """Event of the mouse wheel, in pixels of the browser."""
 
     type: Literal["wheel"]
     x: Coordinate
@@ -72,14 +72,14 @@ class Wheel(_InputMessage):
 
 
 class Key(_InputMessage):
-    """Key press or release, with the key name used by browsers."""
+    """Event of a key press or release, with the key name used by browsers."""
 
     type: Literal["key_down", "key_up"]
     key: ShortText
 
 
 class TextInput(_TimedMessage):
-    """Typed text."""
+    """Event of typed text."""
 
     type: Literal["char"]
     data: str | None = None
@@ -88,7 +88,7 @@ class TextInput(_TimedMessage):
 
 
 class Resize(_TimedMessage):
-    """Size of the page in logical and physical pixels, and their ratio."""
+    """Event of a new page size, in logical and physical pixels with their ratio."""
 
     type: Literal["resize"]
     width: Coordinate
@@ -99,13 +99,13 @@ class Resize(_TimedMessage):
 
 
 class VisibilityChange(_TimedMessage):
-    """Notice that the page became visible or hidden."""
+    """Event sent when the page becomes visible or hidden."""
 
     type: Literal["show", "hide"]
 
 
 class FrameFeedback(_TimedMessage):
-    """Number of the frame that the page has displayed."""
+    """Message with the number of the frame that the page has displayed."""
 
     type: Literal["_framefeedback"]
     index: Annotated[int, Field(ge=0, le=1 << 53)]

@@ -189,14 +189,14 @@ def slider(
     value_range: SliderRange,
     number_format: str,
 ) -> None:
-    """Draw a slider of a number."""
+    """Draw a slider for a number."""
     flags = _LOG if value_range.logarithmic else 0
     result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
     edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
 
 
 def clamp(value: float, value_range: SliderRange) -> float:
-    """Clamp a value to the range, because typed values and single precision can be outside."""
+    """Clamp a value to a range, which typed values and rounding to single precision can exceed."""
     return min(value_range.high, max(value_range.low, value))
 
 
