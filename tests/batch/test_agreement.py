@@ -88,7 +88,7 @@ def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
     )
     assert found.distance == pytest.approx(truth.statistic, abs=1e-4)
     assert found.p_value == pytest.approx(truth.pvalue, rel=0.02)
-    mean, sd = map(float, found.stated.split(", "))
+    mean, sd = map(float, found.expected.split(", "))
     assert mean == pytest.approx(law.mean(), abs=2e-3 * law.std()) and sd == pytest.approx(
         law.std(), rel=2e-3
     )

@@ -147,7 +147,7 @@ def test_a_folder_is_replaced_only_where_it_is_an_export(skin1: Subject, tmp_pat
     assert sorted(file.name for file in folder.iterdir()) == ["README.md", "export.json", "skin1.asset"]
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "work.txt").write_text("mine")
-    with pytest.raises(DermisError, match=r"of before that holds export\.json"):
+    with pytest.raises(DermisError, match=r"a folder that holds export\.json"):
         export_skin(skin1, "unity", tmp_path / "own")
     assert sorted(one.name for one in tmp_path.iterdir()) == ["exported", "own"]
 

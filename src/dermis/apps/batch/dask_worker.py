@@ -118,9 +118,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
                     return WorkerEvent(shard.stop - shard.first, shard, event.failed)
         except (EOFError, OSError) as fault:
             raise LostProcessError(f"a worker: {child.exit_reason()}") from fault
-        return WorkerEvent(
-            refusal="the run: expected to continue, but it has ended. Run the command again to continue."
-        )
+        return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
     def _start(self) -> ChildProcess:
         """Start the process on the adapter that belongs to this worker's rank."""

@@ -274,9 +274,8 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
         values = table["choice"]
         if not isinstance(values, list | tuple):
             raise ValueError("a list in choice")
-        weights = table.get("weights")
-        shares = [1.0] * len(values) if weights is None else _numbers(weights, "a list of numbers in weights")
-        return Choice(tuple(parse_distribution(one, True) for one in values), tuple(shares))
+        weights = _numbers(table.get("weights", [1.0] * len(values)), "a list of numbers in weights")
+        return Choice(tuple(parse_distribution(one, True) for one in values), tuple(weights))
     raise ValueError(_EXPECTED_FORMS)
 
 

@@ -7,7 +7,6 @@ import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection
-from typing import Self
 
 from dermis.apps.batch.child_processes import ChildProcess, LostProcessError, shared_bytes, start_process
 from dermis.base.errors import DermisError
@@ -62,14 +61,6 @@ class EncoderPool:
         """Kill the processes; `encode_all` starts new ones."""
         while self._processes:
             self._processes.pop().child.kill()
-
-    def __enter__(self) -> Self:
-        """Return the pool itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the pool."""
-        self.close()
 
     def _start_processes(self, size: int) -> None:
         """Start the processes for jobs of up to `size` bytes."""

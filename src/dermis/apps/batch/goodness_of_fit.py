@@ -12,15 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, kolmogorov, ndtr
 
-from dermis.apps.batch.distributions import (
-    Choice,
-    Constant,
-    Distribution,
-    FileChoice,
-    Normal,
-    TruncatedNormal,
-    Uniform,
-)
+from dermis.apps.batch import distributions
+from dermis.apps.batch.distributions import Choice, Constant, Distribution
 from dermis.apps.batch.index import open_index
 from dermis.apps.batch.sampling import round_significant
 from dermis.apps.batch.spec import Spec
@@ -96,13 +89,13 @@ def cdf(distribution: Distribution, x: Array, *, closed: bool) -> Array:
     match distribution:
         case Constant(value):
             return ((x >= float(value)) if closed else (x > float(value))).astype(np.float64)
-        case Uniform(low, high, logarithmic):
+        case distributions.Uniform(low, high, logarithmic):
             if logarithmic:
                 low, high, x = np.log(low), np.log(high), np.log(np.maximum(x, low))
             return np.clip((x - low) / (high - low), 0.0, 1.0)
-        case Normal(mean, sd):
+        case distributions.Normal(mean, sd):
             return np.asarray(ndtr((x - mean) / sd))
-        case TruncatedNormal(mean, sd, low, high):
+        case distributions.TruncatedNormal(mean, sd, low, high):
             z, first, last = ((one - mean) / sd for one in (np.clip(x, low, high), low, high))
             if first > 0:  # upper tails, as 1 minus the lower tail would cancel far above the mean
                 return np.asarray((ndtr(-first) - ndtr(-z)) / (ndtr(-first) - ndtr(-last)))
@@ -115,7 +108,7 @@ def cdf(distribution: Distribution, x: Array, *, closed: bool) -> Array:
 
 def text_probabilities(distribution: Distribution) -> dict[str, float]:
     """Return the probability of each text of a distribution."""
-    if isinstance(distribution, FileChoice):
+    if isinstance(distribution, distributions.FileChoice):
         return dict.fromkeys(distribution.names, 1.0 / len(distribution.names))
     if isinstance(distribution, Constant):
         return {str(distribution.value): 1.0}

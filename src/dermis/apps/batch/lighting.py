@@ -1,4 +1,4 @@
-"""Lights of an image: a rig of the package, or sampled key, fill and rim lamps."""
+"""Lights of an image: a preset rig, or sampled key, fill and rim lamps."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,27 +27,24 @@ _PERSON_IDS = "person.number", "person.seed"
 _MAX_VALUES = 12  # listed values of a text
 
 
-class _RowFields(TypedDict):
-    """Fields of every row.
+class Row(TypedDict):
+    """Row of the parameter table.
 
     drawn : distribution as TOML
     first : values of the first 16 images, None where an image has none
     images : number of images with this parameter, among the first 20,000
+    min, mean, max : statistics of numbers
+    counts : number of images with each text
     """
 
     parameter: str
     drawn: str
     first: list[float | str | None]
     images: int
-
-
-class Row(_RowFields, total=False):
-    """Row of the parameter table: minimum, mean and maximum of numbers, or counts of texts."""
-
-    min: float
-    mean: float
-    max: float
-    counts: dict[str, int]
+    min: NotRequired[float]
+    mean: NotRequired[float]
+    max: NotRequired[float]
+    counts: NotRequired[dict[str, int]]
 
 
 def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.uint8]]:

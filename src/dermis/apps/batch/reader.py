@@ -100,10 +100,8 @@ def read_dataset(
     ...     print(image["picture"].shape, image["parameters"]["camera.yaw_deg"])
     (2, 4, 3) 12.5
     """
-    chosen = _select_shards(checked_path(path, "a data set"), shards)
-    return _iterate_images(
-        chosen, None if shuffle is None else Random(checked_integer("shuffle", shuffle, 0, 2**64))
-    )
+    random = None if shuffle is None else Random(checked_integer("shuffle", shuffle, 0, 2**64))
+    return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:

@@ -21,7 +21,7 @@ _WEIGHT_POWER = 1.5  # random weights are a uniform number to this power, so tha
 _BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
-_DIALS = "intensity", "asymmetry", "variation"
+_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _COLOUR = "background.red", "background.green", "background.blue"
 _CONDITIONAL: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
@@ -186,7 +186,7 @@ class Sampler:
             weights: Weights = random_expression(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
-        intensity, asymmetry, variation = (float(found[f"expression.{dial}"]) for dial in _DIALS)
+        intensity, asymmetry, variation = (float(found[f"expression.{key}"]) for key in _VARIATION_KEYS)
         varied = expression_weights(
             weights,
             intensity,
@@ -196,9 +196,8 @@ class Sampler:
         )
         sampled: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():
-            sampled |= dict.fromkeys(
-                expand_targets([target]), self._sample(k, f"pose.{target}", distribution)
-            )
+            weight = self._sample(k, f"pose.{target}", distribution)
+            sampled |= dict.fromkeys(expand_targets([target]), weight)
         return {target: round_significant(float(sampled.get(target, 0.0))) for target in self.targets}
 
     @cached_property

@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from dermis.apps.batch.atomic_files import move_into_place, remove_path, temporary_path, unfinished_files
@@ -102,12 +101,10 @@ class ShardWriter:
         """Record an image that could not be rendered."""
         self._left_out[number] = shorten(reason, _MAX_REASON_LENGTH)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Write the manifest and rename the shard to its final path, or remove it after an error."""
         try:
-            if error is None:
+            if kind is None:
                 self._files.finish(self._manifest_bytes())
                 move_into_place(self._temporary, self._target)
         except OSError as fault:

@@ -31,11 +31,7 @@ MAX_IMAGES = 10**9
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
 _BACKGROUND = "[background]"
-SETTINGS_OUTSIDE_RENDER = {
-    "size": "size, above all tables",
-    "background": _BACKGROUND,
-    "background_blur": _BACKGROUND,
-}
+OUTSIDE_RENDER = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
 """Settings that are not keys of [render], and where a spec states them instead."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
 _HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
@@ -122,7 +118,7 @@ class Spec(FrozenModel):
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return the landmark sets by name: the name of a set of the package, or the path of a table."""
+        """Return the landmark sets by name: the name of a preset set, or the path of a table."""
         return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
@@ -144,7 +140,7 @@ class Spec(FrozenModel):
         """Return the canonical TOML with all values, which `parse_spec` reads as the same spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
-        values["render"] = self.render.model_dump(exclude=set(SETTINGS_OUTSIDE_RENDER), exclude_none=True)
+        values["render"] = self.render.model_dump(exclude=set(OUTSIDE_RENDER), exclude_none=True)
         del values["folder"]
         return "\n".join([_HEADER, *_toml_lines("", values)])
 
@@ -188,15 +184,10 @@ def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """
     if "folder" in data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
-    fields = {
-        name: table if name == "files" else _expand_patterns(table, folder, name)
-        for name, table in data.items()
-    }
+    fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in data.items()}
     fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
-        fields["correlated"] = tuple(
-            _build_model(tables.CorrelationGroup, "correlated", group) for group in groups
-        )
+        fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
     spec = _build_model(Spec, "", fields | {"folder": folder})
     names = [name for name in spec.landmarks if name not in SETS]
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
@@ -215,8 +206,8 @@ def example_toml() -> str:
 def _parse_render(size: object, table: object) -> Settings:
     if not isinstance(table, Mapping):
         return _build_model(Settings, "render", table)
-    for key in SETTINGS_OUTSIDE_RENDER.keys() & table.keys():
-        advice = f"Write it as {SETTINGS_OUTSIDE_RENDER[key]}"
+    for key in OUTSIDE_RENDER.keys() & table.keys():
+        advice = f"Write it as {OUTSIDE_RENDER[key]}"
         refuse(f"render: {key}", "no such key in [render]", "it is given here", advice)
     return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 

@@ -91,9 +91,7 @@ def _check_correlations(groups: Sequence[CorrelationGroup], sampled: Mapping[str
                 expected = "names of parameters that the spec samples, such as camera.yaw_deg"
                 refuse("correlated: of", expected, f"got {name!r}", "Correct it")
             if name in seen:
-                refuse(
-                    "correlated: of", "each name in one group", f"{name} is in two", "Merge the two groups"
-                )
+                refuse("correlated: of", "each name in one group", f"{name} is in two", "Merge the groups")
         if people != sorted(people, reverse=True):
             actual = f"{group.of[people.index(False)]} precedes one"
             refuse("correlated: of", "parameters of the person first", actual, "Change their order")

@@ -253,14 +253,12 @@ class LampTable(FrozenModel):
     """Side length [mm]."""
     strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
     """Irradiance at the head, divided by pi."""
-    kelvin: Annotated[Distribution, NumberField(1700, 20_000, "K: from candle to blue sky")] = Constant(
-        6500.0
-    )
+    kelvin: Annotated[Distribution, NumberField(1700, 20_000, "K: candle to blue sky")] = Constant(6500.0)
     """Colour temperature; 6500 is white [K]."""
 
 
 class LightTable(FrozenModel):
-    """Lamps: a rig of the package, or key, fill and rim lamps."""
+    """Lamps: a preset rig, or key, fill and rim lamps."""
 
     kind: Annotated[Distribution, NameField(lambda: [RIG, *light_presets()])] = Constant("studio")
     """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""

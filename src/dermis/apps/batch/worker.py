@@ -8,11 +8,12 @@ import os
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
@@ -131,11 +132,7 @@ class Worker:
                 writer.leave_out(*failure)
         return tuple(sorted(failed))
 
-    def __enter__(self) -> Self:
-        """Return the worker itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """Kill the encoder processes."""
         self._encoders.close()
 
@@ -210,7 +207,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
     with warnings.catch_warnings():
         _forward_notes(lambda text: pipe.send(WorkerEvent(note=text)))
         try:
-            with Worker(slot.adapter, options) as worker:
+            with closing(Worker(slot.adapter, options)) as worker:
                 while True:
                     shard = pipe.recv()
                     failed = worker.render_shard(shard, lambda: pipe.send(WorkerEvent(images=1)))

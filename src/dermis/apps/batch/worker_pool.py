@@ -112,9 +112,8 @@ class _PoolState:
     def start_worker(self, slot: WorkerSlot) -> None:
         """Start a worker if a shard is left in the queue."""
         if self._queue:
-            worker = _WorkerProcess(
-                slot, start_process(run_worker, slot, self._options), self._queue.popleft()
-            )
+            child = start_process(run_worker, slot, self._options)
+            worker = _WorkerProcess(slot, child, self._queue.popleft())
             self.workers.append(worker)
             self._send_shard(worker)
 

@@ -153,13 +153,11 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
     reference = curve.fraction_within(r)[:, channel]
     middle = np.log(median / float(np.interp(0.5, unit_cdf(_CDF_RADII), _CDF_RADII)))
 
-    def squared_error(log_length: float) -> float:
+    def loss(log_length: float) -> float:
         return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
     bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
-    result = minimize_scalar(
-        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE}
-    )
+    result = minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE})
     return float(np.exp(result.x))
 
 

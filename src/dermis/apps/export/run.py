@@ -93,9 +93,7 @@ class ExportReport:
         lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {meaning}")
-            lines.append(
-                f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  with the naive parameters"
-            )
+            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  of naive parameters")
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:

@@ -16,9 +16,7 @@ def supported_lights(lights: Iterable[Light], supported: Container[str], program
 
     supported : kinds of light that the program supports, including point and directional
     """
-    return [
-        _nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, start=1)
-    ]
+    return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
 
 
 def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Light:

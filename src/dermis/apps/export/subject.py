@@ -22,7 +22,7 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.half_space import tabulated_curve
+from dermis.optics.half_space import tabulated_cumulative
 from dermis.optics.media import Floats
 from dermis.optics.profiles import find_gaussians
 from dermis.optics.radial import RadialProfile, gaussian_radial_profile
@@ -145,7 +145,7 @@ def load_subject(
     path = checked_path(source, "a skin or a head")
     name = str(source)
     if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in _MESHES):
-        return _load_skin(name, profile, model, head)
+        return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(source, **head)
     if profile is not None:
         skin = Skin(profile=str(profile))
@@ -156,10 +156,8 @@ def load_subject(
     return Subject(path.name, curve, albedo, used, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(
-    name: str, profile: str | Path | None, model: ModelName | None, head: Iterable[str]
-) -> Subject:
-    for option in ("profile",) if profile is not None else tuple(head):
+def _load_skin(name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
+    for option in head_options:
         refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
     curve, used, tissue = reference_curve(Skin(profile=name), model)
     return Subject(Path(name).name, curve, curve.energy, used, tissue)
@@ -183,10 +181,8 @@ def reference_curve(
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Omit this option")
         return CumulativeProfile.from_radial_profile(gaussian_radial_profile(table)), "table", None
     tissue = skin_tissue(skin)
-    tabulated = (
-        tabulated_curve(tissue.medium) if tissue.rgb is None and model in (None, "montecarlo") else None
-    )
-    if tabulated is not None:
+    may_be_tabulated = tissue.rgb is None and model in (None, "montecarlo")
+    if may_be_tabulated and (tabulated := tabulated_cumulative(tissue.medium)) is not None:
         return tabulated, "montecarlo", tissue
     used: ModelName = model or "layered"
     transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)

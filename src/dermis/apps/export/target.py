@@ -40,12 +40,12 @@ Parameters = tuple[Parameter, ...]
 
 
 def get_value(parameters: Parameters, name: str) -> Value:
-    """Return the value of the parameter of a name."""
+    """Return the value of the parameter with a given name."""
     return next(one.value for one in parameters if one.name == name)
 
 
 def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
-    """Return the value of the parameter of a name as a tuple of numbers."""
+    """Return the value of the parameter with a given name as a tuple of numbers."""
     value = get_value(parameters, name)
     return value if isinstance(value, tuple) else (float(value),)
 
@@ -298,14 +298,13 @@ class JsonTarget(Target):
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the parameters with units and meanings as JSON, marked as not tested."""
         file = self.main_file(output, subject)
+        rows = {p.name: {"value": p.value, "unit": p.unit, "meaning": p.meaning} for p in parameters}
         content = {
             "for": f"{self.title} {version}",
             "status": "not run: by published documentation",
             "skin": subject.name,
             "profile": subject.model,
-            "parameters": {
-                one.name: {"value": one.value, "unit": one.unit, "meaning": one.meaning} for one in parameters
-            },
+            "parameters": rows,
             "remains_wrong": self.limitations,
         }
         file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

@@ -20,7 +20,7 @@ _MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
 class Arnold(JsonTarget):
-    """Random walk of standard_surface, for a scene in centimetres."""
+    """Export of the parameters of standard_surface's random walk, for scenes in cm."""
 
     name = "arnold"
     title = "Arnold"

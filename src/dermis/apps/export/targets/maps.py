@@ -69,15 +69,11 @@ MAP_INFOS: Mapping[str, MapInfo] = MappingProxyType(
         "reflected": MapInfo("", "share", "mean albedo of the specular reflection over all directions"),
         "melanin": MapInfo("", "share", "volume fraction of melanosomes in the epidermis"),
         "blood": MapInfo("", "share", "volume fraction of blood in the dermis"),
-        "thickness": MapInfo(
-            "mm", "range", "thickness of the tissue below, up to the depth that light reaches"
-        ),
+        "thickness": MapInfo("mm", "range", "thickness of the tissue, up to the depth that light reaches"),
         "curvature": MapInfo("1/mm", "range", "root mean square of the principal curvatures, smoothed"),
         "stretch": MapInfo("mm", "none", "length on the skin of the maps' width (R) and height (G)"),
         "irradiance": MapInfo("irradiance", "light", "irradiance that enters the skin, before diffusion"),
-        "scattered": MapInfo(
-            "irradiance", "light", "pi times the radiance along the normal, after diffusion"
-        ),
+        "scattered": MapInfo("irradiance", "light", "pi times radiance along the normal, after diffusion"),
     }
 )
 """Properties of the maps by name, which is also the name of their files."""
@@ -112,9 +108,7 @@ class MapFolder(Target):
         """Return the sum of Gaussians with which the renderer diffuses light, or no diffusion."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERED) or subject.scene is None:
-            return CumulativeProfile.from_function(
-                lambda r: np.tile(r[:, None] > 0.0, 3).astype(float), energy
-            )
+            return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
         profile = SkinProfiles().profile(subject.scene.skin)
         return gaussian_curve(profile.variance_mm2, profile.weight, energy)
 

@@ -34,7 +34,7 @@ _LOADERS = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
 
 class Babylon(EnginePage):
-    """Web page with Babylon.js."""
+    """Export to a web page that draws the head with Babylon.js."""
 
     name = "babylon"
     title = "Babylon.js"
@@ -74,7 +74,7 @@ class Babylon(EnginePage):
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the elements of two scripts, and their sources."""
+        """Return the script elements of the library, and their sources for the page's policy."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]
@@ -118,11 +118,9 @@ def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> Cumulat
 
     metres : metersPerUnit
     """
-    r, _, weight = spiral_samples(colour)
-    rendered_mm = WIDTH_ERROR * r / metres
-    return CumulativeProfile.from_function(
-        lambda radius: (radius[:, None] >= rendered_mm).astype(float) @ weight, energy
-    )
+    radii, _, weight = spiral_samples(colour)
+    radii_mm = WIDTH_ERROR * radii / metres
+    return CumulativeProfile.from_function(lambda r: (r[:, None] >= radii_mm).astype(float) @ weight, energy)
 
 
 TARGET = Babylon()

@@ -174,14 +174,14 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
 
 def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
-    """Return a transformation of Cycles' scenes for the upright head, in metres."""
+    """Convert a transformation to Blender's coordinates: Z up, in metres."""
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
     return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
 
 
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
-    """Return a lamp of Cycles' scenes for the upright head, in metres."""
+    """Convert a lamp to Blender's coordinates: Z up, in metres."""
     fields = dict(lamp["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":

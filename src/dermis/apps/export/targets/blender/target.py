@@ -167,7 +167,7 @@ class RandomWalk(NamedTuple):
 
 
 class Blender(Target):
-    """Subsurface scattering of the Principled BSDF, by each method of Cycles and in EEVEE."""
+    """Export to the Principled BSDF of Blender, with a subsurface method of Cycles or EEVEE."""
 
     name = "blender"
     title = "Blender"
@@ -184,9 +184,7 @@ class Blender(Target):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the radius for which the method's profile is closest to the reference."""
         units = self._unit_cdfs(subject, version)
-        fitted = np.array(
-            [fit_length_scale(subject.curve, channel, unit) for channel, unit in enumerate(units)]
-        )
+        fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
         radius = fitted / self._unit_lengths(subject, version)
         return self._parameters(tuple(round(float(x), 5) for x in radius), version)
 
@@ -227,14 +225,10 @@ class Blender(Target):
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
             Parameter(_RADIUS, radius, "mm, times the scale", self._radius_meaning(version)),
             Parameter(_SCALE, _METRES_PER_MM, "m", "metres per millimetre"),
-            Parameter(
-                "IOR", SKIN_ETA, "-", "of the surface, for reflection and for the start of random walks"
-            ),
+            Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]
         if self.variant.startswith("random"):
-            parameters.append(
-                Parameter("Subsurface Anisotropy", 0.0, "-", "mean cosine of the scattering angle")
-            )
+            parameters.append(Parameter("Subsurface Anisotropy", 0.0, "-", "mean cosine of scattering"))
         if self.variant == "random-walk-skin":
             parameters.append(Parameter("Subsurface IOR", SKIN_ETA, "-", "determines the mean free path"))
         return tuple(parameters)

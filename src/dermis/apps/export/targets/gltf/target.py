@@ -29,7 +29,7 @@ _NAIVE_FACTOR = 0.5  # middle of the slider
 
 
 class Gltf(Target):
-    """A .glb file."""
+    """Export to a .glb file whose skin material has extensions for scattering or transmission."""
 
     name = "gltf"
     title = "glTF"
@@ -86,9 +86,7 @@ def _scatter_parameters(volume: Volume) -> Parameters:
         Parameter(_COLOUR, floats(volume.colour), "-", "fraction of the light without an event on that path"),
         Parameter("KHR_materials_scatter.scatterStrengthFactor", 1.0, "-", "factor of the colour below"),
         Parameter(_MULTISCATTER, multiscatter, "-", "by van de Hulst's formula, or a map"),
-        Parameter(
-            "KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "the mean free paths are reduced ones"
-        ),
+        Parameter("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean free paths are reduced ones"),
         _IOR,
     )
 

@@ -72,9 +72,8 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
     weights = np.stack([1.0 - second - third, second, third], axis=1)
     first = len(grid) * np.arange(len(triangles))[:, None, None]
     corners = (first + np.array(upward + downward)).reshape(-1, 3)
-    return SubdividedTriangles(
-        np.repeat(triangles, len(grid)), np.tile(weights, (len(triangles), 1)), corners
-    )
+    weights = np.tile(weights, (len(triangles), 1))
+    return SubdividedTriangles(np.repeat(triangles, len(grid)), weights, corners)
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:

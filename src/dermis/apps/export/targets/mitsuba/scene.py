@@ -12,17 +12,9 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.targets.maps import encode_map_exr
+from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
-from dermis.apps.export.targets.mitsuba.xml import (
-    Override,
-    Ref,
-    XmlBackend,
-    bitmap_path,
-    default_element,
-    include_element,
-    xml_document,
-    xml_element,
-)
+from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, rgb
@@ -76,9 +68,9 @@ def scene_files(
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
-    yield "scene.xml", xml_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples)))
+    yield "scene.xml", xml.document(_scene_elements(backend, scene, appearance, boundary, (*size, samples)))
     for each in BOUNDARIES:
-        yield f"boundary_{each}.xml", xml_document(_skin_elements(backend, each, appearance, meshes))
+        yield f"boundary_{each}.xml", xml.document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
@@ -88,7 +80,7 @@ def scene_files(
     if not isinstance(appearance.roughness, float):
         yield "textures/roughness.exr", encode_map_exr("roughness", appearance.roughness)
     for index, values in enumerate(backend.bitmaps):
-        yield bitmap_path(index), encode_map_exr("light", np.asarray(values, np.float32))
+        yield xml.bitmap_path(index), encode_map_exr("light", np.asarray(values, np.float32))
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
@@ -146,10 +138,10 @@ def _scene_elements(
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
     sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
     sensor["film"] |= {
-        "width": Override("integer", "width"),
-        "height": Override("integer", "height"),
+        "width": xml.Override("integer", "width"),
+        "height": xml.Override("integer", "height"),
     }
-    sensor["sampler"]["sample_count"] = Override("integer", "samples")
+    sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
@@ -161,9 +153,9 @@ def _scene_elements(
     opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
     for index in appearance.opaque:
         parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": opaque})
-    defaults = [default_element(*one) for one in (("boundary", boundary), *sizes)]
-    elements = [xml_element(part, "", backend) for part in parts]
-    return [*defaults, *elements, include_element("boundary_$boundary.xml")]
+    defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
+    elements = [xml.element(part, "", backend) for part in parts]
+    return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
 
 
 def _skin_elements(
@@ -183,9 +175,9 @@ def _skin_elements(
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
     for name in (name for name in shapes if name in meshes):
-        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(shapes[name])}
-        parts.append({**shape, "interior": Ref("skin_medium")})
-    return [xml_element(part, "", backend) for part in parts]
+        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
+        parts.append({**shape, "interior": xml.Ref("skin_medium")})
+    return [xml.element(part, "", backend) for part in parts]
 
 
 def _opaque_file(index: int) -> str:

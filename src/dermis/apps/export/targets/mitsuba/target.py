@@ -47,7 +47,7 @@ _SIZE, _SAMPLES = (512, 512), 256
 
 
 class Mitsuba(Target):
-    """Scene with medium, surface, lights, camera and meshes, in millimetres."""
+    """Export to a Mitsuba scene in mm, with medium, surface, lights, camera and meshes."""
 
     name = "mitsuba"
     title = "Mitsuba"

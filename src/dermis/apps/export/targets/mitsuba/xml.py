@@ -83,17 +83,17 @@ class Override:
     name: str
 
 
-def xml_element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
+def element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
     """Return the XML element of a description.
 
     backend : collects the pictures
     """
     plugin = str(description["type"])
-    element = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
+    node = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
     for key, value in description.items():
         if key not in ("type", "id"):
-            element.append(_property_element(key, value, backend))
-    return element
+            node.append(_property_element(key, value, backend))
+    return node
 
 
 def bitmap_path(index: int) -> str:
@@ -101,7 +101,7 @@ def bitmap_path(index: int) -> str:
     return f"textures/light_{index}.exr"
 
 
-def xml_document(parts: list[ET.Element]) -> bytes:
+def document(parts: list[ET.Element]) -> bytes:
     """Return the scene of some elements as XML."""
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
@@ -130,16 +130,16 @@ def _property_element(key: str, value: object, backend: XmlBackend) -> ET.Elemen
     if isinstance(value, Override):
         return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
     if isinstance(value, Transform):
-        element = ET.Element("transform", {"name": key})
-        ET.SubElement(element, "matrix", {"value": _numbers(value.matrix)})
-        return element
+        node = ET.Element("transform", {"name": key})
+        ET.SubElement(node, "matrix", {"value": _numbers(value.matrix)})
+        return node
     if isinstance(value, Bitmap):
         backend.bitmaps.append(value.values)
         return _value_element("filename", bitmap_path(len(backend.bitmaps) - 1))
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
             return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
-        return xml_element(value, key, backend)
+        return element(value, key, backend)
     return _value_element(key, value)
 
 

@@ -123,11 +123,10 @@ def skin_material(
 def opaque_material(material: Material) -> OpenPbrMaterial:
     """Return the OpenPBR material of a part of the head other than skin."""
     name = material.name.casefold()
+    roughness = next((value for part, value in _ROUGHNESS.items() if part in name), _DEFAULT_ROUGHNESS)
     values: dict[str, Value] = {
         "base_color": floats(material.colour),
-        "specular_roughness": next(
-            (_ROUGHNESS[part] for part in _ROUGHNESS if part in name), _DEFAULT_ROUGHNESS
-        ),
+        "specular_roughness": roughness,
         "specular_ior": _EYE_IOR if "eye" in name else SKIN_ETA,
     }
     return OpenPbrMaterial(material.name, values, {})

@@ -27,7 +27,6 @@ from dermis.optics.half_space import half_space
 from dermis.optics.media import Floats, Layer, albedo_from_colour
 from dermis.specular.fresnel import SKIN_ETA
 
-PUBLISHED_MEANING = "diffuse mean free path, as published"
 _METRES_PER_MM = 1e-3
 _SHADERS = {
     "open-pbr": OPEN_PBR,
@@ -38,7 +37,7 @@ _SHADERS = {
 
 
 class OpenPbr(Target):
-    """MaterialX document with one material per part of the head.
+    """Export to a MaterialX document with one material per part of the head.
 
     Variants that end in "profile" are for renderers that interpret the radius as the d of a profile.
     """
@@ -78,7 +77,8 @@ class OpenPbr(Target):
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the published diffuse mean free paths as the radius."""
-        return surface_parameters(subject, self.shader, published_path_mm(subject), PUBLISHED_MEANING)
+        meaning = "diffuse mean free path, as published"
+        return surface_parameters(subject, self.shader, published_path_mm(subject), meaning)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the random walk, or of MaterialX's profile."""

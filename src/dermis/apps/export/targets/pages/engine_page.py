@@ -52,21 +52,21 @@ class LibraryFile:
 
     @property
     def url(self) -> str:
-        """Return the address from which it is loaded."""
+        """Return the URL from which the page loads the file."""
         return f"{_CDN_URL}/{self.package}@{self.version}/{self.path}"
 
     @property
     def integrity(self) -> str:
-        """Return the hash by which the browser checks it."""
+        """Return the value of the HTML attribute `integrity`, by which the browser checks the file."""
         return f"sha384-{self.sha384}"
 
     @property
     def element(self) -> str:
-        """Return the HTML element that loads and checks it."""
+        """Return the HTML element that loads and checks the file."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
     def read(self, folder: Path) -> str:
-        """Return its text from a folder node_modules of npm.
+        """Return the text of the file from a node_modules folder of npm.
 
         DermisError : if it is missing or belongs to another version
         """
@@ -81,7 +81,7 @@ class LibraryFile:
 
 @dataclass(frozen=True)
 class EnginePage(Target):
-    """Web page that draws a head with a library.
+    """Base class of exports to a web page that draws a head with a JavaScript library.
 
     library_folder : folder node_modules of npm whose files are embedded; None loads them from a public server
     """

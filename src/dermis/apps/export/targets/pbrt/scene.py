@@ -128,9 +128,8 @@ def _rectangle(light: RectangleLight) -> Lines:
     # The order of the sides makes the normal point to the target.
     first, second = -0.5 * light.width_mm * across, 0.5 * light.height_mm * above
     corners = [np.add(light.position, a * first + b * second) for b in (-1, 1) for a in (-1, 1)]
-    radiance = np.divide(
-        light.irradiance, facing_irradiance(light.width_mm, light.height_mm, _distance(light))
-    )
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    radiance = np.divide(light.irradiance, unit_irradiance)
     return [
         directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
         directive("Shape", "bilinearmesh", {"point3 P": corners}),

@@ -79,9 +79,7 @@ def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     depth = Parameter(DEPTH_SCALE, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1")
     return (
         Parameter("enable_burley", True, "-", "Burley's profile instead of six Gaussians"),
-        Parameter(
-            "enable_mean_free_path", True, "-", "otherwise the editor converts these values on loading"
-        ),
+        Parameter("enable_mean_free_path", True, "-", "else the editor converts these values on loading"),
         Parameter(ALBEDO, floats(albedo), "-", "A of s(A); does not affect the colour"),
         Parameter(COLOUR, floats(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"),
         Parameter(DISTANCE, distance, "cm", "mean free path at a colour of 1"),

@@ -71,13 +71,11 @@ def add_mesh(
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     _add_uv(prim, texture_coordinates(head), polygons)
-    subsets = {}
-    for material in np.unique(polygons.material).tolist():
-        faces = Vt.IntArray.FromNumpy(np.flatnonzero(polygons.material == material).astype(np.int32))
-        subsets[material] = UsdGeom.Subset.CreateGeomSubset(
-            prim, f"part_{material}", UsdGeom.Tokens.face, faces, "materialBind"
-        )
-    UsdGeom.Subset.SetFamilyType(prim, "materialBind", UsdGeom.Tokens.partition)
+    subsets, family, tokens = {}, "materialBind", UsdGeom.Tokens
+    for k in np.unique(polygons.material).tolist():
+        faces = Vt.IntArray.FromNumpy(np.flatnonzero(polygons.material == k).astype(np.int32))
+        subsets[k] = UsdGeom.Subset.CreateGeomSubset(prim, f"part_{k}", tokens.face, faces, family)
+    UsdGeom.Subset.SetFamilyType(prim, family, tokens.partition)
     return subsets
 
 

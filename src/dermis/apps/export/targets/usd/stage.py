@@ -91,35 +91,33 @@ def _add_material(
     """
     material = UsdShade.Material.Define(stage, path)
     material.GetPrim().SetDisplayName(definition.name)
-    _add_open_pbr(stage, material, definition, prefix)
-    _add_preview(stage, material, definition, prefix)
+    _add_open_pbr(material, definition, prefix)
+    _add_preview(material, definition, prefix)
     return material
 
 
-def _add_open_pbr(
-    stage: Usd.Stage, material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str
-) -> None:
+def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str) -> None:
     prim = material.GetPrim()
     prim.AddAppliedSchema("MaterialXConfigAPI")  # its plug-in is not part of usd-core
     prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set("1.39")
-    surface = _add_shader(stage, material, "open_pbr", "ND_open_pbr_surface_surfaceshader")
+    surface = _add_shader(material, "open_pbr", "ND_open_pbr_surface_surfaceshader")
     for key, value in definition.values.items():
         _set_input(surface, key, value)
     if definition.maps:
-        uv_node = _add_shader(stage, material, "place", "ND_geompropvalue_vector2")
+        uv_node = _add_shader(material, "place", "ND_geompropvalue_vector2")
         uv_node.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV)
         uv = uv_node.CreateOutput("out", Sdf.ValueTypeNames.Float2)
     for key, role in definition.maps.items():
         map_type, types = MAPS[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[map_type.type]
-        image = _add_shader(stage, material, f"{role}_image", _NODES[map_type.type])
+        image = _add_shader(material, f"{role}_image", _NODES[map_type.type])
         file = image.CreateInput("file", types.Asset)
         file.Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
         file.GetAttr().SetColorSpace(map_type.space or "raw")
         image.CreateInput("texcoord", types.Float2).ConnectToSource(uv)
         output = image.CreateOutput("out", usd_type)
         if role == "normal":
-            normal_map = _add_shader(stage, material, "normal_in_space", "ND_normalmap_float")
+            normal_map = _add_shader(material, "normal_in_space", "ND_normalmap_float")
             normal_map.CreateInput("in", usd_type).ConnectToSource(output)
             output = normal_map.CreateOutput("out", usd_type)
         surface.CreateInput(key, usd_type).ConnectToSource(output)
@@ -127,12 +125,10 @@ def _add_open_pbr(
     material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
 
-def _add_preview(
-    stage: Usd.Stage, material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str
-) -> None:
+def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str) -> None:
     """Add the UsdPreviewSurface of a material, which has its colour but no subsurface scattering."""
     types = Sdf.ValueTypeNames
-    surface = _add_shader(stage, material, "preview", "UsdPreviewSurface")
+    surface = _add_shader(material, "preview", "UsdPreviewSurface")
     for key, value in definition.values.items():
         if key in _PREVIEW_INPUTS and not (key == "base_color" and "subsurface_color" in definition.maps):
             _set_input(surface, _PREVIEW_INPUTS[key], value)
@@ -141,10 +137,10 @@ def _add_preview(
         if key not in _PREVIEW_INPUTS:
             continue
         if uv is None:
-            uv_node = _add_shader(stage, material, "preview_place", "UsdPrimvarReader_float2")
+            uv_node = _add_shader(material, "preview_place", "UsdPrimvarReader_float2")
             uv_node.CreateInput("varname", types.String).Set(_UV)
             uv = uv_node.CreateOutput("result", types.Float2)
-        texture = _add_shader(stage, material, f"preview_{role}", "UsdUVTexture")
+        texture = _add_shader(material, f"preview_{role}", "UsdUVTexture")
         texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
         texture.CreateInput("sourceColorSpace", types.Token).Set(MAPS[role].preview_space)
         texture.CreateInput("st", types.Float2).ConnectToSource(uv)
@@ -161,8 +157,8 @@ def _add_preview(
     material.CreateSurfaceOutput().ConnectToSource(out)
 
 
-def _add_shader(stage: Usd.Stage, material: UsdShade.Material, name: str, kind: str) -> UsdShade.Shader:
-    shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild(name))
+def _add_shader(material: UsdShade.Material, name: str, kind: str) -> UsdShade.Shader:
+    shader = UsdShade.Shader.Define(material.GetPrim().GetStage(), material.GetPath().AppendChild(name))
     shader.CreateIdAttr(kind)
     return shader
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, get_numbers
+from dermis.apps.export.target import Parameter, Parameters
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     encode_map_files,
@@ -17,31 +15,21 @@ from dermis.apps.export.targets.openpbr.materials import (
     mesh_materials,
     write_maps,
 )
-from dermis.apps.export.targets.openpbr.target import (
-    PUBLISHED_MEANING,
-    fitted_path_mm,
-    get_radii_mm,
-    profile_error_text,
-    published_path_mm,
-    surface_parameters,
-    walk_curve,
-)
+from dermis.apps.export.targets.openpbr.target import OpenPbr, get_radii_mm
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.optics.cumulative_profile import CumulativeProfile
 
 _PACKAGE, _BINARY = ".usdz", ".usdc"
 _UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
 
 
-class Usd(Target):
+class Usd(OpenPbr):
     """Export to a USD stage: a file with maps beside it, a .usdz package, or a folder."""
 
     name = "usd"
     title = "USD with OpenPBR"
     suffixes = (".usda", _BINARY, ".usd", _PACKAGE, "")
-    versions = ("1.1.1",)
-    needs_maps = True
+    variants = ()
     limitations = (
         "Correct in renderers that support the MaterialX nodes and random walks as OpenPBR specifies. Others "
         "use UsdPreviewSurface, which has no subsurface scattering. Hairs do not follow the head's motion. "
@@ -50,19 +38,11 @@ class Usd(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters of OpenPBR whose random walk is closest to the profile."""
-        path = fitted_path_mm(subject)
-        meaning = f"longest mean free path; {profile_error_text(path, subject)}"
-        return (*surface_parameters(subject, OPEN_PBR, path, meaning), _UNIT_PARAMETER)
+        return (*super().parameters(subject, version), _UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return published diffuse mean free paths used as mean free paths."""
-        path = published_path_mm(subject)
-        return (*surface_parameters(subject, OPEN_PBR, path, PUBLISHED_MEANING), _UNIT_PARAMETER)
-
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the random walk with the parameters."""
-        colour = np.array(get_numbers(parameters, "subsurface_color"))
-        return walk_curve(colour, get_radii_mm(parameters, OPEN_PBR), subject)
+        return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the stage, with the maps beside it or in the package."""

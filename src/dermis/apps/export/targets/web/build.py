@@ -14,7 +14,7 @@ from dermis.apps.export.targets.web.frame_json import (
     NamedFrame,
     PictureMap,
     PictureMaps,
-    describe_frames,
+    frames_json,
 )
 from dermis.apps.export.targets.web.maps import (
     MapPictures,
@@ -34,6 +34,7 @@ from dermis.scene.lights import Light, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
+OnRenderer = Callable[[Renderer, Scene, Settings], None]
 TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
@@ -106,9 +107,7 @@ class PageRequest:
         return self.settings.model_copy(update={"size": (side, side), **diffusion})
 
 
-def build_content(
-    request: PageRequest, on_renderer: Callable[[Renderer, Scene, Settings], None] | None = None
-) -> PageContent:
+def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Return the content of the page.
 
     on_renderer : called with each kind's renderer, whose maps are by then those that the page decodes
@@ -118,8 +117,7 @@ def build_content(
         renderer = capture_renderer(form, request.adapter)
         content.forms[form] = _build_form(content, renderer, request, form)
         settings = request.settings_for(request.sizes[form][0])
-        if on_renderer is not None:
-            on_renderer(renderer, request.scene, settings)
+        on_renderer(renderer, request.scene, settings)
         if content.poster is None:
             content.poster = renderer.draw(request.scene, settings).srgb8()
     return content
@@ -139,7 +137,7 @@ def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, 
     captured_frames = [frame.captured for frame in frames]
     picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
     steps = quantise_hairs(renderer, capture, captured_frames)
-    form_json = describe_frames(capture, frames, picture_maps, steps, content.packer)
+    form_json = frames_json(capture, frames, picture_maps, steps, content.packer)
     for frame_json, changes in zip(form_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
     form_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
@@ -178,11 +176,9 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
     return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
 
 
-def _colour_maps(
-    content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps
-) -> Json:
+def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
     """Return the number of the colour map, and its picture entries at nodes of sliders that change it."""
-    number = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
+    number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}
     settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}

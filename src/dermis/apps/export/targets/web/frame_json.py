@@ -45,12 +45,13 @@ class PictureMap(NamedTuple):
     mip_passes: CapturedFrame | None
 
 
+Frames = list[CapturedFrame]
 PictureMaps = dict[int, PictureMap]
 QuantisedBuffers = dict[int, tuple[float, ...]]
 """Steps of the columns of quantised float buffers, by the index of the buffer."""
 
 
-def describe_frames(
+def frames_json(
     capture: FrameCapture,
     frames: list[NamedFrame],
     picture_maps: PictureMaps,
@@ -61,11 +62,10 @@ def describe_frames(
 
     New resources are filled with zeros, so content of zeros is not stored.
     """
-    pictures = [
-        [capture.resource(one.picture.bytes), capture.resource(one.picture.exposed)] for one in frames
-    ]
-    contents, tables = {}, set(resources_bound_as(capture, [one.captured for one in frames], _TABLES))
-    for number in read_before_written(capture, [one.captured for one in frames]):
+    pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
+    captured_frames = [frame.captured for frame in frames]
+    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TABLES))
+    for number in read_before_written(capture, captured_frames):
         if number in steps:
             floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
             contents[number] = [packer.add_floats(floats, steps[number])]
@@ -82,9 +82,7 @@ def describe_frames(
         "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
         "frames": [_frame_json(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
-        "halved": {
-            k: _passes_json(one.mip_passes, packer) for k, one in picture_maps.items() if one.mip_passes
-        },
+        "halved": {k: _passes_json(m.mip_passes, packer) for k, m in picture_maps.items() if m.mip_passes},
     }
 
 
@@ -156,30 +154,26 @@ def _camel_case(name: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def read_before_written(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> list[int]:
-    """Return the sorted indices of resources that some pass reads before any pass writes them."""
+def read_before_written(capture: FrameCapture, frames: Frames) -> list[int]:
+    """Return the sorted indices of resources that some pass reads before any pass writes them.
+
+    Views are replaced by their textures, so that a texture counts as written if any part of it is.
+    """
     found: set[int] = set()
-    for captured in captured_frames:
+    for frame in frames:
         written: set[int] = set()
-        for one in captured.passes:
-            found |= {
-                base_resource(capture, k)
-                for k in read_resources(capture, one)
-                if not _is_written(capture, k, written)
-            }
-            written |= set(written_resources(capture, one))
+        for one in frame.passes:
+            found |= {base_resource(capture, k) for k in read_resources(capture, one)} - written
+            written |= {base_resource(capture, k) for k in written_resources(capture, one)}
     return sorted(found)
 
 
-def resources_bound_as(
-    capture: FrameCapture, captured_frames: list[CapturedFrame], names: tuple[str, ...]
-) -> dict[int, str]:
+def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
     """Return the resources bound under one of the given names, with that name."""
     found: dict[int, str] = {}
-    for captured in captured_frames:
-        for one in (each for each in captured.passes if each.program is not None):
-            known = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
-            found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
+    for one in (one for frame in frames for one in frame.passes if one.program is not None):
+        bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
+        found |= {k: name for k, name in zip(one.bound, bound_names, strict=True) if name in names and k >= 0}
     return found
 
 
@@ -216,8 +210,3 @@ def _reads(entry: Json) -> bool:
 
 def _writes(entry: Json) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
-
-
-def _is_written(capture: FrameCapture, number: int, written: set[int]) -> bool:
-    """Return whether any part of a resource has been written."""
-    return any(base_resource(capture, k) == base_resource(capture, number) for k in written)

@@ -2,7 +2,7 @@
 
 /**
  * Page that input controls.
- * @typedef {{state: import("./view_state.js").ViewState, touch: () => void, choose: () => void,
+ * @typedef {{state: import("./state.js").ViewState, touch: () => void, choose: () => void,
  *     draw: () => Promise<void>}} Page
  */
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.targets.web.frame_json import (
+    Frames,
     PictureMap,
     PictureMaps,
     QuantisedBuffers,
@@ -18,7 +19,7 @@ from dermis.apps.export.targets.web.frame_json import (
 from dermis.apps.export.targets.web.packing import quantise
 from dermis.frame.capture import capture_mips, update_map
 from dermis.frame.renderer import Renderer
-from dermis.gpu.capture import CapturedFrame, FrameCapture
+from dermis.gpu.capture import FrameCapture
 from dermis.images.filters import mip_chain
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -115,12 +116,10 @@ class MapPictures:
         """Return whether texels equal those from which the picture of a role was encoded."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
-    def replace_textures(
-        self, renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
-    ) -> PictureMaps:
+    def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
         """Replace the textures of maps by their decoded pictures, and return these by index."""
         maps = {}
-        for number, role in _picture_textures(capture, captured_frames).items():
+        for number, role in _picture_textures(capture, frames).items():
             texture, description = capture.resource_at(number), capture.resources[number]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
             mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(description["mips"]))
@@ -157,11 +156,9 @@ def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float3
     return np.asarray(mip_chain(values)[mip], np.float32)
 
 
-def quantise_hairs(
-    renderer: Renderer, capture: FrameCapture, captured_frames: list[CapturedFrame]
-) -> QuantisedBuffers:
+def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> QuantisedBuffers:
     """Quantise the hair knots in the device's buffers; return the step of each column by buffer."""
-    buffers = resources_bound_as(capture, captured_frames, ("knots",))
+    buffers = resources_bound_as(capture, frames, ("knots",))
     for number in buffers:
         knots = capture.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
         data = quantise(knots, _KNOT_STEPS_MM)
@@ -177,11 +174,11 @@ def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.floa
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _picture_textures(capture: FrameCapture, captured_frames: list[CapturedFrame]) -> dict[int, str]:
+def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
     """Return half-float textures that are bound as maps and large enough for pictures, with their roles."""
     return {
         number: role
-        for number, role in resources_bound_as(capture, captured_frames, _MAP_ROLES).items()
+        for number, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
         if capture.resources[number].get("format", "").endswith("16float")
         and min(capture.resources[number]["size"][:2]) >= MIN_SIDE
     }

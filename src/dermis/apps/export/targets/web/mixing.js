@@ -1,10 +1,10 @@
 // Interpolation of the colour map between nodes of sliders that change it.
 
 import { decodeLayer, toTexels } from "./maps.js";
-import { nodeWeights } from "./view_state.js";
+import { nodeWeights } from "./state.js";
 
 /** @typedef {import("./device.js").GpuScene} GpuScene */
-/** @typedef {import("./view_state.js").Slider} Slider */
+/** @typedef {import("./state.js").Slider} Slider */
 
 /** Return the texels of the colour map at values of sliders. @param {GpuScene} gpuScene @param {Slider[]} changed @param {Record<string, number>} values */
 export async function mixColourMap(gpuScene, changed, values) {

@@ -7,9 +7,9 @@ import { mixColourMap } from "./mixing.js";
 import { decodeSevenBits, gunzip } from "./packed.js";
 import { Player } from "./player.js";
 import { Screen } from "./screen.js";
-import { applyState, defaultState } from "./view_state.js";
+import { applyState, defaultState } from "./state.js";
 
-/** @typedef {import("./view_state.js").Slider} Slider */
+/** @typedef {import("./state.js").Slider} Slider */
 /** @typedef {import("./device.js").Scene} Scene */
 /** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Slider[]}} File */
 

@@ -17,12 +17,16 @@ from dermis.apps.export.fitting import gaussian_curve
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
 from dermis.apps.export.targets.pages.html import escape_script, render_page
-from dermis.apps.export.targets.web.build import PageContent
+from dermis.apps.export.targets.web import build
+from dermis.apps.export.targets.web.maps import with_reduced_maps
 from dermis.apps.export.targets.web.packing import encode_seven_bits
-from dermis.apps.export.targets.web.sliders import Slider
+from dermis.apps.export.targets.web.sliders import Slider, scene_sliders
 from dermis.base.errors import refuse
+from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
+from dermis.scene.settings import Settings
 
 MODULES = (
     "graph",
@@ -31,7 +35,7 @@ MODULES = (
     "player",
     "maps",
     "camera",
-    "view_state",
+    "state",
     "screen",
     "mixing",
     "input",
@@ -45,7 +49,7 @@ _ATLAS_SIDE = 512
 _MAX_MAP_SIDE = 1024
 
 
-def page_html(content: PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
+def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
     """Return the HTML of the page.
 
     title, note : plain text, which is escaped
@@ -72,9 +76,8 @@ def page_html(content: PageContent, sliders: tuple[Slider, ...], title: str, not
 
 def player_script() -> str:
     """Return the modules of the player joined into one script."""
-    return "".join(
-        _EXPORT.sub("", _IMPORT.sub("", (_HERE / f"{name}.js").read_text("utf-8"))) for name in MODULES
-    )
+    texts = ((_HERE / f"{name}.js").read_text("utf-8") for name in MODULES)
+    return "".join(_EXPORT.sub("", _IMPORT.sub("", text)) for text in texts)
 
 
 def _webp(picture: NDArray[np.uint8]) -> bytes:
@@ -121,35 +124,21 @@ class Web(Target):
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page."""
-        from dermis.apps.export.targets.web.build import (
-            INTERACTIVE_QUALITY,
-            PICTURE_SIDES,
-            PageRequest,
-            build_content,
-        )
-        from dermis.apps.export.targets.web.maps import with_reduced_maps
-        from dermis.apps.export.targets.web.sliders import scene_sliders
-        from dermis.apps.export.targets.web.target import page_html
-        from dermis.scene.settings import Settings
-
         scene = subject.scene
         if scene is None:
             actual = f"got the skin {subject.name}"
             refuse("subject", "a head, which the page renders", actual, "Name a head")
         scene = replace(scene, head=with_reduced_maps(scene.head, min(self.side, _MAX_MAP_SIDE)))
         sliders, settings = scene_sliders(scene), Settings(atlas=_ATLAS_SIDE)
-        request = PageRequest(scene, sliders, settings, PICTURE_SIDES, self.adapter, INTERACTIVE_QUALITY)
-        text = page_html(build_content(request), sliders, subject.name, self.limitations)
+        sides, quality = build.PICTURE_SIDES, build.INTERACTIVE_QUALITY
+        request = build.PageRequest(scene, sliders, settings, sides, self.adapter, quality)
+        text = page_html(build.build_content(request), sliders, subject.name, self.limitations)
         output.write_text(text, encoding="utf-8")
         return [output]
 
     @staticmethod
     def _profile(subject: Subject) -> GaussianSum:
-        from dermis.frame.features.diffusion.profiles import SkinProfiles
-        from dermis.optics.profiles import load_profile
-
-        scene = subject.scene
-        return SkinProfiles().profile(scene.skin) if scene else load_profile(subject.name)
+        return SkinProfiles().profile(subject.scene.skin) if subject.scene else load_profile(subject.name)
 
 
 TARGET = Web()
