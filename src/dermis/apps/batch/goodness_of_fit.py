@@ -152,9 +152,9 @@ def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) 
     distance = max(abs(counts[text] / count - expected.get(text, 0.0)) for text in {*expected, *counts})
     expected_distance = max(sqrt(2 / np.pi * p * (1 - p) / count) for p in expected.values())
     p_value = 0.0 if counts.keys() - expected.keys() else _chi_square(expected, counts, count)
-    stated = _format_probabilities(expected)
+    probabilities = _format_probabilities(expected)
     found = _format_probabilities({text: counts[text] / count for text in expected})
-    return FitTest(name, count, stated, found, distance, expected_distance, p_value)
+    return FitTest(name, count, probabilities, found, distance, expected_distance, p_value)
 
 
 def _format_probabilities(probabilities: Mapping[str, float]) -> str:

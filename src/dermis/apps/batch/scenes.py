@@ -75,14 +75,14 @@ class SceneBuilder:
         pose = Pose(self._weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones))
         motion = pose.motion(head.control)
         camera = sampled_camera(parameters, head, person.points, motion, width / height)
-        dials = table_values(parameters, "skin")
-        if "profile" in dials:
-            dials["profile"] = self._path(dials["profile"])
+        skin_values = table_values(parameters, "skin")
+        if "profile" in skin_values:
+            skin_values["profile"] = self._path(skin_values["profile"])
         scene = Scene(
             head,
             lights=sampled_lights(parameters),
             camera=camera,
-            skin=person.skin.replace(**dials) if dials else person.skin,
+            skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._environment(parameters),
             pose=_with_gaze(parameters, head, pose, camera.position),
         )
@@ -136,14 +136,14 @@ class SceneBuilder:
 def sampled_person(parameters: Parameters) -> Human:
     """Return the person of a seed, with sampled fields replaced by those of the parameters."""
     fields: dict[str, object] = {}
-    looks: dict[str, dict[str, object]] = {}
+    appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():
         part, _, field = name.partition(".")
         if field:
-            looks.setdefault(part, {})[field] = value
+            appearance.setdefault(part, {})[field] = value
         elif name not in _NOT_FIELDS:
             fields[name] = value
-    return Human.drawn(int(parameters[_SEED]), **fields, **looks)
+    return Human.drawn(int(parameters[_SEED]), **fields, **appearance)
 
 
 @cache

@@ -146,7 +146,7 @@ _SIGNED = NumberField(-1, 1, "0 is the average")
 _MELANIN = NumberField(0, 10, "0.3 is blond, 8 black")
 _DISTANCE = NumberField(150, 20_000, "mm: from close-up to telephoto")
 _STRENGTH = NumberField(0, 100, "light cannot be negative")
-_Dials = dict[str, Annotated[Distribution, DistributionField()]]
+_Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(FrozenModel):
@@ -173,13 +173,13 @@ class PersonTable(FrozenModel):
     """Eumelanin of the hair before greying: 0.3 is blond, 1.3 brown, 8 black."""
     hair_pheomelanin: Annotated[Distribution | None, _MELANIN] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
-    skin: _Dials = Field(default_factory=dict)
+    skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
-    eyes: _Dials = Field(default_factory=dict)
+    eyes: _Distributions = Field(default_factory=dict)
     """Fields of `EyeLook`: eumelanin, pupil_mm, redness."""
-    hair: _Dials = Field(default_factory=dict)
+    hair: _Distributions = Field(default_factory=dict)
     """Fields of `HairLook`: style, length_mm, density, curl, grey, beard_mm ..."""
-    targets: _Dials = Field(default_factory=dict)
+    targets: _Distributions = Field(default_factory=dict)
     """Weights of MakeHuman's targets by name, see `dermis head --list-targets`."""
 
 

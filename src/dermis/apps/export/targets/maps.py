@@ -37,7 +37,7 @@ SIDES = tuple(1 << k for k in range(8, 14))
 """Supported sides of the maps [texel]."""
 _MAX_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
 _LOGGER = logging.getLogger("dermis")
-PngEncoding = Literal["colour", "light", "normal", "share", "range", "root", "none"]
+PngEncoding = Literal["colour", "light", "normal", "fraction", "range", "root", "none"]
 """Encoding of a map as PNG: 8-bit sRGB; 8-bit sRGB of light divided by its 99.9th percentile; a normal n as
 (n + 1) / 2 in 16 bits; a fraction in 16 bits; the range from minimum to maximum in 16 bits; the square root
 in 16 bits; no PNG."""
@@ -65,10 +65,10 @@ MAP_INFOS: Mapping[str, MapInfo] = MappingProxyType(
         "normal": MapInfo("", "normal", "normal with relief in tangent space: x along +u, z outwards"),
         "height": MapInfo("mm", "range", "height of the same relief, with an arbitrary origin"),
         "roughness": MapInfo("", "root", "Beckmann m, including the relief finer than a texel"),
-        "rho_s": MapInfo("", "share", "factor of the specular reflection"),
-        "reflected": MapInfo("", "share", "mean albedo of the specular reflection over all directions"),
-        "melanin": MapInfo("", "share", "volume fraction of melanosomes in the epidermis"),
-        "blood": MapInfo("", "share", "volume fraction of blood in the dermis"),
+        "rho_s": MapInfo("", "fraction", "factor of the specular reflection"),
+        "reflected": MapInfo("", "fraction", "mean albedo of the specular reflection over all directions"),
+        "melanin": MapInfo("", "fraction", "volume fraction of melanosomes in the epidermis"),
+        "blood": MapInfo("", "fraction", "volume fraction of blood in the dermis"),
         "thickness": MapInfo("mm", "range", "thickness of the tissue, up to the depth that light reaches"),
         "curvature": MapInfo("1/mm", "range", "root mean square of the principal curvatures, smoothed"),
         "stretch": MapInfo("mm", "none", "length on the skin of the maps' width (R) and height (G)"),
@@ -129,9 +129,9 @@ class MapFolder(Target):
 
 def encode_map_exr(name: str, values: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
-    letters = "Y" if values.ndim == 2 else "RGB"
+    names = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
-    return encode_exr_parts({name: dict(zip(letters, channels, strict=True))}, fast=True)
+    return encode_exr_parts({name: dict(zip(names, channels, strict=True))}, fast=True)
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
@@ -145,7 +145,7 @@ def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
         return _to_uint16(0.5 * values + 0.5), {"png": "value = 2 level / 65535 - 1"}
     if encoding == "root":
         return _to_uint16(np.sqrt(values)), {"png": "value = (level / 65535)^2"}
-    if encoding == "share":
+    if encoding == "fraction":
         return _to_uint16(values), {"png": "value = level / 65535"}
     low, high = float(values.min()), float(values.max())
     span = high - low or 1.0

@@ -98,16 +98,16 @@ def _write(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[P
     """Write the script and the files that it reads beside it."""
     files, scene = [script], subject.scene
     if scene is None:
-        surroundings, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
+        scene_dict, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
     else:
-        surroundings, panorama = describe_scene(scene, scene.head.centre_mm)
-        surroundings["head"] = head
+        scene_dict, panorama = describe_scene(scene, scene.head.centre_mm)
+        scene_dict["head"] = head
         files.append(script.with_name(head))
         files[-1].write_bytes(_encode_head(subject, scene))
     if panorama is not None:
         files.append(script.with_name(PANORAMA))
         np.save(files[-1], panorama)
-    script.write_text(script_text(skin | surroundings), encoding="utf-8")
+    script.write_text(script_text(skin | scene_dict), encoding="utf-8")
     return files
 
 

@@ -29,16 +29,16 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
     Raises DermisError if the skin does not enclose a volume.
     """
     mesh, centre = head.mesh, np.array(head.centre_mm, np.float32)
-    solid = closed_skin(mesh, head.name)
-    solid = replace(solid, positions=(solid.positions - centre).astype(np.float32))
+    closed = closed_skin(mesh, head.name)
+    closed = replace(closed, positions=(closed.positions - centre).astype(np.float32))
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    outer, _ = offset_inwards(solid, -interface_gap_mm(backend, solid), head.name)
+    outer, _ = offset_inwards(closed, -interface_gap_mm(backend, closed), head.name)
     used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
     solid_vertex = np.unique(mesh.point[used], return_inverse=True)[1]
     attributes = mesh.normals[used], mesh.uv[used]
     count = int(skin.sum())
     files = {}
-    for name, surface, caps in (("skin", solid, "caps"), ("upper", outer, "upper_caps")):
+    for name, surface, caps in (("skin", closed, "caps"), ("upper", outer, "upper_caps")):
         files[name] = encode_ply(corners.reshape(-1, 3), surface.positions[solid_vertex], *attributes)
         if len(surface.triangles) > count:
             cap_vertices, cap_corners = np.unique(surface.triangles[count:], return_inverse=True)

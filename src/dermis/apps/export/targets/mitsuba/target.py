@@ -42,7 +42,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _BRIGHT_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
 _MAX_SAMPLED_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
-_SIGMA, _ALBEDO, _PASSING, _INDEX, _ALPHA = "sigma_t", "albedo", "passing", "int_ior", "alpha"
+_SIGMA, _ALBEDO, _TRANSMITTANCE, _INDEX, _ALPHA = "sigma_t", "albedo", "passing", "int_ior", "alpha"
 _SIZE, _SAMPLES = (512, 512), 256
 
 
@@ -69,7 +69,7 @@ class Mitsuba(Target):
         return (
             Parameter(_SIGMA, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"),
             Parameter(_ALBEDO, medium.albedo, "-", "of single scattering: not the skin's colour"),
-            Parameter(_PASSING, transmittance, "-", "mean transmittance of the textures, both ways"),
+            Parameter(_TRANSMITTANCE, transmittance, "-", "mean transmittance of the textures, both ways"),
             Parameter(_INDEX, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
             Parameter(_ALPHA, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"),
         )
@@ -77,13 +77,13 @@ class Mitsuba(Target):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as albedo, and 1/d as extinction."""
         extinction, albedo = floats(1.0 / fit_burley_width(subject.curve)), floats(subject.clipped_albedo())
-        values = {_SIGMA: extinction, _ALBEDO: albedo, _PASSING: (1.0,) * 3}
+        values = {_SIGMA: extinction, _ALBEDO: albedo, _TRANSMITTANCE: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light along the normal."""
         boundary = self._boundary
-        names = _SIGMA, _ALBEDO, _PASSING
+        names = _SIGMA, _ALBEDO, _TRANSMITTANCE
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
         curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
         matched = boundary == "matched"

@@ -70,11 +70,11 @@ def frames_json(
             floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
             contents[number] = [packer.add_floats(floats, steps[number])]
             continue
-        _, pictured, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mip_bytes(capture, number)[pictured:]
+        _, picture_count, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
+        mips = [] if mip_passes else _mip_bytes(capture, number)[picture_count:]
         if any(one.any() for one in mips):
             add = packer.add if number not in tables else _column_packer(packer)
-            contents[number] = [-1] * pictured + [add(one) for one in mips]
+            contents[number] = [-1] * picture_count + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
         "programs": [_program_json(one) for one in capture.programs],
@@ -121,8 +121,8 @@ def _view_record(captured: CapturedFrame, stage: str) -> int:
 
 def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
     """Return the passes of a frame; data that the host writes is replaced by its buffer and byte run."""
-    hosts = ((one, one.written) for one in captured.passes)
-    return [{**vars(one), "written": host and (host[0], packer.add(host[1]))} for one, host in hosts]
+    writes = ((one, one.written) for one in captured.passes)
+    return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
 
 
 def _program_json(one: Json) -> Json:
