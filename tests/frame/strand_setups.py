@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.strands import Roots, Strands, frames, seen_from
+from dermis.mesh.strands import Roots, Strands, root_frames, to_root_frames
 
 SIDE_MM = 100.0
 _CELLS = 4
 
 
 def sheet() -> Mesh:
-    """A square of quads in the XY plane about the origin that faces +Z."""
+    """Return a square of quads in the XY plane about the origin that faces +Z."""
     along = np.linspace(0, 1, _CELLS + 1)
     v, u = (axis.ravel() for axis in np.meshgrid(along, along, indexing="ij"))
     number = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
@@ -25,13 +25,13 @@ def sheet() -> Mesh:
     places = SIDE_MM * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
     pairs = np.arange(2 * len(quads)).reshape(-1, 2)
     flat, skin = np.zeros(2 * len(quads), np.int32), (Material("skin"),)
-    return build_mesh(places, np.column_stack((u, v)), halves(quads), flat, skin, quads=pairs)
+    return build_mesh(places, np.column_stack((u, v)), split_quads(quads), flat, skin, quads=pairs)
 
 
 def hairy(
     begins: ArrayLike, ends: ArrayLike, radius_mm: ArrayLike, absorption: ArrayLike = 0.0, knots: int = 5
 ) -> Head:
-    """A white sheet with hairs from places to others (n, 3) [mm].
+    """Return a white sheet with straight strands between (n, 3) points [mm].
 
     absorption : [1/mm]
     """
@@ -39,11 +39,11 @@ def hairy(
     roots = Roots(np.zeros(count, np.int32), np.full((count, 2), 0.5, np.float32))
     t = np.linspace(0, 1, knots)[None, :, None]
     places = (1 - t) * np.asarray(begins, float)[:, None] + t * np.asarray(ends, float)[:, None]
-    root, _ = frames(mesh, roots, mesh.points_mm)
+    root, _ = root_frames(mesh, roots, mesh.points_mm)
     radius = np.broadcast_to(np.asarray(radius_mm, np.float32), (count,))
     strands = Strands(
         roots,
-        seen_from(mesh, roots, places - root[:, None]),
+        to_root_frames(mesh, roots, places - root[:, None]),
         np.repeat(radius[:, None], knots, axis=1),
         np.broadcast_to(np.asarray(absorption, np.float32), (count, 3)).copy(),
     )
@@ -51,7 +51,7 @@ def hairy(
 
 
 def shuffled(head: Head, seed: int) -> Head:
-    """The same hairs in another order."""
+    """Return a head with its strands in another order."""
     from dataclasses import replace
 
     strands = head.strands

@@ -1,4 +1,4 @@
-"""What is behind the head, and the head's own coverage as alpha."""
+"""The background behind the head, and the coverage of the head as alpha."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_the_gradient_is_grey_and_falls_off_to_the_corners(renderer: Renderer) -
 
 @pytest.mark.parametrize("blur", [0.0, 0.3])
 def test_the_environment_is_sharp_or_blurred(renderer: Renderer, tmp_path: Any, blur: float) -> None:
-    """A world that is bright on its right half only: the edge is a step, or soft."""
+    """An environment that is bright on its right half shows a step, or a soft edge."""
     world = np.where(directions(256, 512)[..., :1] > 0, 1.0, 0.25) * np.ones(3)
     write_exr(tmp_path / "half.exr", world.astype(np.float32))
     around = Environment(name=str(tmp_path / "half.exr"), exposure=2.0)
@@ -78,7 +78,7 @@ def over(colours: NDArray[Any], alpha: NDArray[Any], behind: float) -> NDArray[A
 
 @pytest.mark.parametrize("tone", ["none", "filmic"])
 def test_alpha_lays_the_head_over_anything(renderer: Renderer, tone: str) -> None:
-    """Premultiplied floats over a colour are the picture with that colour; bytes are not multiplied."""
+    """Premultiplied floats over a colour equal the picture with that colour; bytes have straight alpha."""
     made = drawn(renderer, tone=tone)
     floats, levels = made.linear_rgba(), made.rgba8()
     grey = drawn(renderer, background=(0.3, 0.3, 0.3)).linear()

@@ -1,4 +1,4 @@
-"""Scattered light: numpy's pyramid, no light lost, and none taken when there is no bloom."""
+"""Bloom compared with a pyramid in NumPy; no light is lost, and no pass runs without bloom."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Few and wide Gaussians in steps of falling resolution: as right as at once, for less."""
+"""Chains of blurs with intermediate levels: as accurate as a single blur, at a lower cost."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas.textures import AtlasMip, _coarser
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.kernels import chain_cost, add_intermediate_levels
+from dermis.frame.features.diffusion.kernels import add_intermediate_levels, chain_cost
 from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
 from dermis.frame.programs import FLOATS
 from dermis.gpu import CommandList, Device, download, make_texture, upload
@@ -25,7 +25,7 @@ SIX = load_profile("gpu-gems-3").variance_mm2[1:]
 
 @pytest.mark.parametrize("texels_per_mm", [1.5, 3.0, 6.0])
 def test_one_gaussian_costs_less_than_six(texels_per_mm: float) -> None:
-    """By the texels read; at once it costs two to five times as much."""
+    """Compare the number of texel reads; a single blur costs two to five times as much."""
     six, at_once = (chain_cost(list(v), texels_per_mm, MOST) for v in (SIX, SIX[-1:]))
     led, steps = add_intermediate_levels(SIX[-1:], texels_per_mm, MOST)
     assert chain_cost(list(led), texels_per_mm, MOST) < min(six, 0.5 * at_once)
@@ -45,9 +45,11 @@ def test_steps_are_told_from_the_profiles_levels() -> None:
 
 @pytest.mark.parametrize("texels_per_mm", [1.5, 3.0, 6.0])
 def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm: float) -> None:
-    """A point of light, against the analytic peak; the sum is read between coarse texels, as a frame's."""
+    """Compare a blurred point of light with the analytic peak."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
-    coarser = _coarser(device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
+    coarser = _coarser(
+        device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+    )
     textures, wanted = resting(device, atlas, coarser=coarser, median_texels_per_mm=texels_per_mm), SIX[-1:]
     source, _, r2, area = point_of_light(atlas)
     led, steps = add_intermediate_levels(wanted, textures.median_texels_per_mm, len(textures.coarser))

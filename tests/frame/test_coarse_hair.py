@@ -1,4 +1,4 @@
-"""Hair of the head in the frame: few wide hairs for many, deep opacity, and light that hairs pass on."""
+"""Hair of the head in the frame: few wide strands for many, deep opacity, and dual scattering."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BLACK = 1e5  # absorption [1/mm]
 
 
 def picture(renderer: Renderer, scene: Scene, **settings: Any) -> NDArray[np.float64]:
-    """(h, w, 4) picture and coverage."""
+    """Return the (h, w, 4) picture with its coverage."""
     given = {"size": (SIZE, SIZE), "technique": "none"} | settings
     made = run_frame(renderer, scene, **given).resources.post.picture
     return download(renderer.device, made.exposed).astype(float)
@@ -37,7 +37,7 @@ def lit(head: Head, **more: Any) -> Scene:
 
 
 def wool(count: int, absorption: float, cover: float = 0.0) -> Head:
-    """Coarse hairs that stand on the sheet, and stand for each other."""
+    """Return a sheet with upright coarse strands."""
     rng = np.random.default_rng(5)
     begins = np.column_stack([rng.uniform(-9, 9, (count, 2)), np.full(count, 0.05)])
     ends = begins + np.column_stack([rng.normal(0, 0.8, (count, 2)), rng.uniform(1.5, 3.0, count)])
@@ -51,11 +51,13 @@ def wool(count: int, absorption: float, cover: float = 0.0) -> Head:
 def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
     renderer: Renderer, absorption: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A quarter of them, four times as wide."""
+    """A quarter of the strands is drawn four times as wide."""
     scene = replace(lit(wool(6000, absorption)), lights=(frontal(shadows=True),))
     shown = []
     for share in (1, 4):
-        monkeypatch.setattr(drawing, "drawn_hair_count", lambda made, _, share=share: made.coarse.hairs // share)
+        monkeypatch.setattr(
+            drawing, "drawn_hair_count", lambda made, _, share=share: made.coarse.hairs // share
+        )
         renderer.clear_cache()
         shown.append(picture(renderer, scene, size=(48, 48))[..., :3])
     renderer.clear_cache()
@@ -87,7 +89,7 @@ def test_a_white_head_of_hair_gains_no_light(renderer: Renderer, absorption: flo
 
 @pytest.mark.parametrize(("absorption", "low", "high"), [(0.0, 0.3, 0.95), (BLACK, 0.0, 0.3)])
 def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, high: float) -> None:
-    """A hair below a roof of others: white ones pass on what black ones keep."""
+    """A strand below a roof of strands gets light through white ones and none through black ones."""
     y = np.linspace(-4, 4, 80)
     roof = np.column_stack([np.full(80, -14.0), y, np.full(80, 9.0)])
     seen = []

@@ -1,4 +1,4 @@
-"""Spreading below the surface: twin, analytic answers, and constants that stay constant."""
+"""Diffusion over the atlas: NumPy twin, analytic solutions, and constants that stay constant."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BLURRED = PROFILE.variance_mm2[1:]
 def blur(
     device: Device, source: Floats, atlas: AtlasTextures, variances: Floats = BLURRED, **edge: Any
 ) -> list[Floats]:
-    """Levels of 32-bit floats over an (n, n, 3) source, or (n, n, 4) with its coverage."""
+    """Return the blurred levels of (n, n, 3) light, or of (n, n, 4) light with its coverage."""
     size = len(source)
     most = len(atlas.mips_for(edge.get("edge", "repeated"))) - 1
     halvings = choose_halvings(variances, atlas.median_texels_per_mm, most)
@@ -46,7 +46,7 @@ def blur(
 
 
 def random_atlas(size: int, shear: float) -> Atlas:
-    """Stretch from coarse to fine, with some texels empty, and charts that end anywhere in the map."""
+    """Return an atlas of varying stretch with empty texels, whose charts end at random."""
     rng = np.random.default_rng(11)
     stretch = np.exp(rng.uniform(np.log(0.2), np.log(12.0), (size, size, 2))).astype(np.float16)
     triangle = np.where(rng.random((size, size)) < 0.05, -1, 0).astype(np.int32)
@@ -58,7 +58,7 @@ def random_atlas(size: int, shear: float) -> Atlas:
         triangle=triangle,
         stretch=stretch,
         shear=rng.uniform(-shear, shear, (size, size)).astype(np.float16),
-        reach=np.minimum(room, rng.integers(0, 40, room.shape)).astype(np.uint16),
+        edge_distance=np.minimum(room, rng.integers(0, 40, room.shape)).astype(np.uint16),
     )
 
 
@@ -78,7 +78,7 @@ def test_twin(device: Device, shear: float, edge: str) -> None:
 
 
 def test_empty_texels_show_the_clear_colour(device: Device) -> None:
-    """Black bleeds in where they are black; constant light stays constant where they have its colour."""
+    """Black empty texels darken their surroundings; with the colour of constant light they do not."""
     atlas = build_atlas(plane(60.0, 2, uv_scale=0.7), 64)
     source, resources = atlas.coverage[..., None] * np.ones(4), resting(device, atlas)
     black, white = (
@@ -112,7 +112,7 @@ def patch(size_mm: float, v_scale: float) -> Atlas:
 
 
 def point_of_light(atlas: Atlas) -> tuple[Floats, tuple[int, int], Floats, float]:
-    """Unit power in a texel in the patch's middle; its place; squared distances and texel area in mm."""
+    """Return a lit texel of power 1 in the middle, its index, squared distances and its area [mm2]."""
     y, x = int(np.argwhere(atlas.coverage[:, 128])[:, 0].max()) // 2, 128
     source = np.zeros((256, 256, 3))
     source[y, x] = 1.0
@@ -124,7 +124,7 @@ def point_of_light(atlas: Atlas) -> tuple[Floats, tuple[int, int], Floats, float
 
 @pytest.mark.parametrize("name", [*UNIFORM, "2 : 1"])
 def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> None:
-    """A lit texel of power 1 receives R(r) times a texel's area from itself; the unblurred level aside."""
+    """A lit texel of power 1 receives R(r) times its area; the unblurred level is left out."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), r2, area = point_of_light(atlas)
     parts = blur(device, source, resting(device, atlas))
@@ -139,7 +139,7 @@ def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> No
 
 @pytest.mark.parametrize("name", UNIFORM | UNEVEN)
 def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) -> None:
-    """Second moments in mm2, along x and along y, at every level."""
+    """Compare the second moments along x and y [mm2] at every level."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), _, _ = point_of_light(atlas)
     per_mm = atlas.stretch[y, x].astype(float)
@@ -156,7 +156,7 @@ def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) 
 @pytest.mark.parametrize("size", [64, 200])
 @pytest.mark.parametrize("mesh", [uv_sphere(40.0, 24, 12), plane(60.0, 2, uv_scale=0.7)])
 def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> None:
-    """Up to the edges of charts and beyond, in the gutter."""
+    """Constant light stays constant up to the edges of charts and in the gutter."""
     atlas = build_atlas(mesh, size)
     colour = np.array([1.0, 0.3, 2.7])
     source = atlas.coverage[..., None] * colour
@@ -166,12 +166,12 @@ def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> 
 
 
 def test_the_order_of_the_axes_does_not_matter(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
+    """With uniform stretch, blurring along v first gives the same result."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
     resources, along = resting(device, atlas), diffuse._axis_program
     first = blur(device, source, resources)
-    monkeypatch.setattr(diffuse, "_along", lambda *given: along(*given[:2], 1 - given[2], *given[3:]))
+    monkeypatch.setattr(diffuse, "_axis_program", lambda *given: along(*given[:2], 1 - given[2], *given[3:]))
     swapped = blur(device, source, resources)
     assert max(np.abs(a - b).max() for a, b in zip(first, swapped, strict=True)) < TWIN
 
@@ -186,7 +186,7 @@ def test_a_symmetric_patch_stays_symmetric(device: Device) -> None:
 
 @pytest.mark.parametrize("texels_per_mm", [1.0, 3.0, 6.0])
 def test_one_wide_gaussian_alone_is_smooth(device: Device, texels_per_mm: float) -> None:
-    """No narrower level prepares the source: it must not be read sparsely."""
+    """Without a narrower level before it, the source must not be sampled sparsely."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     source, _, r2, area = point_of_light(atlas)
     (image,) = blur(device, source, resting(device, atlas), np.array([7.41]))
@@ -206,7 +206,7 @@ SHEARED = {
 
 @pytest.mark.parametrize("name", SHEARED)
 def test_sheared_maps_spread_light_in_circles(device: Device, name: str) -> None:
-    """Against the sum of Gaussians by distance on the surface, and in all directions alike."""
+    """Compare with the sum of Gaussians by distance on the surface, in all directions."""
     mesh = bent_plane(60.0, SHEARED[name])
     atlas = build_atlas(mesh, 256)
     position = atlas.interpolate(mesh, mesh.positions)

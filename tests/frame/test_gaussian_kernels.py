@@ -1,4 +1,4 @@
-"""Sampled Gaussians: exact in sum and variance, and no wider than their taps."""
+"""Sampled Gaussian kernels: exact in sum and variance, and no wider than their taps."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_wide_kernel_is_the_gaussian(variance: float) -> None:
 
 
 def test_table_covers_the_widest_kernel() -> None:
-    """Row `MAX_TABLE_VARIANCE * ROWS_PER_UNIT` and the next are read; each column used there holds a ratio in 0..1."""
+    """The last two rows of the table are read too, and each column used there holds a ratio in 0..1."""
     table = kernel_table()
     assert table.shape == (MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2, tap_count(MAX_TABLE_VARIANCE) + 1)
     assert ((table >= 0) & (table <= 1)).all()

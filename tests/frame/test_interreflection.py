@@ -1,4 +1,4 @@
-"""Light from skin to skin: an integrating sphere, a white corner in a furnace, and what makes it run."""
+"""Interreflection: an integrating sphere, a white corner in a furnace, and the passes that run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SIDE = 64
 
 @pytest.mark.parametrize("albedo", [0.3, 0.6])
 def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
-    """By bounces comes albedo / (1 - albedo) times the light that came straight."""
+    """Bounces add albedo / (1 - albedo) times the direct light."""
     ball = uv_sphere(40.0, 48, 24)
     within = replace(ball, normals=-ball.normals, triangles=np.ascontiguousarray(ball.triangles[:, ::-1]))
     head = head_of(within, colour=np.full((4, 4, 3), albedo))
@@ -39,7 +39,7 @@ def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
 
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
 def test_a_white_corner_in_a_furnace(renderer: Renderer, direction: str) -> None:
-    """What the wall hides of even light from everywhere, its own light gives back."""
+    """The light of the wall replaces the uniform light that it hides."""
     head = corner(colour=np.ones((4, 4, 3)))
     scene = replace(scene_of(head, rho_s=0.0, direction=direction), environment=Environment(name="uniform"))
     points, normals = surface(cached_atlas(head.mesh, SIDE), head)

@@ -1,4 +1,4 @@
-"""Labels show what the picture shows, and landmarks lie on their edges."""
+"""Labels agree with the picture, and landmarks are on their edges."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_hair_is_labelled_where_it_covers_most(renderer: Renderer) -> None:
 
 
 def test_tiles_of_a_workgroup_label_the_same(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As GPUs do it: many chains for each tile, followed side by side."""
+    """Many linked lists per tile, as on GPUs, give the same labels."""
     head, shown = Human.drawn(1).head(subdivide=0), []
     small = Settings(size=(75, 93), atlas=128, shadow_size=64, samples=4)  # no whole tiles
     names = "label", "label_face_synthetics"

@@ -1,4 +1,4 @@
-"""Landmarks, head pose and gaze are those of the picture, on people who move and turn."""
+"""Landmarks, head pose and gaze agree with the picture for people who move and turn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame knows of its light and of the skin: parts of the picture, shadows, pigments, thickness."""
+"""Outputs of light and skin: parts of the picture, shadows, pigments, thickness."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PARTS = ("albedo", "irradiance", "diffuse", "specular")
 
 
 def found(renderer: Renderer, scene: Scene, *names: str, **given: Any) -> Arrays:
-    """Outputs by name, and the picture as "linear"."""
+    """Return the outputs by name, and the picture as "linear"."""
     rendered = renderer.draw(scene, settings_of(**given), outputs=names)
     return {name: rendered.output(name).astype(float) for name in names} | {"linear": rendered.linear()}
 
@@ -119,7 +119,7 @@ def test_visibility_is_none_of_a_lamp_behind_and_all_of_one_in_front(renderer: R
 
 
 def test_a_light_gives_irradiance_where_it_is_visible(renderer: Renderer) -> None:
-    """On a wall behind a small ball: hard and soft shadows, and a lamp so wide that it is shaded in parts."""
+    """A wall behind a small ball has hard and soft shadows, also of a lamp that is shaded in parts."""
     ball = uv_sphere(8.0, 24, 12), (0, 0, 30), (0.5, 0, 0.5)
     head = head_of(joined((plane(120.0, 8), (0, 0, 0), (0, 0, 0.5)), ball))
     camera, where = front_camera(head, (-20, 0, 0), 60.0), place(head, (40, 0, 160))
@@ -150,7 +150,7 @@ def test_thickness_of_a_slab_and_of_a_ball(renderer: Renderer) -> None:
 
 
 def test_thickness_ends_where_no_light_passes(renderer: Renderer) -> None:
-    """A wedge: as thick as it is, up to the reach of the light; nothing beside it."""
+    """The thickness of a wedge is exact up to the reach of the light."""
     head = head_of(wedge(60.0, 1.0, 16.0, cells=8))
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=80.0))
     got = found(renderer, scene, "thickness", seams="stitch", atlas=256, size=(80, 80))["thickness"]
@@ -184,7 +184,7 @@ def test_light_that_changes_changes_the_outputs(renderer: Renderer, close: float
 
 @pytest.fixture(scope="module")
 def face(renderer: Renderer) -> tuple[Human, Arrays]:
-    """A person's eyes and open mouth."""
+    """Return a person's eyes and open mouth."""
     person = Human.drawn(5)
     camera = Camera(position=(0, -30, 600), target=(0, -30, 80), frame_mm=130.0)
     scene = Scene(person.head(), camera=camera, lights=load_lights("studio"), pose={"jawOpen": 0.4})

@@ -1,4 +1,4 @@
-"""The exposure meter: its number by hand, what it depends on and what not."""
+"""The exposure meter compared with closed forms, and what it depends on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.frame.features.post.meter import CLIPPING, KEY, SIDE, MIN_HIGHLIGHT_FACTOR
+from dermis.frame.features.post.meter import CLIPPING, KEY, MIN_HIGHLIGHT_FACTOR, SIDE
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -27,7 +27,7 @@ def metered(renderer: Renderer, scene: Scene, **settings: Any) -> float:
 
 
 def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
-    """(n, 2) light and brightness at the points that were metered last."""
+    """Return (n, 2) light and brightness at the points that were metered last."""
     meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.post.meter
     assert meter is not None
     raw = np.frombuffer(renderer.device.handle.queue.read_buffer(meter.points), np.float32)
@@ -57,7 +57,7 @@ def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> 
 
 @pytest.mark.parametrize("technique", TECHNIQUES)
 def test_it_is_an_incident_meter(renderer: Renderer, technique: str) -> None:
-    """Dark skin is metered as light skin is, so that it stays dark, whatever spreads the light."""
+    """Dark skin is metered like light skin for every technique, so that it stays dark."""
     dark = head_of(plane(100.0), colour=np.full((8, 8, 3), 0.05))
     both = [
         metered(renderer, scene_of(head, frontal(3.0), **DULL), technique=technique) for head in (FLAT, dark)
@@ -72,7 +72,7 @@ def test_surroundings_count_as_the_light_that_falls_in(renderer: Renderer) -> No
 
 
 def glossy(irradiance: float, share: float) -> Scene:
-    """A plane with a bright strip in the picture that takes a share of it."""
+    """Return a scene of a plane with a bright strip over a fraction of the picture."""
     bright = np.full((8, 200, 3), 0.1)
     bright[:, : round(200 * (0.1 + 0.8 * share))] = 40.0 / irradiance
     head = head_of(plane(100.0), colour=bright)
@@ -90,7 +90,7 @@ def test_highlights_stop_it_down_by_one_stop_at_most(renderer: Renderer) -> None
 
 
 def test_only_skin_is_metered(renderer: Renderer) -> None:
-    """Beside a plain plane the light is the same, so is the exposure; plain things alone tell nothing."""
+    """The exposure is that of the skin beside a plain plane; without skin it is 1."""
     mesh = plane(50.0)
     parts = ((mesh, (-25, 0, 0), (0.0, 0.0, 0.5)), (mesh, (25, 0, 0), (0.5, 0.0, 0.5)))
     both = head_of(joined(*parts, kinds=["skin", "opaque"]))
@@ -104,7 +104,7 @@ def test_only_skin_is_metered(renderer: Renderer) -> None:
 
 
 def test_it_has_no_memory(renderer: Renderer) -> None:
-    """The same after other scenes, and next to the same at another size."""
+    """The exposure is the same after other scenes, and nearly the same at another size."""
     scene = scene_of(FLAT, frontal(2.0))
     first = metered(renderer, scene)
     metered(renderer, scene_of(FLAT, frontal(20.0)))

@@ -1,4 +1,4 @@
-"""Occlusion that follows a head: closed forms, meshes baked anew, and what makes it run."""
+"""Occlusion of a moving head: closed forms, bakes of the moved mesh, and the passes that run."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.frame.features.occlusion import moving as moving_occlusion
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.features.occlusion.moving import SIDE as MAP_SIDE
-from dermis.frame.features.occlusion.moving import make_anchors, sky_views, head_rotation
+from dermis.frame.features.occlusion.moving import head_rotation, make_anchors, sky_views
 from dermis.frame.features.visibility.layers import make_layers
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -43,20 +43,20 @@ def head() -> Head:
 
 
 def posed(head: Head, points: NDArray[np.floating] | None = None, **given: Any) -> Scene:
-    """The head under an even sky, its points elsewhere."""
+    """Return a scene of the head in uniform light with its points moved."""
     pose = Pose(positions_mm=points, **given) if points is not None or given else None
     scene = scene_of(head, camera=front_camera(head, frame_mm=180.0), rho_s=0.0)
     return replace(scene, environment=SKY, pose=pose)
 
 
 def open_maps(renderer: Renderer, scene: Scene, **settings: Any) -> list[Floats]:
-    """The open share of the sky as the shading reads it, of each layout."""
+    """Return the occlusion map of each layout as the shading reads it."""
     layouts = run_frame(renderer, scene, **({"atlas": SIDE} | settings)).layouts
     return [download(renderer.device, layout.bindings["occlusion_map"]).astype(float) for layout in layouts]
 
 
 def on_floor(head: Head) -> tuple[NDArray[np.bool_], Floats]:
-    """Texels in the middle of the floor, and their distance from the wall's foot."""
+    """Return the mask of texels in the middle of the floor, and their distance from the wall."""
     points, normals = surface(cached_atlas(head.mesh, SIDE), head)
     d = points[..., 0] - FOOT_MM
     middle = (normals[..., 2] > 0.9) & (np.abs(points[..., 1]) < 20) & (d > 15) & (d < 80)
@@ -83,7 +83,7 @@ def test_a_wall_that_turns_about_its_foot(renderer: Renderer, head: Head, degree
 
 
 def baked_anew(renderer: Renderer, head: Head, points: Floats, side: int) -> NDArray[np.float32]:
-    """Rows of a bake for the mesh at other places: the atlas and the vertices."""
+    """Return the rows of a bake for the moved mesh: the atlas and the vertices."""
     mesh = head.mesh
     places = points[mesh.point].astype(np.float32)
     moved = build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
@@ -94,7 +94,7 @@ def baked_anew(renderer: Renderer, head: Head, points: Floats, side: int) -> NDA
 
 
 def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: int, away: Any) -> Any:
-    """Root mean squares from a bake anew, of each setting, over the texels of which `away` says so."""
+    """Return the RMS error against a bake of the moved mesh for each setting, over chosen texels."""
     anew = baked_anew(renderer, head, points, side)[:side]
     own, found = np.isfinite(anew) & away, {}
     for which in ("baked", "rest"):
@@ -104,7 +104,7 @@ def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: i
 
 
 def test_a_moved_wall_occludes_as_one_baked_anew(renderer: Renderer, head: Head) -> None:
-    """But for triangles with a corner in the crease, which sees both sides of the wall."""
+    """Compare all triangles but those with a corner in the crease, which sees both sides of the wall."""
     points, (places, _) = hinged(head, 45.0), surface(cached_atlas(head.mesh, SIDE), head)
     away = (places[..., 0] > FOOT_MM + 10) | (places[..., 2] > 4)
     found = errors(renderer, head, posed(head, points), points.astype(float), SIDE, away)
@@ -115,13 +115,13 @@ def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer) -> None:
     human = Human().head(subdivide=0)
     scene = replace(scene_of(human), environment=SKY, pose=Pose(weights={"jawOpen": 1.0}))
     assert scene.motion is not None
-    points = human.control.posed(scene.motion.weights.astype(float), scene.motion.matrices.astype(float))
+    points = human.control.pose(scene.motion.weights.astype(float), scene.motion.matrices.astype(float))
     found = errors(renderer, human, scene, points, 256, away=True)
     assert found["baked"] < FOLLOWED < found["rest"]  # which is the mean person's
 
 
 def test_vertices_follow_too(renderer: Renderer, head: Head) -> None:
-    """Row by row after the texels, for surfaces that have none."""
+    """The rows of vertices are updated too, for surfaces without texels."""
     points = hinged(head, 45.0)
     anew, (made,) = (
         baked_anew(renderer, head, points.astype(float), SIDE),

@@ -1,4 +1,4 @@
-"""The open share of the sky against closed forms, and how the frame uses it."""
+"""Sky visibility compared with closed forms, and its use in the frame."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SIDE = 64
 
 
 def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> NDArray[np.float32]:
-    """Rows of the bake: the atlas and the vertices."""
+    """Return the rows of a bake: the atlas and the vertices."""
     inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
     texels = inputs.layouts[0].atlas.resources["atlas"]
     return bake_occlusion(
@@ -51,7 +51,7 @@ def test_a_ball_sees_all_of_its_sky(renderer: Renderer) -> None:
 
 
 def test_a_floor_beside_a_wall(renderer: Renderer) -> None:
-    """A wall of height h at distance d hides (1 - d / sqrt(d^2 + h^2)) / 2 when it is long."""
+    """A long wall of height h at distance d hides (1 - d / sqrt(d^2 + h^2)) / 2."""
     head = corner()
     made = baked(renderer, head)[:SIDE]
     points, normals = surface(cached_atlas(head.mesh, SIDE), head)
@@ -65,7 +65,7 @@ def test_a_floor_beside_a_wall(renderer: Renderer) -> None:
 
 
 def test_vertices_follow_the_atlas(renderer: Renderer) -> None:
-    """Row by row after the texels, for every vertex."""
+    """All vertices follow the texels, row by row."""
     head = corner()
     made = baked(renderer, head)
     count = len(head.mesh.positions)
@@ -107,7 +107,7 @@ def test_corners_are_darker_and_can_be_left_bright(renderer: Renderer) -> None:
 
 
 def test_opaque_parts_are_occluded_by_their_vertices(renderer: Renderer) -> None:
-    """The floor as an opaque part: it owns no texels."""
+    """An opaque floor owns no texels and uses the values of its vertices."""
     mesh = corner().mesh
     kinds = tuple(replace(part, kind="opaque") for part in mesh.materials[:1]) + mesh.materials[1:]
     head = head_of(replace(mesh, materials=kinds))
@@ -120,7 +120,7 @@ def test_opaque_parts_are_occluded_by_their_vertices(renderer: Renderer) -> None
 
 
 def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Read from disk the second time, by any renderer's key: mesh, atlas and directions."""
+    """The second bake is read from disk, by a key of mesh, atlas and directions."""
     head = corner()
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))
     first = seen(renderer, scene)

@@ -1,4 +1,4 @@
-"""What a frame knows besides its colour agrees with the mesh, with the camera and with itself."""
+"""Outputs of a frame agree with the mesh, with the camera and with each other."""
 
 from __future__ import annotations
 
@@ -42,12 +42,14 @@ PIXEL = 0.01
 """How near to the centre of its pixel a position projects [pixel]."""
 
 
-def drawn(renderer: Renderer, scene: Scene = SCENE, previous: Scene | None = None, **given: Any) -> RenderedFrame:
+def drawn(
+    renderer: Renderer, scene: Scene = SCENE, previous: Scene | None = None, **given: Any
+) -> RenderedFrame:
     return renderer.draw(scene, settings_of(**{"size": SIZE} | given), outputs=NAMES, previous=previous)
 
 
 def centres() -> Floats:
-    """(h, w, 2) of pixels in OpenCV's coordinates."""
+    """Return the (h, w, 2) centres of pixels in OpenCV's coordinates."""
     return np.dstack(np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))).astype(float)
 
 
@@ -90,7 +92,7 @@ def test_positions_project_to_the_centres_of_their_pixels(
 
 
 def test_triangles_seen_along_their_plane_are_met_where_they_look_nearest(renderer: Renderer) -> None:
-    """At the rim of a fine ball: rasterisers find some a little beside, and rays meet their plane far off."""
+    """At the rim of a ball rasterisers hit triangles slightly outside, and rays their plane far away."""
     fine, size = head_of(uv_sphere(30.0, 200, 100)), (256, 256)
     scene = scene_of(fine, frontal(), camera=CAMERA)
     rendered = renderer.draw(scene, settings_of(size=size), outputs=("position", "triangle"))
@@ -116,7 +118,7 @@ def test_barycentrics_are_of_the_triangles_corners(
 
 
 def test_normals_are_those_of_the_surface(found: dict[str, NDArray[Any]], seen: NDArray[np.bool_]) -> None:
-    """A ball without relief: all look away from its middle, the flat triangles' a little off."""
+    """Normals of a ball without relief point away from its middle, those of flat triangles nearly so."""
     outward = found["position"] + np.subtract(BALL.centre_mm, BALL.mesh.positions.mean(axis=0))
     outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-6)
     for name, least in (("normal", 0.9999), ("normal_geometric", 0.99)):
@@ -143,7 +145,7 @@ def test_relief_bends_one_normal_only(renderer: Renderer, found: dict[str, NDArr
 def test_a_frame_is_the_same_to_the_bit(
     renderer: Renderer, found: dict[str, NDArray[Any]], change: dict[str, Any]
 ) -> None:
-    """Of the samples, only coverage follows."""
+    """Outputs do not depend on the samples of the picture, except for coverage."""
     rendered = drawn(renderer, **change)
     for name in set(NAMES) - {"alpha"}:
         assert rendered.output(name).tobytes() == found[name].tobytes(), name
@@ -162,7 +164,7 @@ def test_alpha_is_that_of_the_picture_hair_and_all(renderer: Renderer) -> None:
 
 
 def turned(degrees: float, **parts: Any) -> Scene:
-    """The ball turned about the upright axis, as another person of the same mesh."""
+    """Return a scene of the ball turned about the upright axis, as another person of the same mesh."""
     angle = np.radians(degrees)
     turn = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
     places = (BALL.positions_mm @ np.transpose(turn)).astype(np.float32)
@@ -170,7 +172,7 @@ def turned(degrees: float, **parts: Any) -> Scene:
 
 
 def expected_motion(rendered: RenderedFrame, now: Scene, before: Scene) -> tuple[Floats, NDArray[np.bool_]]:
-    """By the corners of the triangles that are seen, before and now."""
+    """Return the motion by the corners of the visible triangles, before and now."""
     seen = rendered.output("triangle") >= 0
     corners = BALL.mesh.point[BALL.mesh.triangles[rendered.output("triangle")[seen]]]
     places = []
@@ -209,7 +211,7 @@ def test_what_stands_still_does_not_move(renderer: Renderer) -> None:
 
 
 def test_a_clip_is_observed_as_it_is_drawn(renderer: Renderer) -> None:
-    """Pictures, outputs and motion from one scene to the next, frames in flight or not."""
+    """Pictures, outputs and motion of a clip are the same with frames in flight and without."""
     clip = [turned(4.0 * k, lights=[frontal(1.0 + k)]) for k in range(5)]
     names, settings = ("depth", "motion", "triangle"), settings_of(size=SIZE)
     found = list(renderer.observe(iter(clip), settings, outputs=names))
@@ -249,7 +251,7 @@ def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
 
 
 def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
-    """The passes of a frame with outputs are those of one without, and then theirs."""
+    """Outputs add passes after those of a frame without outputs, and change none of them."""
 
     def passes(**given: Any) -> list[str]:
         renderer.graph.listing = listing = Listing()
@@ -272,7 +274,7 @@ def test_what_is_known_is_not_made_again(renderer: Renderer) -> None:
 
 
 def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As memory that the frame takes: 24 bytes a pixel for a normal and its copy."""
+    """Outputs count as memory of the frame: 24 bytes per pixel for a normal and its copy."""
     asked: list[FrameRequest] = []
     monkeypatch.setattr(allocation, "check_limits", lambda _, one: asked.append(one))
     for names in ([], ["normal"]):

@@ -1,4 +1,4 @@
-"""Exposure and encoding: the device's bytes are numpy's."""
+"""Exposure and encoding on the device, compared with NumPy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def finished(
 
 
 def values(seed: int) -> Floats:
-    """Radiance over the whole range of the curve, more of it in the dark, some over white."""
+    """Return radiance over the whole range of the curve, mostly dark, with some values above white."""
     rng = np.random.default_rng(seed)
     light = rng.uniform(0, 1.05, (60, 101, 4)) ** rng.choice([1, 3, 6], (60, 101, 1))
     light[..., 3] = rng.uniform(0, 1, (60, 101))
@@ -51,7 +51,7 @@ def test_bytes_are_numpys(device: Device, exposure: float) -> None:
 
 
 def test_every_grey_level_survives(device: Device) -> None:
-    """Bytes decoded to linear light and encoded again are themselves."""
+    """Bytes that are decoded to linear light and encoded again do not change."""
     from dermis.images.colour import decode_srgb_levels
 
     levels = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(4, axis=2)

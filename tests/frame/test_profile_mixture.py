@@ -1,4 +1,4 @@
-"""Skin whose profile a map mixes: against a full sum over the plane in float64, and what must stay."""
+"""Skin of mixed profiles, compared with a full sum over the plane in float64."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KEPT_EVEN, KEPT = 1e-3, 0.01
 
 @pytest.fixture(scope="module")
 def maps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A mask with a sharp and a soft edge, and one of two other profiles."""
+    """Write a mask with a sharp and a soft edge, and one of two other profiles."""
     folder = tmp_path_factory.mktemp("masks")
     x = np.linspace(-1.0, 1.0, SIDE)
     one = np.where(x[:, None] < 0.1, x[None] > 0.0, np.clip(0.5 + x[None], 0.0, 1.0))
@@ -45,13 +45,13 @@ def maps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def lit_scene(**skin: Any) -> Scene:
-    """A plane that lets light in on random patches."""
+    """Return a scene of a plane that light enters in random patches."""
     patches = np.random.default_rng(5).random((SIDE // 8, SIDE // 8, 3)).repeat(8, axis=0).repeat(8, axis=1)
     return scene_of(head_of(plane(SIZE_MM), colour=0.05 + 0.9 * patches**4), frontal(), **(DIFFUSE | skin))
 
 
 def lights(renderer: Renderer, scene: Scene) -> tuple[FrameInputs, Floats, Floats]:
-    """A frame, and the light that enters and that leaves over the plane, (n, n, 3)."""
+    """Draw a frame, and return its inputs and the (n, n, 3) light that enters and leaves the plane."""
     inputs = run_frame(renderer, scene, atlas=SIDE)
     leaves = download(renderer.device, inputs.resources.scattered).astype(float)
     return inputs, entered_light(renderer, inputs)[..., :3], leaves[..., :3]
@@ -63,9 +63,9 @@ def pictured(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
 
 
 def spread(light: Floats, variance_mm2: float) -> Floats:
-    """(n, n, 3) light under a Gaussian of texels' integrals; beyond the edge the last texel goes on.
+    """Return (n, n, 3) light after a Gaussian blur with exact integrals over texels; the edge is repeated.
 
-    What is narrower than 0.1 mm is lit again in the picture and not blurred.
+    Gaussians narrower than 0.1 mm are relit in the picture and not blurred.
     """
     from scipy.special import ndtr
 
@@ -79,7 +79,7 @@ def spread(light: Floats, variance_mm2: float) -> Floats:
 
 
 def solved(light: Floats, profiles: list[GaussianSum], shares: Floats) -> Floats:
-    """What leaves when each texel spreads light by its own profiles: (w(x) + w(y)) / 2 of each Gaussian."""
+    """Return the light that leaves by the texels' own profiles: (w(x) + w(y)) / 2 of each Gaussian."""
     found = np.zeros_like(light)
     for profile, share in zip(profiles, np.moveaxis(shares, -1, 0)[..., None], strict=True):
         for variance, weight in zip(profile.variance_mm2, profile.weight / profile.albedo, strict=True):
@@ -92,7 +92,7 @@ def mixed_by(name: Path, *others: str) -> dict[str, Any]:
 
 
 def mixed(renderer: Renderer, scene: Scene, name: Path, others: int) -> tuple[Floats, Floats, Floats]:
-    """Light that enters, light that leaves with what is lit again in the picture, and the map's shares."""
+    """Return light that enters, light that leaves with the relit level, and the blend weights."""
     inputs, light, made = lights(renderer, scene)
     shares = load_blend_weights(str(name)).astype(float)
     changes = inputs.view["relit_changes"][:others, :3]
@@ -111,7 +111,7 @@ def test_full_sum_over_the_plane(renderer: Renderer, maps: dict[str, Path], othe
 
 
 def test_energy_is_kept(renderer: Renderer, maps: dict[str, Path]) -> None:
-    """All light leaves again under even light, whatever the map; little is gained or lost in patches."""
+    """All uniform light leaves again for any map, and patches of light lose or gain little."""
     even = scene_of(head_of(plane(SIZE_MM)), frontal(), **DIFFUSE, **mixed_by(maps["one"], "skin2"))
     entered, left, _ = mixed(renderer, even, maps["one"], 1)
     assert left.sum() == pytest.approx(entered.sum(), rel=KEPT_EVEN)
@@ -121,7 +121,7 @@ def test_energy_is_kept(renderer: Renderer, maps: dict[str, Path]) -> None:
 
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
-    """Two profiles of the same Gaussians, the narrowest of which is lit again in the picture."""
+    """Write two profiles of the same Gaussians, whose narrowest one is relit in the picture."""
     folder = tmp_path_factory.mktemp("tables")
     rows = {"narrow": ("0.006,0.7,0.8,0.9", "4,0.3,0.2,0.1"), "wide": ("0.006,0.2,0.5,0.6", "4,0.8,0.5,0.4")}
     for name, lines in rows.items():
@@ -134,7 +134,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
 def test_alike_or_alone(
     renderer: Renderer, maps: dict[str, Path], tables: tuple[str, str], seams: str
 ) -> None:
-    """A mixture of equal profiles is that profile; all of another one is that other one, lit again too."""
+    """A mixture of equal profiles is that profile, and a map of ones gives the other profile."""
     narrow, wide = tables
     full = maps["one"].with_name("full.png")
     write_png(full, np.full((4, 4, 1), 255, np.uint8))

@@ -1,4 +1,4 @@
-"""The image of simple scenes against their closed form, pixel by pixel."""
+"""Pictures of simple scenes compared with closed forms, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def image(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
 
 
 def seen_points(scene: Scene) -> tuple[Floats, Floats]:
-    """(h, w, 3) places of the plane z = 0 at the pixels' centres, and unit vectors to the eye."""
+    """Return the (h, w, 3) points of the plane z = 0 at pixel centres, and unit vectors to the eye."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
     eye = np.add(scene.camera.position, scene.head.centre_mm)
     pixel = scene.camera.frame_mm / SIZE[1]
@@ -50,7 +50,7 @@ def seen_points(scene: Scene) -> tuple[Floats, Floats]:
 
 
 def closed_form(scene: Scene, colour: Floats | float) -> Floats:
-    """Diffuse and mirrored radiance of the plane under its lights, nothing spreading."""
+    """Return the diffuse and specular radiance of the plane under its lights, without diffusion."""
     points, view = seen_points(scene)
     m, rho_s = scene.skin.roughness, scene.skin.rho_s
     below = twins.entering(scene, points, np.broadcast_to(Z, points.shape))
@@ -79,7 +79,7 @@ LIGHTS = {
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", LIGHTS)
 def test_dry_plane(renderer: Renderer, name: str, mix: float) -> None:
-    """Technique "none": all light leaves where it entered, in every pixel."""
+    """With technique "none" all light leaves where it enters, in every pixel."""
     scene = scene_of(
         FLAT, LIGHTS[name], camera=front_camera(FLAT, frame_mm=50.0), mix=mix, roughness=0.5, rho_s=0.4
     )
@@ -92,7 +92,7 @@ def test_dry_plane(renderer: Renderer, name: str, mix: float) -> None:
 @pytest.mark.parametrize("technique", ["texture-space", "none"])
 @pytest.mark.parametrize("albedo", ["map", "profile"])
 def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique: str, close: float) -> None:
-    """Under one directional light spreading changes nothing, and a profile's weights are its colour."""
+    """Diffusion does not change uniform light, and the weights of a profile are its colour."""
     scene = scene_of(
         FLAT, LIGHTS["directional"], camera=front_camera(FLAT, frame_mm=50.0), albedo=albedo, roughness=0.5
     )
@@ -103,7 +103,7 @@ def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique
 
 
 def test_a_profile_keeps_its_own_colour(renderer: Renderer, tmp_path: Any) -> None:
-    """Weights that sum to less than 1 darken the skin by just that."""
+    """Weights that sum to less than 1 darken the skin by that factor."""
     path = tmp_path / "dark.csv"
     path.write_text("variance_mm2,red,green,blue\n0.005,0.1,0.2,0.05\n0.5,0.3,0.1,0.2\n")
     scene = scene_of(
@@ -122,7 +122,7 @@ def test_a_profile_keeps_its_own_colour(renderer: Renderer, tmp_path: Any) -> No
 
 @pytest.mark.parametrize("mix", [0.0, 0.3, 1.0])
 def test_colour_map_and_its_shares(renderer: Renderer, mix: float) -> None:
-    """An even colour comes out once, however it is divided between before and after."""
+    """A uniform colour is applied once, however it is divided between entry and exit."""
     scene = scene_of(
         CREAM, LIGHTS["directional"], camera=front_camera(CREAM, frame_mm=50.0), mix=mix, roughness=0.5
     )
@@ -137,7 +137,7 @@ BALL = head_of(uv_sphere(30.0, 48, 24))
 @pytest.mark.parametrize("background", [(0.0, 0.0, 0.0), (0.25, 0.5, 2.0)])
 @pytest.mark.parametrize("exposure", [1.0, 0.25])
 def test_silhouette(renderer: Renderer, background: Any, exposure: float) -> None:
-    """Coverage is the share of samples on the ball; the background keeps its value at any exposure."""
+    """Coverage is the fraction of samples on the ball, and the background is independent of exposure."""
     scene = scene_of(BALL, frontal(), camera=front_camera(BALL, frame_mm=80.0))
     made = image(renderer, scene, samples=8, background=background, exposure=exposure, size=(40, 40))
     black = image(renderer, scene, samples=8, exposure=exposure, size=(40, 40))
@@ -162,7 +162,7 @@ def test_more_samples_change_only_edges(renderer: Renderer) -> None:
 
 
 def test_opaque_material(renderer: Renderer) -> None:
-    """Its own colour, no spreading, a wet surface; even light from beside the view leaves little gloss."""
+    """An opaque material has its own colour and a wet surface, without diffusion."""
     mesh = joined((plane(100.0), (0, 0, 0), (0, 0, 1)), kinds=["opaque"])
     head = head_of(mesh, colour=np.full((8, 8, 3), 0.9))
     light = DirectionalLight(direction=(1, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
@@ -174,7 +174,7 @@ def test_opaque_material(renderer: Renderer) -> None:
 
 
 def unmapped_head() -> Head:
-    """Two planes side by side; the uv of the right one is smaller than a texel."""
+    """Return two planes side by side; the uv of the right one is smaller than a texel."""
     return head_of(
         joined((plane(40.0), (-20, 0, 0), (0, 0, 0.9)), (plane(40.0), (20, 0, 0), (0.99, 0.99, 0.002)))
     )
@@ -191,7 +191,7 @@ def test_unmapped_triangles_keep_all_their_light(renderer: Renderer, albedo: str
 
 
 def tailed() -> Head:
-    """A strip 80 mm long: in uv a square, then a taper, then a tail too thin for any texel's centre."""
+    """Return a strip 80 mm long: in uv a square, a taper, and a tail too thin for any texel centre."""
     x = np.repeat([-40.0, -10.0, 0.0, 40.0], 2)
     y = np.tile([20.0, -20.0], 4)
     u = np.repeat([0.05, 0.4, 0.45, 0.9], 2)
@@ -202,7 +202,7 @@ def tailed() -> Head:
 
 
 def test_a_thin_tail_of_a_chart_is_not_left_dark(renderer: Renderer) -> None:
-    """Even light: the tail, which owns no texels, is as bright as the rest of its chart."""
+    """In uniform light the tail, which owns no texels, is as bright as the rest of its chart."""
     head = tailed()
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=30.0), roughness=0.5)
     made = image(renderer, scene, size=(70, 28), atlas=64)[..., :3]
@@ -216,7 +216,7 @@ def test_a_thin_tail_of_a_chart_is_not_left_dark(renderer: Renderer) -> None:
 def test_software_adapters_get_the_picture_of_gpus(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, technique: str, samples: int
 ) -> None:
-    """Strips of pixels, the last one cut off, past what shows nothing; lights from behind passed over."""
+    """Strips of pixels give the same picture, and so does skipping lights from behind."""
     sun = DirectionalLight(direction=(2, -1, 1), shadows=False)
     scene = scene_of(head_of(uv_sphere(30.0, 24, 12)), sun, LIGHTS["spot"], frontal(), sun)
     own = [one for one in programs.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
@@ -229,7 +229,7 @@ def test_software_adapters_get_the_picture_of_gpus(
 
 
 def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
-    """Pixels below one that shows nothing are another invocation's."""
+    """A strip ends at its last pixel even if that shows nothing."""
     head = head_of(plane(20.0))
     camera = front_camera(head, (0, 10.0, 0), frame_mm=40.0)  # its upper edge is in the middle of the picture
     scene, size = scene_of(head, frontal(), camera=camera), (16, 256)

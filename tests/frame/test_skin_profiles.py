@@ -1,4 +1,4 @@
-"""Profiles of skins, fitted when they are asked for and kept."""
+"""Diffusion profiles of skins, which are fitted on demand and cached."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_the_same_pigments_are_not_fitted_again() -> None:
 
 
 def test_skins_in_turn_are_fitted_once() -> None:
-    """As on both sides of the viewer's divider."""
+    """Two skins that alternate, as on both sides of the viewer's divider, are fitted once."""
     profiles = SkinProfiles()
     first = [profiles.profile(skin(melanin=share)) for share in (0.02, 0.05)]
     again = [profiles.profile(skin(melanin=share)) for share in (0.02, 0.05, 0.02)]

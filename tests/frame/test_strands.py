@@ -1,4 +1,4 @@
-"""Hairs in the frame: their lobe, their cover, their order, and what they do to the light on the skin."""
+"""Strands in the frame: lobe, cover, order, and shadows on the skin."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BLACK = 1e5  # absorption [1/mm]
 
 
 def picture(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
-    """(h, w, 4) picture and coverage."""
+    """Return the (h, w, 4) picture with its coverage."""
     given = {"size": (SIZE, SIZE), "technique": "none"} | settings
     made = run_frame(renderer, scene, **given).resources.post.picture
     return download(renderer.device, made.exposed).astype(float)
@@ -43,13 +43,13 @@ def lit(head: Head, **more: Any) -> Scene:
 
 
 def one(radius_mm: float, *, slope: float = 0.3, absorption: float = BLACK) -> Head:
-    """A single hair across the middle, leaning."""
+    """Return a sheet with a single sloping strand across its middle."""
     ends = np.array([[-12.0, -12.0 * slope + 0.2, ABOVE], [12.0, 12.0 * slope + 0.2, ABOVE]])
     return hairy(ends[:1], ends[1:], radius_mm, absorption)
 
 
 def tangle(count: int, absorption: float = 0.0, radius_mm: float = 0.2) -> Head:
-    """Hairs all over each other."""
+    """Return a sheet with overlapping strands."""
     rng = np.random.default_rng(3)
     begins, ends = rng.uniform(-6, 6, (2, count, 3))
     begins[:, 2], ends[:, 2] = rng.uniform(0.3, 4.0, (2, count))
@@ -77,7 +77,7 @@ def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
 @pytest.mark.parametrize("slope", [0.0, 0.3, 2.5])
 @pytest.mark.parametrize("radius_mm", [0.04, 0.3, 1.4])
 def test_a_hair_covers_what_it_is_wide(renderer: Renderer, radius_mm: float, slope: float) -> None:
-    """Beside the sheet, over nothing: columns of pixels through a hair, thin as it may be."""
+    """Compare the coverage of columns of pixels beside the sheet with the width of a strand."""
     ends = np.array([[-12.0, -12.0 * slope + 80.2, 0.0], [12.0, 12.0 * slope + 80.2, 0.0]])
     head = hairy(ends[:1], ends[1:], radius_mm, BLACK)
     scene = scene_of(head, frontal(), camera=front_camera(head, (0.0, 80.0, 0.0), frame_mm=FRAME_MM))
@@ -89,7 +89,7 @@ def test_a_hair_covers_what_it_is_wide(renderer: Renderer, radius_mm: float, slo
 
 
 def test_the_order_of_hairs_does_not_matter(renderer: Renderer) -> None:
-    """More of them over each pixel than it keeps."""
+    """The picture is independent of the order even if a pixel has more fragments than it keeps."""
     head = tangle(80, absorption=3.0)
     first, second = (picture(renderer, lit(each)) for each in (head, shuffled(head, 1)))
     assert np.array_equal(first, second)
@@ -97,7 +97,7 @@ def test_the_order_of_hairs_does_not_matter(renderer: Renderer) -> None:
 
 
 def test_any_number_of_hairs_may_share_a_tile(renderer: Renderer) -> None:
-    """Thousands of them, so thin that they hardly cover anything: no pixel is left out, none changes much."""
+    """Thousands of nearly invisible strands change no pixel much, and no pixel is lost."""
     head = tangle(3000, radius_mm=1e-5)
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=60.0))
     made, bare = (picture(renderer, scene, size=(24, 24), strands=on)[..., :3] for on in (True, False))
@@ -106,7 +106,7 @@ def test_any_number_of_hairs_may_share_a_tile(renderer: Renderer) -> None:
 
 
 def test_without_hairs_nothing_changes(renderer: Renderer) -> None:
-    """A head that has none and one whose hairs are left out: the same to the bit, by the same passes."""
+    """A head without strands and one with hidden strands give identical pictures by the same passes."""
     head = tangle(20)
     ran = []
     for scene, strands in ((lit(head), False), (lit(replace(head, strands=None)), True)):
@@ -145,7 +145,7 @@ def test_hairs_behind_the_skin_are_hidden(renderer: Renderer) -> None:
 
 
 def test_hairs_beyond_the_sheet_cover_nothing_else(renderer: Renderer) -> None:
-    """Over an empty background they count as coverage, so that pictures can be laid over others."""
+    """Over an empty background strands count as coverage."""
     head = hairy([[-90, 0, 1]], [[90, 0, 1]], 3.0, BLACK)
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=160.0))
     covered = picture(renderer, scene)[..., 3]
@@ -155,7 +155,7 @@ def test_hairs_beyond_the_sheet_cover_nothing_else(renderer: Renderer) -> None:
 
 
 def test_hairs_shade_the_skin_softly(renderer: Renderer) -> None:
-    """A row of thin hairs over the sheet, lit aslant: a band beside it, as dark as they cover the light."""
+    """A row of thin strands in oblique light casts a band that is as dark as their cover."""
     y = np.arange(-1.95, 2.0, 0.1)
     begins = np.column_stack([np.full(40, -30.0), y, np.full(40, 8.0)])
     head = hairy(begins, begins * [-1, 1, 1], 0.025, BLACK)
@@ -170,7 +170,7 @@ def test_hairs_shade_the_skin_softly(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("behind_mm", [20.0, 60.0])
 def test_hairs_behind_the_head_do_not_shade_its_front(renderer: Renderer, behind_mm: float) -> None:
-    """However far before the skin the hair lies that casts a shadow there."""
+    """Strands behind the head cast no shadow on its front at any distance."""
     y = np.arange(-1.95, 2.0, 0.1)
     ends = np.column_stack([np.full(40, -30.0), y, np.full(40, 25.0)])
     far = ends - np.array([0.0, 0.2, 1.0]) * (25.0 + behind_mm)  # along the light
@@ -183,7 +183,7 @@ def test_hairs_behind_the_head_do_not_shade_its_front(renderer: Renderer, behind
 
 
 def test_hairs_follow_the_skin(renderer: Renderer) -> None:
-    """A sheet that is moved and turned takes its hairs with it."""
+    """Strands move and turn with the sheet."""
     head = one(0.4)
     angle = np.radians(30.0)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
@@ -193,9 +193,9 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     assert made is not None and head.strands is not None
     raw = renderer.device.handle.queue.read_buffer(made.tables.posed)
     rows = np.frombuffer(raw, np.float32, 7 * 4).reshape(1, 7, 4)
-    there = head.strands.places_mm(head.mesh, moved)
+    there = head.strands.knot_positions_mm(head.mesh, moved)
     assert np.abs(rows[:, 2:, :3] - there).max() < 1e-4
-    still = head.strands.places_mm(head.mesh, head.positions_mm)
+    still = head.strands.knot_positions_mm(head.mesh, head.positions_mm)
     assert np.abs(there - (still @ turn.T + [2.0, -3.0, 0.0])).max() < 1e-4
 
 
@@ -211,7 +211,7 @@ def test_hairs_are_drawn_again_only_when_they_change(renderer: Renderer) -> None
 
 
 def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
-    """What hairs scatter counts as reflected light; in the light from below the skin they only cover."""
+    """Light that strands scatter counts as reflected; they only cover diffuse light."""
     scene = lit(tangle(40, absorption=2.0))
     parts = ("all", "diffuse", "specular")
     whole, below, over = (picture(renderer, scene, parts=part)[..., :3] for part in parts)
@@ -233,7 +233,7 @@ def test_strands_are_a_setting() -> None:
 def test_tiles_of_a_workgroup_draw_the_same(
     renderer: Renderer, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As GPUs do it: many chains for each tile, followed side by side."""
+    """Many linked lists per tile, as on GPUs, give the same picture."""
     scene, shown = lit(tangle(700, absorption=0.4)), []
     for ways in (1, 64):
         monkeypatch.setattr(strand_space, "chains_per_tile", lambda device, tiles, ways=ways: ways)

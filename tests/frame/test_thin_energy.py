@@ -1,4 +1,4 @@
-"""Thin parts give no more light than they get; half-space skin lets through what slabs of its medium do."""
+"""Energy of thin parts: they emit no more light than they receive, and transmit as slabs of their medium."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ BODY = media()["skin1"].with_eta(1.0)
 
 @pytest.fixture(scope="module")
 def skin1(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A file of its profile."""
+    """Return a file of the profile of skin1."""
     file: Path = tmp_path_factory.mktemp("profile") / "skin1.toml"
     write_profile(file, fit_gaussians(diffusion_profile(BODY).rings(), 6, name="skin1").profile, {})
     return str(file)
 
 
 def left(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, around: Any = None, **skin: Any) -> Any:
-    """(n, 3) light that leaves a slab far from its rim below the surface, on the upper and the lower face."""
+    """Return the (n, 3) diffuse light that leaves the upper and the lower face of a slab far from its rim."""
     scene = replace(scene_of(head_of(mesh, colour=WHITE), *lights, rho_s=0.0, **skin), environment=around)
     inputs = run_frame(renderer, scene, atlas=192, occlusion="none")
     texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
@@ -55,7 +55,7 @@ def left(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, around: Any 
 
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
 def test_a_white_sheet_in_a_furnace(renderer: Renderer, direction: str) -> None:
-    """Alike lit from everywhere it gives what it gets, less what half-spaces let pass unscattered."""
+    """In uniform light it emits what it receives, without the light that half-spaces transmit unscattered."""
     uniform = Environment(name="uniform")
     thick, thin = (
         np.concatenate(left(renderer, wedge(40.0, d, d), around=uniform, direction=direction))
@@ -68,7 +68,7 @@ def test_a_white_sheet_in_a_furnace(renderer: Renderer, direction: str) -> None:
 
 @pytest.mark.parametrize("degrees", [0.0, 60.0])
 def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, degrees: float) -> None:
-    """Red and green light on both faces beside the exact slab."""
+    """Compare red and green light on both faces with the exact slab."""
     angle = np.radians(degrees)
     way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
     lamp = DirectionalLight(direction=way, irradiance=(1.0, 1.0, 1.0), shadows=False)
@@ -79,7 +79,7 @@ def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, d
         through, back = (face.mean(axis=0) / cosine for face in left(renderer, mesh, lamp, **skin))
         for c in range(2):
             made = solve_slabs(float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, 1.0)
-            exact = [np.interp(cosine, made.cosine, part[0]) for part in (made.through, made.back)]
+            exact = [np.interp(cosine, made.cosine, part[0]) for part in (made.transmitted, made.reflected)]
             assert through[c] == pytest.approx(exact[0], rel=0.15)
             assert back[c] == pytest.approx(exact[1], rel=0.25)
 
@@ -88,7 +88,7 @@ def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, d
 def test_flesh_that_scatters_forward_lets_more_through(
     renderer: Renderer, skin1: str, degrees: float
 ) -> None:
-    """Red light on the far face beside the exact slab, which passes twice as much as an isotropic one."""
+    """Compare with the exact slab, which transmits twice as much red light as an isotropic one."""
     angle = np.radians(degrees)
     way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
     lamp = DirectionalLight(direction=way, irradiance=(1.0, 1.0, 1.0), shadows=False)
@@ -101,7 +101,7 @@ def test_flesh_that_scatters_forward_lets_more_through(
             for g in (0.0, 0.8)
         )
         made = solve_slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0, g=0.8)
-        assert forward == pytest.approx(float(np.interp(cosine, made.cosine, made.through[0])), rel=0.12)
+        assert forward == pytest.approx(float(np.interp(cosine, made.cosine, made.transmitted[0])), rel=0.12)
         assert forward > more * even
 
 
@@ -110,7 +110,7 @@ def test_flesh_that_scatters_forward_lets_more_through(
 def test_a_colour_that_nothing_blurs_passes_nowhere(
     renderer: Renderer, tmp_path: Path, direction: str
 ) -> None:
-    """All blue is in the narrowest Gaussian, which stays where it is: none is missing from thin parts."""
+    """All blue light is in the relit Gaussian, so that thin parts lose none of it."""
     weight = np.array([[0.2, 0.2, 0.3], [0.2, 0.1, 0.0], [0.2, 0.1, 0.0]])
     write_profile(tmp_path / "red.toml", GaussianSum("red", np.array([1e-4, 0.5, 4.0]), weight), {})
     skin = {"albedo": "profile", "profile": str(tmp_path / "red.toml"), "direction": direction}

@@ -1,4 +1,4 @@
-"""Light through thin parts: twins; slabs, wedges and a rolled rim lit from behind; spheres let none pass."""
+"""Translucency compared with NumPy twins, and on slabs, wedges, a rolled rim and spheres."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ BEHIND = DirectionalLight(direction=(0, 0, 1), irradiance=(1.0, 1.0, 1.0), shado
 
 @dataclass(frozen=True)
 class Thin:
-    """Thin parts with their pairs on a device, and the same in NumPy.
+    """Thin parts with their pairs on a device, and the same pairs in NumPy.
 
-    lie : of all receivers and sources of the twin
-    receiver, source : (l,) of each pair, in the twin's numbers
+    lie : geometry of all receivers and sources of the twin
+    receiver, source : (l,) indices of each pair in the twin
     """
 
     mesh: Mesh
@@ -79,7 +79,7 @@ class Thin:
 
 @pytest.fixture(scope="module")
 def thin(device: Device) -> Thin:
-    """The translucent pairs of a small wedge."""
+    """Return the translucent pairs of a small wedge."""
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
@@ -109,7 +109,7 @@ def thin(device: Device) -> Thin:
 
 
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
-    """What the blurred levels let pass between pairs, on a surface."""
+    """Return pairs on a surface with the weights of a profile."""
     made = with_profile(device, make_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight)
     frame = CommandList(device)
     translucency_weights.draw_weights(frame, made)
@@ -133,7 +133,7 @@ def test_the_places_stand_for_all_of_the_surface(device: Device, thin: Thin) -> 
 
 
 def test_twin_of_the_places(device: Device, thin: Thin) -> None:
-    """Middles, areas and normals of cells, and how the map lies on the surface there."""
+    """Compare the positions, areas, normals and the metric of cells."""
     words = read(device, thin.pairs.pairs).reshape(-1, 3)
     taken, given = (np.zeros(count, np.int64) for count in (thin.pairs.receivers[1], thin.pairs.sources[1]))
     taken[words[:, 1]], given[words[:, 0]] = thin.receiver, thin.source
@@ -155,7 +155,7 @@ def test_twin_of_the_places(device: Device, thin: Thin) -> None:
 
 
 def test_twin_of_the_pairs(thin: Thin) -> None:
-    """By brute force: all that let light pass that counts, each once."""
+    """Compare with a search by brute force: all relevant pairs are found once."""
     light = passes(thin.lie, thin.given.area_mm2, thin.cells)
     made = np.zeros(light.shape, np.int64)
     np.add.at(made, (thin.receiver, thin.source), 1)
@@ -167,7 +167,7 @@ def test_twin_of_the_pairs(thin: Thin) -> None:
 
 
 def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
-    """The nearest copy in chart or gutter; nine texels around a place show it."""
+    """Compare the distances to the nearest copy in a chart or gutter."""
     by = (np.stack([thin.offset & 0xFFFF, thin.offset >> 16]).astype(np.uint16)).view(np.int16) / 8.0
     made = far_of(thin.atlas, thin.taken.chosen(thin.receiver), *by)
     nowhere = thin.offset == 0x80008000
@@ -201,7 +201,7 @@ def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
 def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
     surface = surface_of(device, thin.mesh, thin.atlas)
     again = pairs_on(device, surface, thin.atlas, divide_into_cells(thin.atlas, SIGMA))
-    for name in ("pairs", "sums"):
+    for name in ("pairs", "receiver_ranges"):
         assert (read(device, getattr(again, name)) == read(device, getattr(thin.pairs, name))).all()
     weights = read(device, weighed(device, again, surface).weights)
     assert (weights == read(device, thin.translucency.weights)).all()
@@ -216,7 +216,7 @@ def test_a_narrow_profile_has_no_pairs(device: Device) -> None:
 
 @pytest.mark.parametrize("layout", ["mesh", "stitched", "unwrapped"])
 def test_a_ball_smaller_than_the_profile_spreads_has_pairs(device: Device, layout: str) -> None:
-    """Its blurs read nearly all texels, gutters included."""
+    """The search works if blurs read nearly all texels, gutters included."""
     mesh = uv_sphere(3.0, 48, 24)
     atlas = build_atlas(mesh, 64, layout)
     pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide_into_cells(atlas, SIGMA))
@@ -238,7 +238,7 @@ def test_cells_are_coarser_where_memory_does_not_hold_the_pairs(
 
 
 def test_pairs_follow_a_surface_that_moves(device: Device, thin: Thin) -> None:
-    """Those of the surface at rest let pass what those do that are found where it is now."""
+    """Pairs found at rest transmit as much light as pairs found on the moved surface."""
     head = head_of(thin.mesh)
     x, y, z = head.positions_mm.T.astype(float)
     moved = np.stack([1.1 * x, y + 0.02 * x * x, 0.8 * z + 0.1 * x], axis=-1).astype(np.float32)
@@ -262,9 +262,9 @@ def test_pairs_follow_a_surface_that_moves(device: Device, thin: Thin) -> None:
 def scattered(
     renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, atlas: int = 128, **given: str
 ) -> tuple[Floats, Floats, Floats]:
-    """(n, 3) places and normals of the texels that own surface, and the light that leaves them.
+    """Return (n, 3) positions and normals of the texels with surface, and the light that leaves them.
 
-    The profile has its own colour; the level that is lit again is left out.
+    The profile has its own colour, and the relit level is left out.
     """
     head = head_of(mesh)
     scene = scene_of(head, *(lights or (BEHIND,)), albedo="profile", rho_s=0.0)
@@ -280,7 +280,7 @@ def scattered(
 
 
 def front(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, **given: Any) -> tuple[Floats, Floats]:
-    """Places of the texels of a wedge's front, and their light."""
+    """Return the positions of the texels on the front of a wedge, and their light."""
     points, normals, light = scattered(renderer, mesh, *lights, **given)
     facing = normals[:, 2] > 0.9
     return points[facing], light[facing]
@@ -288,7 +288,7 @@ def front(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, **given: An
 
 @pytest.mark.parametrize("thickness", [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 20.0])
 def test_a_slab_lets_through_what_the_profile_says(renderer: Renderer, thickness: float) -> None:
-    """Far from its rim, in amount and colour: exp(-d^2 / 2v) of each Gaussian."""
+    """Far from its rim, a slab transmits exp(-d^2 / 2v) of each Gaussian."""
     points, light = front(renderer, wedge(60.0, thickness, thickness))
     inner = light[np.abs(points[:, :2]).max(axis=1) < 14.0]
     assert len(inner) > 100
@@ -310,7 +310,7 @@ def test_light_of_several_sources_adds_up(renderer: Renderer) -> None:
 
 
 def test_a_wedge_fades_without_a_step(renderer: Renderer) -> None:
-    """From 0.5 to 20 mm: never brighter where thicker, and near what a slab lets through."""
+    """From 0.5 to 20 mm, light never increases with thickness and stays close to that of a slab."""
     points, light = front(renderer, wedge(60.0, 0.5, 20.0, cells=8), atlas=256)
     middle = np.abs(points[:, 1]) < 15.0
     order = np.argsort(points[middle, 0])
@@ -327,7 +327,7 @@ def test_a_wedge_fades_without_a_step(renderer: Renderer) -> None:
 
 
 def test_a_sphere_lets_nothing_through(renderer: Renderer) -> None:
-    """Nothing doubles at the terminator."""
+    """Light is not counted twice at the terminator."""
     ball = uv_sphere(20.0, 48, 24)
     on, off = (scattered(renderer, ball, transmission=t)[2] for t in ("thin", "none"))
     assert off.max() > 0.5
@@ -341,7 +341,7 @@ def test_nothing_comes_through_when_it_is_switched_off(renderer: Renderer) -> No
 
 
 def test_light_counts_once_where_both_sides_meet(renderer: Renderer) -> None:
-    """Lit alike all around, a thin slab has no bright line along its rim."""
+    """A thin slab in uniform light has no bright line along its rim."""
     mesh = wedge(40.0, 0.4, 0.4)
     everywhere = (BEHIND, DirectionalLight(direction=(0, 0, -1), irradiance=(1, 1, 1), shadows=False))
     points, light = front(renderer, mesh, *everywhere, atlas=256)
@@ -350,7 +350,7 @@ def test_light_counts_once_where_both_sides_meet(renderer: Renderer) -> None:
 
 
 def test_a_rolled_rim_glows_evenly(renderer: Renderer) -> None:
-    """No dark spots, no bright chains, and nearly all of the light that straight lines bring."""
+    """There are no dark or bright spots, and the sum is close to that by straight lines."""
     mesh = hook()
     points, normals, light = scattered(renderer, mesh, atlas=256, interreflection=False)
     dark = (normals[:, 2] > 0.1) & (np.abs(points[:, 1]) < 5.0) & (points[:, 0] > -7.0)

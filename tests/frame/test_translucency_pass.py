@@ -1,4 +1,4 @@
-"""The sum over pairs against its twin: alone and in teams, in one row of workgroups and in many."""
+"""The sum over pairs compared with its twin: by single invocations and teams, in few and many workgroups."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ ALONE: Constants = (("TEAM", 1), ("ROUND", 1))
 
 @dataclass(frozen=True)
 class Weighed:
-    """Thin parts whose pairs have their weights, and what the sum reads.
+    """Thin parts with the weights of their pairs, and the data that the sum reads.
 
-    source, texel : (l,) of each pair, and (n, 2) of the sources, x and y
-    share : (l, 3) of a source's light that passes
-    cell, first, end : (m,) packed x and y, and the pairs of each
+    source, texel : (l,) source of each pair, and (n, 2) texel of each source
+    share : (l, 3) fraction of a source's light that a pair transmits
+    cell, first, end : (m,) packed x and y of each receiver, and the range of its pairs
     """
 
     thin: Translucency
@@ -52,7 +52,7 @@ class Weighed:
 
 @pytest.fixture(scope="module")
 def weighed(device: Device) -> Weighed:
-    """A small wedge's."""
+    """Return the pairs of a small wedge with their weights."""
     return weighed_of(device, wedge(12.0, 1.0, 4.0, cells=2))
 
 
@@ -82,7 +82,7 @@ def unpacked(words: NDArray[Any]) -> Index:
 def summed(
     device: Device, weighed: Weighed, levels: NDArray[np.float32], constants: Constants
 ) -> tuple[Floats, Floats]:
-    """(n, n, 3) and (n, n, 4) the twin's light, and the shader's with 1 where there is surface.
+    """Return the (n, n, 3) light of the twin, and the (n, n, 4) light of the shader with its coverage.
 
     levels : (2, 64, 64, 3) blurred light
     """
@@ -99,7 +99,7 @@ def summed(
     column, row = unpacked(weighed.cell).T
     for k in range(len(weighed.cell)):
         sums[row[k], column[k]] = light[weighed.first[k] : weighed.end[k]].sum(axis=0)
-    return sums, download(device, thin.light).astype(float)
+    return sums, download(device, thin.pairs.transmitted).astype(float)
 
 
 @pytest.mark.parametrize("row", [1, 1024])
@@ -121,7 +121,7 @@ def test_twin_of_what_comes_through(
 
 
 def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -> None:
-    """Sources from a millionth to a million: 14 bits of each, over the whole range of floats."""
+    """Sources from 1e-6 to 1e6 keep a relative precision of 14 bits."""
     powers = np.random.default_rng(9).uniform(-6, 6, (2, 64, 64, 3))
     twin, made = summed(device, weighed, (10**powers).astype(np.float32), ALONE)
     assert twin.max() > 1e4
@@ -134,7 +134,7 @@ def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     frame = CommandList(device)
     translucency.draw(frame, make_levels(device, 64, (BLUR.halvings,), FLOATS), BLUR, ball.thin)
     frame.submit()
-    light = download(device, ball.thin.light)
+    light = download(device, ball.thin.pairs.transmitted)
     assert (light[..., :3] == 0).all()
     assert ((light[..., 3] == 1) == ball.thin.pairs.cells.receiver_mask).all()
     assert light[..., 3].any()

@@ -1,4 +1,4 @@
-"""Each sample sees the triangle that a ray through it meets first."""
+"""Each sample sees the first triangle that a ray through it hits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GRAZING = 3e-3  # rays this near an edge, as a share of the triangle: corners sn
 
 
 def rays(scene: Scene, offset: Floats) -> tuple[Floats, Floats]:
-    """The eye and (h, w, 3) directions through the pixels at an offset in 0..1."""
+    """Return the eye, and (h, w, 3) directions through an offset (0 to 1) in each pixel."""
     camera: Camera = scene.camera
     eye = np.add(camera.position, scene.head.centre_mm)
     forward = np.subtract(camera.target, camera.position)
@@ -42,7 +42,7 @@ def rays(scene: Scene, offset: Floats) -> tuple[Floats, Floats]:
 
 
 def first_hit(head: Head, eye: Floats, ray: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Index + 1 of the nearest triangle that each ray meets, and whether no edge was close."""
+    """Return index + 1 of the nearest triangle on each ray, and whether no edge is close."""
     a, b, c = np.moveaxis(head.mesh.positions[head.mesh.triangles].astype(float), 1, 0)
     flat = ray.reshape(-1, 1, 3)
     normal = np.cross(b - a, c - a)
@@ -68,7 +68,7 @@ HEADS = {
 
 
 def view_of(head: Head, turned: bool) -> Scene:
-    """Straight on, with no pixel's centre on an edge, or from the upper right with a leaning camera."""
+    """Return a front view without pixel centres on edges, or a rolled view from the upper right."""
     camera = front_camera(head, (0.7, 0.4, 0))
     if turned:
         eye, target = place(head, (120, 80, 240)), place(head, (5, 0, 0))
@@ -79,7 +79,7 @@ def view_of(head: Head, turned: bool) -> Scene:
 def nearest(
     renderer: Renderer, scene: Scene, *, triangles: bool, compute: bool, samples: int
 ) -> list[NDArray[Any]]:
-    """Layers for the samples of a pixel by one of the two ways there are."""
+    """Return the layers for the samples of a pixel by one of the two implementations."""
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
     layers = make_layers(renderer.device, SIZE, samples, triangles=triangles, compute=compute)
     frame = CommandList(renderer.device)
@@ -116,7 +116,7 @@ def test_both_ways_find_the_same_depth(renderer: Renderer, name: str) -> None:
 
 @pytest.mark.parametrize("compute", [False, True])
 def test_a_frame_holds_no_holes(renderer: Renderer, compute: bool) -> None:
-    """Pixels that a closed ball covers are all found, those on shared edges too."""
+    """All pixels of a closed ball are covered, those on shared edges too."""
     head = head_of(uv_sphere(30.0, 64, 32))
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=24.0))
     for layer in nearest(renderer, scene, triangles=True, compute=compute, samples=4):
@@ -125,7 +125,7 @@ def test_a_frame_holds_no_holes(renderer: Renderer, compute: bool) -> None:
 
 @pytest.mark.parametrize("compute", [False, True])
 def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) -> None:
-    """A floor on which the camera stands: what lies before it is seen."""
+    """A floor below the camera is visible in front of it."""
     floor = plane(400.0)
     head = head_of(
         build_mesh(
@@ -141,7 +141,7 @@ def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) 
 
 @pytest.mark.parametrize("triangles", [False, True])
 def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool) -> None:
-    """Layers that were drawn to hold only what they are drawn with."""
+    """Layers that are drawn again hold only the new view."""
     options = {"triangles": triangles, "compute": True}
     used, fresh = (make_layers(renderer.device, SIZE, 2, **options) for _ in range(2))
     for turned, layers in ((False, used), (True, used), (True, fresh)):
@@ -156,7 +156,7 @@ def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool)
 
 @pytest.mark.parametrize("count", [1, 2, 5, 8, 64])
 def test_samples_are_even_in_both_axes(count: int) -> None:
-    """One in each of `count` columns and rows of the pixel, with the pixel's centre as their mean nearly."""
+    """Each of `count` columns and rows of the pixel has one sample, and their mean is close to the centre."""
     places = pixel_samples(count)
     assert places.shape == (count, 2) and (places >= 0).all() and (places < 1).all()
     assert sorted((places[:, 0] * count).astype(int)) == list(range(count))

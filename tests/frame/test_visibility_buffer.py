@@ -1,4 +1,4 @@
-"""The nearest surface in compute against planes in NumPy, and what is left of it in the next frame."""
+"""The visibility buffer in compute, compared with NumPy, and the absence of traces of the last frame."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STEEP = 1e-5  # rounding of depths that change by most of their range within a p
 
 
 def soup(count: int, seed: int = 3) -> Head:
-    """Triangles from far below a pixel to half of the picture, each with its own part of the maps."""
+    """Return triangles from far below a pixel to half of the picture, each with its own part of the maps."""
     rng = np.random.default_rng(seed)
     middle = rng.uniform((-70, -45, -40), (70, 45, 40), (count, 1, 3))
     side = np.exp(rng.uniform(np.log(0.2), np.log(70.0), (count, 1, 1)))
@@ -43,7 +43,7 @@ def soup(count: int, seed: int = 3) -> Head:
 
 @dataclass(frozen=True)
 class Truth:
-    """Of each sample: depth, 0 where there is nothing; triangle + 1; and whether neither is a close call."""
+    """Depth of each sample (0 for nothing), triangle + 1, and whether both are unambiguous."""
 
     depth: Floats
     triangle: NDArray[np.int64]
@@ -52,7 +52,7 @@ class Truth:
 
 @cache
 def truth_of_soup(numbers: bytes) -> Truth:
-    """Every triangle at the centre of every pixel, as a matrix sees them."""
+    """Return the nearest of all triangles at the centre of every pixel, for a matrix."""
     head, clip = SOUP, np.frombuffer(numbers).reshape(4, 4)
     corners = np.c_[head.mesh.positions.astype(float), np.ones(len(head.mesh.positions))] @ clip.T
     width, height = SIZE
@@ -72,7 +72,7 @@ def truth_of_soup(numbers: bytes) -> Truth:
 
 
 def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, samples: int) -> Any:
-    """Layers after a view was drawn into them, and its matrices."""
+    """Draw a view, and return its layers and matrices."""
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = CommandList(renderer.device)
@@ -93,9 +93,9 @@ TURNED = Camera(position=(60, 50, 280), target=(3, 2, 0), up=(0.2, 1, 0), frame_
 def test_triangles_of_all_sizes(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, what: str, groups: int, samples: int
 ) -> None:
-    """In workgroups of few and of many triangles, with a word or two for each sample."""
+    """Workgroups of few and of many triangles agree, with one or two words per sample."""
     monkeypatch.setattr(visibility_buffer, "_GROUPS", groups)
-    monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if "after" in what else 0.1)
+    monkeypatch.setattr(visibility_buffer, "_MAX_DEPTH_STEP_MM", 0.0 if "after" in what else 0.1)
     layers = make_layers(renderer.device, SIZE, samples, triangles=what != "depth", compute=True)
     made, clips = shown(layers, renderer, SOUP, TURNED, samples)
     for layer, clip in zip(made, clips, strict=True):
@@ -109,7 +109,7 @@ def test_triangles_of_all_sizes(
 
 
 def test_more_blocks_than_a_workgroup_lists(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """128 triangles of one workgroup that cover 11 blocks each, and it lists 1024."""
+    """A workgroup of 128 triangles with 11 blocks each exceeds its list of 1024."""
     monkeypatch.setattr(visibility_buffer, "_GROUPS", 1)
     monkeypatch.setattr(visibility_buffer, "_RUN", 128)
     head = head_of(plane(80.0, 8))
@@ -126,8 +126,8 @@ BALL = head_of(uv_sphere(12.0, 24, 12))
 def test_tiles_hold_only_the_last_view(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, triangles: bool, apart: bool
 ) -> None:
-    """A ball that leaves tiles and comes back leaves nothing behind, nor do layers that are drawn no more."""
-    monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if apart else 0.1)
+    """A ball that leaves tiles and returns leaves no trace, nor do layers that are no longer drawn."""
+    monkeypatch.setattr(visibility_buffer, "_MAX_DEPTH_STEP_MM", 0.0 if apart else 0.1)
     options = {"triangles": triangles, "compute": True}
     used = make_layers(renderer.device, SIZE, 2, **options)
     for aside, samples in ((40, 2), (-40, 2), (-40, 2), (5, 1), (40, 2), (500, 2)):
@@ -139,7 +139,7 @@ def test_tiles_hold_only_the_last_view(
 
 
 def test_steps_of_depth() -> None:
-    """How far apart two depths are that differ by little where depths are coarsest, as if all were."""
+    """The depth range follows from the coarsest step of depth."""
     near, far = 250.0, 640.0
     scale = near / (far - near)
     eye = np.array([[3.3, 0, 0, 0], [0, 5, 0, 0], [0, 0, -scale, scale * (far - 5)], [0, 0, 1, 5]])
@@ -151,10 +151,10 @@ def test_steps_of_depth() -> None:
     assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 
-@pytest.mark.filterwarnings("ignore:camera. expected a place around the head")
+@pytest.mark.filterwarnings("ignore:camera. expected a position outside the head")
 @pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
 def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: Any) -> None:
-    """No triangle goes on beyond the edge opposite a corner beside the eye: the rasteriser's silhouettes."""
+    """Compare with the silhouettes of the rasteriser for triangles with a corner beside the eye."""
     ball = head_of(uv_sphere(60.0, 24, 12))
     target = tuple(np.add(eye, ahead).tolist())
     camera = Camera(position=eye, target=target, up=(0.1, 1, 0.2), frame_mm=60.0)

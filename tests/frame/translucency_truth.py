@@ -1,4 +1,4 @@
-"""A sheet with a rolled rim, and light from behind summed by straight lines."""
+"""A sheet with a rolled rim, and light from behind summed along straight lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def hook(thick: float = 2.2, bend: float = 4.5, length: float = 36.0) -> Mesh:
-    """A sheet whose edge rolls over towards +Z like the helix of an ear, along Y; its other edge is open."""
+    """Return a sheet along Y whose edge rolls over towards +Z like the helix of an ear."""
     turn = np.linspace(0.0, np.pi, 25)
     ahead = np.column_stack([np.linspace(-16.0, 0.0, 17)[:-1], np.zeros(16)])
     round_ = np.column_stack([bend * np.sin(turn), bend * (1 - np.cos(turn))])
@@ -41,7 +41,7 @@ def hook(thick: float = 2.2, bend: float = 4.5, length: float = 36.0) -> Mesh:
 
 
 def straight(mesh: Mesh, places: Floats, blurred: GaussianSum) -> Floats:
-    """Red light from behind, summed by straight lines."""
+    """Return red light from behind, summed along straight lines."""
 
     def light(at: MeshPoints) -> Floats:
         normals = at.interpolate(mesh, mesh.normals)

@@ -1,4 +1,4 @@
-"""Translucency once more in numpy float64: places, pairs by brute force, and what passes between them."""
+"""Twin of translucency in NumPy float64: points, pairs by brute force, and transmitted light."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ INSIDE = 0.1
 
 @dataclass(frozen=True)
 class Points:
-    """Places in the cells of an atlas.
+    """Points of the cells of an atlas.
 
     cell, texel : (n, 2) x, y
     position, normal : (n, 3) [mm]
-    area_mm2 : (n,) of the surface that each stands for; 0 where light is only taken
+    area_mm2 : (n,) area of the surface that each stands for; 0 for receivers
     """
 
     cell: Index
@@ -49,7 +49,7 @@ class Points:
 
 
 def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = None) -> dict[str, Any]:
-    """What shaders read of a mesh and its atlas, also where its points are elsewhere."""
+    """Return the resources of a mesh and its atlas, optionally for other positions of its points."""
     head, textures = Head("test", mesh, Maps()), upload_atlas(device, atlas)
     tables = shape_tables(device, head)
     shape = evaluate_rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
@@ -60,12 +60,12 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
 
 
 def pairs_on(device: Device, surface: dict[str, Any], atlas: Atlas, cells: Cells) -> PairBuffers:
-    """The translucent pairs of a surface."""
+    """Return the translucent pairs of a surface."""
     return find_pairs(device, surface, atlas, cells)
 
 
 def interpolated(mesh: Mesh, atlas: Atlas, x: Index, y: Index, values: NDArray[Any]) -> Floats:
-    """(n, k) of a (v, k) corner attribute at texels."""
+    """Return (n, k) a (v, k) vertex attribute interpolated at texels."""
     b = atlas.barycentric[y, x] / 65535.0
     weights = np.column_stack([1.0 - b.sum(axis=1), b])
     corners = values[mesh.triangles[atlas.triangle[y, x]]].astype(np.float64)
@@ -77,7 +77,7 @@ def unit(vectors: Floats) -> Floats:
 
 
 def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
-    """The middles of the cells that hold texels of their own, or lie beside such, in order."""
+    """Return the receivers: middles of cells with texels of their own or beside such cells, in order."""
     own = np.zeros((side + 2, side + 2), bool)
     y, x = np.stack(np.nonzero(atlas.lit)) * side // atlas.size
     for row, column in np.ndindex(3, 3):
@@ -91,7 +91,7 @@ def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
 
 
 def giving(mesh: Mesh, atlas: Atlas, side: int) -> Points:
-    """The cells with surface of their own: its middle and area, and the normal at their middle texel."""
+    """Return the sources: cells with surface of their own, with its centre, area and normal."""
     y, x = np.nonzero(atlas.lit)
     corners = atlas.corner_uv[atlas.triangle[y, x]].astype(float) * atlas.size
     b = atlas.barycentric[y, x] / 65535.0
@@ -116,7 +116,7 @@ def giving(mesh: Mesh, atlas: Atlas, side: int) -> Points:
 
 
 def rise(start: float, end: float, x: Floats) -> Floats:
-    """From 0 at the start to 1 at the end, smooth at both."""
+    """Return a smooth step from 0 at `start` to 1 at `end`."""
     t = np.clip((x - start) / (end - start), 0, 1)
     return np.asarray(t * t * (3 - 2 * t))
 
@@ -127,7 +127,7 @@ def share_of(cosine: Floats, inward: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Lie:
-    """How sources lie to receivers, (m, n) each: cosine of normals, mean one to the inward ones, and [mm]."""
+    """Geometry of pairs, (m, n) each: cosine of the normals, mean inward cosine, lengths [mm]."""
 
     cosine: Floats
     inward: Floats
@@ -139,7 +139,7 @@ class Lie:
 
 
 def lie(taken: Points, given: Points) -> Lie:
-    """Of all receivers and sources."""
+    """Return the geometry of all pairs of receivers and sources."""
     to = given.position[None] - taken.position[:, None]
     square, depth = (to**2).sum(-1), np.einsum("mnk,nk->mn", to, given.normal)
     inward = 0.5 * (depth - np.einsum("mnk,mk->mn", to, taken.normal)) / np.sqrt(np.maximum(square, 1e-12))
@@ -147,14 +147,17 @@ def lie(taken: Points, given: Points) -> Lie:
 
 
 def passes(found: Lie, area: Floats, cells: Cells) -> Floats:
-    """(m, n) light that passes at most, over the least that counts; 0 out of reach."""
+    """Return (m, n) the largest transmitted light over the least relevant one; 0 out of reach."""
     share, v = share_of(found.cosine - TURN, found.inward + TURN), cells.max_sigma_mm**2
     light = share * area * np.exp(-0.5 * found.square / v) / (LEAST * 2 * np.pi * v)
     return np.where(found.square < cells.radius_mm**2, light, 0.0)
 
 
 def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
-    """(m, n) distance in the map, infinite where no blur leads; places `same` texels apart are one."""
+    """Return (m, n) distances along the surface, infinite where no blur leads.
+
+    same : distance of positions in the atlas that count as one [texel]
+    """
     corners = atlas.corner_uv[np.maximum(atlas.triangle, 0)].astype(float)
     place = np.einsum("yxk,yxkc->yxc", atlas.weights(), corners) * atlas.size - 0.5
     away = np.full((len(taken.texel), len(given.texel)), np.inf)
@@ -173,7 +176,7 @@ def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
 
 
 def far_of(atlas: Atlas, taken: Points, du: NDArray[Any], dv: NDArray[Any]) -> Floats:
-    """(m,) distances along the surface from receivers to places in the map [mm]."""
+    """Return (m,) distances along the surface from receivers to positions in the atlas [mm]."""
     rx, ry = taken.texel.T
     su, sv = np.moveaxis(atlas.stretch[ry, rx].astype(float), -1, 0)
     a, b = du / su, dv / sv
@@ -181,10 +184,10 @@ def far_of(atlas: Atlas, taken: Points, du: NDArray[Any], dv: NDArray[Any]) -> F
 
 
 def passed(found: Lie, far: Floats, area: Floats, cells: Cells, variance: Floats, weight: Floats) -> Floats:
-    """(..., 3) share of a source's light: straight through, less what the blur along the surface brings.
+    """Return (..., 3) weights of pairs: straight transmission without the blur along the surface.
 
-    far, area : (...,) along the surface [mm], of the source [mm2]
-    variance : of the blurred levels, the first smooth one of which the source shows
+    far, area : (...,) distance along the surface [mm], and area of the source [mm2]
+    variance : of the blurred levels, whose first smooth one sources sample
     """
     radius, cell = cells.radius_mm, cells.cell_mm
     smooth = np.flatnonzero(variance >= (0.45 * cell) ** 2)
@@ -201,6 +204,6 @@ def passed(found: Lie, far: Floats, area: Floats, cells: Cells, variance: Floats
 
 
 def decoded(words: NDArray[np.uint32]) -> Floats:
-    """(n, 3) of shares with one exponent."""
+    """Return (n, 3) weights from words with a common exponent."""
     parts = np.stack([words & 511, (words >> 9) & 511, (words >> 18) & 511], axis=-1)
     return np.asarray(parts * np.exp2((words >> 27).astype(float) - 24)[:, None])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.base.reading import checked_path
 from dermis.formats.maps import mixture_map
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.diffusion.pyramid import PyramidLevels
 from dermis.frame.programs import FLOATS, HALVES, TILE, program

@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.shape.mesh import HeadGeometry, upload_triangles
 from dermis.frame.features.visibility.layers import ViewLayers, draw_layers, make_layers
 from dermis.frame.programs import TILE, program, workgroup_grid

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.translucency.cells import Cells
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.lights.records import oblique_constants
