@@ -205,7 +205,7 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
         "processor_seconds": time.process_time() - began,
         "frames": found.frames,
         "residual": found.residual,
-        "not_determined": list(found.certainty.held),
+        "not_determined": list(found.uncertainty.undetermined),
     }
 
 
@@ -213,7 +213,7 @@ def _against(one: Case, found: FitResult) -> JsonObject:
     figures: JsonObject = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
-        figures[name] = {"true": true, "found": found.values[name], "relative_sd": found.certainty.sd[name]}
+        figures[name] = {"true": true, "found": found.values[name], "relative_sd": found.uncertainty.sd[name]}
     way = found.suns[0][0]
     figures["rho_s"] = found.values["rho_s"]
     figures["sun_degrees"] = float(np.degrees(np.arccos(np.clip(way @ one.towards, -1.0, 1.0))))

@@ -20,7 +20,13 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings, pose_at_moment, with_test_rig
+from dermis.apps.validation.benchmarks.cases import (
+    Case,
+    case_scenes,
+    case_settings,
+    pose_at_moment,
+    with_test_rig,
+)
 from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, sequence_ms, stage_ms
 from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file, check_output

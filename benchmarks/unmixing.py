@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
-from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model, solve_pigments, inverse_variances
+from dermis.apps.inverse.unmixing.skin_model import (
+    SkinModel,
+    ThirdUnknown,
+    inverse_variances,
+    skin_model,
+    solve_pigments,
+)
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.apps.validation.pages import JsonObject, write_results

@@ -200,7 +200,9 @@ MOTIONS: dict[str, Motion] = {
         lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
     ),
-    "expression": Motion(_with_targets, lambda state, k: state.with_pose(pose_at_moment(state.scene.head, k))),
+    "expression": Motion(
+        _with_targets, lambda state, k: state.with_pose(pose_at_moment(state.scene.head, k))
+    ),
     "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 

@@ -27,8 +27,8 @@ ETA = 1.4
 ENTRIES = ("straight", "skin")
 PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
 HEADER = """\
-# quantity: fraction of the light that leaves a half-space along its normal and entered within a radius of that
-#   point: isotropic random walks of Cycles, of at most {most} steps, that leave an index-matched surface.
+# quantity: fraction of the light that leaves a half-space along its normal and entered within a radius of
+#   that point: isotropic random walks of Cycles, of at most {most} steps, leaving an index-matched surface.
 #   entry: first direction of walks, "straight" down, or that of RANDOM_WALK_SKIN: half of them diffuse, half
 #   refracted at index {eta} by facets of GGX with roughness 1. root: sqrt(1 - single-scattering albedo)
 # unit: radius in mean free paths; within: dimensionless

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import dermis
-from dermis.apps.validation.benchmarks.cases import test_pose, with_test_rig
+from dermis.apps.validation.benchmarks.cases import pose_at_moment, with_test_rig
 from dermis.apps.validation.pages import template_path
 from dermis.base.command_line import run_script
 from dermis.formats.samples import is_available
@@ -23,7 +23,7 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
     moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
     rough = scene.skin.model_copy(update={"roughness": 0.4})
     return {
-        "a pose": (replace(scene, pose=test_pose(scene.head, 1)), SETTINGS),
+        "a pose": (replace(scene, pose=pose_at_moment(scene.head, 1)), SETTINGS),
         "camera": (replace(scene, camera=dermis.three_quarter(scene.head)), SETTINGS),
         "a light": (replace(scene, lights=(moved, *others)), SETTINGS),
         "exposure": (scene, SETTINGS.model_copy(update={"exposure": 2.0})),

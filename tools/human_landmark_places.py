@@ -11,7 +11,7 @@ from dermis.human.hair import brows
 from dermis.human.model import MATERIALS
 from dermis.human.regions.average import AVERAGE_HUMAN, average_head, part_quads
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
-from dermis.mesh.strands import Roots, corners, finer_roots, weights
+from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -45,8 +45,8 @@ class Surface:
         quads = len(average_head().mesh.quads)
         self.quad = np.repeat(np.arange(quads), len(steps))
         self.place = np.tile(steps, (quads, 1)).astype(np.float32)
-        fine = finer_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.place), LEVELS)
-        self._corner, self._share = corners(self.head.mesh, fine.quad), weights(fine.place)
+        fine = refine_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.place), LEVELS)
+        self._corner, self._share = quad_corners(self.head.mesh, fine.quad), quad_weights(fine.position)
         self.points_mm = self.head.mesh.points_mm
         self.at_mm = self._of(self.points_mm)
         self.lips, self.mouth, self.lids = self._of(self._fields()).T

@@ -11,7 +11,7 @@ from dermis.atlas.unwrap.charts import smooth_charts
 from dermis.atlas.unwrap.flatten import flatten, singular_values
 from dermis.atlas.unwrap.seams import border_edges
 from dermis.atlas.unwrap.unwrap import pack_charts
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -45,7 +45,7 @@ def human_layout(
         pieces.append(own)
         points = np.unique(corner[own])
         flat[points] = _flattened(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
-    outlines = [flat[border_edges(halves(corner[own]))[0]] for own in pieces]
+    outlines = [flat[border_edges(split_quads(corner[own]))[0]] for own in pieces]
     scale, offset = pack_charts(outlines, PADDING)
     for own, move in zip(pieces, offset, strict=True):
         points = np.unique(corner[own])
@@ -58,7 +58,7 @@ def _flattened(places: Doubles, quads: Index, corner: Index, uv: Doubles, group:
     """Return the (v, 2) flattened corners of one island, y up [mm times density]."""
     made = np.zeros((int(corner.max()) + 1, 2))
     used, local = np.unique(corner, return_inverse=True)
-    triangles = halves(local.reshape(-1, 4))
+    triangles = split_quads(local.reshape(-1, 4))
     points = np.zeros((len(used), 3))
     points[local.ravel()] = places[quads.ravel()]
     middle = points[triangles].mean(axis=1)
@@ -82,7 +82,7 @@ def _with_seams(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tu
     island, middle = _islands(corner)[corner[:, 0]], places[quads].mean(axis=1)
     head = np.flatnonzero(island == island[middle[:, 1].argmax()])
     behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
-    behind = smooth_charts(np.repeat(behind, 2).astype(np.int64), halves(quads[head]))[::2] > 0
+    behind = smooth_charts(np.repeat(behind, 2).astype(np.int64), split_quads(quads[head]))[::2] > 0
     far, made = head[behind], corner.copy()
     used, again = np.unique(made[far], return_inverse=True)
     made[far] = len(uv) + again.reshape(-1, 4)

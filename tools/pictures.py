@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from dermis.apps.gallery.panels import sheet
+from dermis.apps.gallery.panels import panel_sheet
 from dermis.apps.gallery.script import encode_webp, find_scripts
 from dermis.apps.gallery.studio import Studio
 from dermis.base.command_line import run_script
@@ -20,7 +20,7 @@ def main(*names: str) -> None:
     """Render all pictures, or those that are named."""
     studio = Studio("lee_perry_smith")
     for script in find_scripts(names):
-        picture = Image.fromarray(sheet(script.draw(studio), script.columns))
+        picture = Image.fromarray(panel_sheet(script.draw(studio), script.columns))
         picture.thumbnail((WIDEST, 4 * WIDEST), Image.Resampling.LANCZOS)
         (FOLDER / f"{script.name}.webp").write_bytes(encode_webp(np.asarray(picture)))
 

@@ -24,7 +24,7 @@ KINDS = {
 def test_words_are_about_fields_and_choices_that_exist(kind: type[FrozenModel]) -> None:
     for name, style in KINDS[kind].items():
         assert name in kind.model_fields
-        assert set(style.display_names) <= set(field_choices(kind, name)), name
+        assert set(style.names) <= set(field_choices(kind, name)), name
 
 
 def test_words_are_about_kinds_of_light_that_exist() -> None:

@@ -41,9 +41,8 @@ def main() -> None:
                 from dermis.base.command_line import print_failure
 
                 reason = f"writing failed ({error.strerror})"
-                code = print_failure(
-                    "dermis", f"stdout: expected writable output, but {reason}. Redirect it."
-                )
+                message = f"stdout: expected writable output, but {reason}. Redirect it."
+                code = print_failure("dermis", message)
         except KeyboardInterrupt:
             code = _EXIT_INTERRUPTED
             streams.discard_stdout()

@@ -208,9 +208,8 @@ def _summary_line(report: Options) -> str:
 def _list_names(name: str, options: SceneOptions, as_json: bool) -> int:
     with spinner("loading"):
         names = animatable_names(name, assemble_scene(name, options)[0].head)
-    print_report(
-        as_json, names, lambda: (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
-    )
+    lines = (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
+    print_report(as_json, names, lambda: lines)
     return 0
 
 

@@ -190,9 +190,7 @@ def _dask_cluster(address: str | None, file: Path | None, adapter: str, local_op
 
     if address is not None and file is not None:
         refuse("--cluster", "no --scheduler", "both are given", "Remove one of them")
-    refuse_options(
-        local_options, None, "with a dask cluster", "Remove it and start more dask workers instead"
-    )
+    refuse_options(local_options, None, "with a dask cluster", "Remove it and start more dask workers")
     return DaskCluster(address, file, adapter)
 
 
@@ -205,15 +203,12 @@ def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
         print_json({**values, "failed": failed, "whole": report.is_complete})
         return
     reused = f" ({report.skipped} reused)" if report.skipped else ""
-    lines = [
-        f"{folder}  {report.images:,} images in {report.shards:,} shards{reused}  {report.seconds:.1f} s"
-        + (f", {rate:.3g} images/s" if rate else "")
-    ]
+    speed = f", {rate:.3g} images/s" if rate else ""
+    counts = f"{report.images:,} images in {report.shards:,} shards{reused}"
+    lines = [f"{folder}  {counts}  {report.seconds:.1f} s{speed}"]
     lines += [f"skipped: image {failure.number}: {failure.reason}" for failure in report.failed]
     if not report.is_complete:
-        lines.append(
-            "shards of other parts are missing: index and data sheet are written with the last shard"
-        )
+        lines.append("shards of other parts are missing: the last one writes index and data sheet")
     print_lines(*lines)
 
 

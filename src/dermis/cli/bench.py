@@ -81,22 +81,14 @@ def bench(
 
 
 def _report_lines(benchmark: Benchmark) -> list[str]:
-    from dermis.apps.validation.benchmarks.report import (
-        COLUMNS,
-        cells,
-        published_text,
-        skipped_lines,
-        stage_table,
-        summary,
-    )
+    from dermis.apps.validation.benchmarks import report
 
-    rows, stages = (
-        _align_columns([COLUMNS, *map(cells, benchmark.rows)]),
-        _align_columns(stage_table(benchmark)),
-    )
+    rows = _align_columns([report.COLUMNS, *map(report.cells, benchmark.rows)])
+    stages = _align_columns(report.stage_table(benchmark))
     default_lines = ["", "the default frame:", *stages] if stages else []
-    published_lines = ["", text] if (text := published_text(benchmark)) else []
-    return [summary(benchmark), "", *rows, *skipped_lines(benchmark), *default_lines, *published_lines]
+    published_lines = ["", text] if (text := report.published_text(benchmark)) else []
+    table_lines = [*rows, *report.skipped_lines(benchmark)]
+    return [report.summary(benchmark), "", *table_lines, *default_lines, *published_lines]
 
 
 def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:

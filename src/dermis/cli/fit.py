@@ -81,12 +81,10 @@ def fit(
 
     colour = white if white == "specular" else parse_colour(white, "--white")
     check_folder(output, SUMMARY)
-    options: Options = {"suns": suns, "exposure": exposure, "white": colour, "noise": noise}
-    options |= {"side": side, "atlas": atlas}
+    options: Options = {"camera": camera, "landmarks": landmarks, "adapter": adapter, "suns": suns}
+    options |= {"exposure": exposure, "white": colour, "noise": noise, "side": side, "atlas": atlas}
     with progress_bar("fitting") as report_progress:
-        result = fitted(
-            photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=report_progress, **options
-        )
+        result = fitted(photo, head, progress=report_progress, **options)
     _report(result, save_fit(output, result), as_json)
     return 0
 
@@ -100,11 +98,9 @@ def _report(result: FitResult, written: list[Path], as_json: bool) -> None:
     for name, value in summary["skin"].items():
         lines.append(f"  {name:10} {value['value']:8.4f}  ± {100 * value['relative_sd']:.0f} %")
     for k, sun in enumerate(summary["suns"], start=1):
-        direction, sd_degrees = ", ".join(f"{x:.2f}" for x in sun["towards"]), max(sun["sd_degrees"])
-        lines.append(
-            f"  sun {k}      towards {direction} (± {sd_degrees:.1f} degrees), "
-            f"irradiance {sun['irradiance']:.3g}"
-        )
+        direction, sd = ", ".join(f"{x:.2f}" for x in sun["towards"]), max(sun["sd_degrees"])
+        light = f"(± {sd:.1f} degrees), irradiance {sun['irradiance']:.3g}"
+        lines.append(f"  sun {k}      towards {direction} {light}")
     lines.append(f"  sky        mean radiance {summary['around']['mean_radiance']:.3g}")
     lines.append(f"  white      {', '.join(f'{x:.3f}' for x in summary['white'])}")
     lines.append(f"  median difference of photograph and fit {100 * summary['residual']:.1f} %")

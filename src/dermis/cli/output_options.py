@@ -143,17 +143,10 @@ def _observation_json(observation: Observation) -> dict[str, object]:
 
 
 def _landmark_rows(landmarks: ProjectedLandmarks) -> list[dict[str, object]]:
-    rows = zip(
-        landmarks.names,
-        landmarks.pixels.tolist(),
-        landmarks.positions_mm.tolist(),
-        landmarks.visible.tolist(),
-        strict=True,
-    )
-    return [
-        {"name": name, "pixel": pixel, "position_mm": position, "visible": visible}
-        for name, pixel, position, visible in rows
-    ]
+    positions, visible = landmarks.positions_mm.tolist(), landmarks.visible.tolist()
+    rows = zip(landmarks.names, landmarks.pixels.tolist(), positions, visible, strict=True)
+    keys = "name", "pixel", "position_mm", "visible"
+    return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
 WriteFrame = Callable[[int, "PlaneArray"], None]

@@ -31,10 +31,8 @@ def _default_pigments() -> dict[str, str]:
     """Return the default of each pigment as help text, with the values of named skins that differ from it."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
-        default, values_of_skins = (
-            getattr(DEFAULT_SKIN, field),
-            {name: getattr(skin, field) for name, skin in SKINS.items()},
-        )
+        default = getattr(DEFAULT_SKIN, field)
+        values_of_skins = {name: getattr(skin, field) for name, skin in SKINS.items()}
         different = [f"{name} {value:g}" for name, value in values_of_skins.items() if value != default]
         defaults[field] = ", ".join([f"{default:g}", *different])
     return defaults

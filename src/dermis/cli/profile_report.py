@@ -122,10 +122,8 @@ class Report:
     def lines(self) -> list[str]:
         """Return the lines of the report as text."""
         radial, fit = self.radial, self.fit
-        lines = [
-            f"{radial.name}, model {radial.model}",
-            f"total      {_format_row(radial.total)}  {self._normalisation()}",
-        ]
+        total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
+        lines = [f"{radial.name}, model {radial.model}", total]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
                 path = _format_row(layer.mean_free_path_mm)
@@ -216,8 +214,9 @@ class Report:
         """Return the (n, 3) light transmitted through the given thicknesses, by method of computation [-]."""
         if not self.through_mm:
             return {}
-        colours = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}
-        return colours if self.tissue is None else colours | {"slab": self.tissue.through(self.through_mm)}
+        gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}
+        tissue = self.tissue
+        return gaussians | ({"slab": tissue.transmittance(self.through_mm)} if tissue else {})
 
 
 _CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
@@ -267,10 +266,8 @@ def _plot_spectra(axes: Axes, report: Report) -> None:
     right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
     for layer, colour in zip(report.tissue.medium.layers, _LAYER_COLOURS, strict=False):
         right.plot(WAVELENGTHS_NM, layer.sigma_a, color=colour, linewidth=1.0, label=f"µa, {layer.name}")
-        label = f"µs′, {layer.name}"
-        right.plot(
-            WAVELENGTHS_NM, layer.sigma_s_prime, color=colour, linewidth=1.0, linestyle=_DASHES, label=label
-        )
+        dashed: dict[str, Any] = {"linestyle": _DASHES, "label": f"µs′, {layer.name}"}
+        right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=colour, linewidth=1.0, **dashed)
     lines = [*axes.get_lines(), *right.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, fontsize=7, **_LEGEND_ABOVE)
 
@@ -279,9 +276,8 @@ def _add_legend(figure: Figure, axes: Axes) -> None:
     """Add a legend below the plot with one column per channel."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     by_channel = sorted(entries, key=lambda entry: _CHANNEL_NAMES.index(entry[1].partition(",")[0]))
-    figure.legend(
-        *zip(*by_channel, strict=True), loc="outside lower center", ncols=3, frameon=False, fontsize=8
-    )
+    style: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "frameon": False, "fontsize": 8}
+    figure.legend(*zip(*by_channel, strict=True), **style)
 
 
 def _plot_curves(axes: Axes, report: Report) -> float:

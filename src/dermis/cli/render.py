@@ -157,9 +157,7 @@ def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> No
         effect = "is rendered as a light" if suns == 1 else "are rendered as lights"
         note(f"note: {peaks} of {scene.environment.name} {effect} with shadows")
     if settings.gamma == "wrong":
-        note(
-            "note: --gamma wrong computes light with encoded colours, which is an error: for comparison only"
-        )
+        note("note: --gamma wrong computes light with encoded colours, an error, for comparison only")
 
 
 def _note_clipped(rendered: RenderedFrame) -> None:

@@ -109,9 +109,8 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     if weights or bone_angles:
         from dermis.mesh.pose import merge_poses
 
-        scene = replace(
-            scene, pose=merge_poses(pose_from_options(weights, bone_angles, scene.head, name), scene.pose)
-        )
+        pose = pose_from_options(weights, bone_angles, scene.head, name)
+        scene = replace(scene, pose=merge_poses(pose, scene.pose))
     environment = _merge_environment(scene.environment, options.environment)
     assembled = Scene(
         scene.head,
@@ -123,9 +122,8 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     )
     if options.look_at is not None:
         assembled = replace(assembled, pose=pose_with_gaze(options.look_at, assembled))
-    final_settings = Settings(
-        **{**PHOTOGRAPHIC_SETTINGS, **settings.model_dump(exclude_unset=True), **options.settings}
-    )
+    set_values = settings.model_dump(exclude_unset=True) | options.settings
+    final_settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **set_values})
     _note_profile_map(assembled.skin, final_settings)
     return assembled, final_settings
 
@@ -177,9 +175,7 @@ def _base_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     from dermis.scene.smoothness import SmoothIn
 
     if Path(name).suffix.lower() == ".toml":
-        refuse_options(
-            options.head, HEAD_OPTION_NAMES, "with a scene file", "Write it into the file's [head]"
-        )
+        refuse_options(options.head, HEAD_OPTION_NAMES, "with a scene file", "Set it in the file's [head]")
         return load_scene(Path(name), camera=options.camera, size=options.settings.get("size"))
     region_options = {"regions": NO_REGIONS} if options.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **region_options, **options.head})

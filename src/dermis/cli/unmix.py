@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_json, print_lines, progress_bar
-from dermis.cli.options import AdapterOption, Flag, JsonOption, OutputPath, drop_none
+from dermis.cli.options import AdapterOption, Flag, JsonOption, Options, OutputPath, drop_none
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
@@ -94,15 +94,8 @@ def unmix(
     change = _parse_change(melanin, blood, oxygen, eumelanin)
     skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
     with progress_bar("unmixing") as report_progress:
-        result = unmixed(
-            colour_map,
-            skin=skin,
-            third=find,
-            noise=noise,
-            shading=shading,
-            adapter=adapter,
-            told=report_progress,
-        )
+        options: Options = {"third": find, "noise": noise, "shading": shading, "adapter": adapter}
+        result = unmixed(colour_map, skin=skin, progress=report_progress, **options)
     recoloured = None if change is None else result.recoloured(change, adapter)
     written = save_maps(output, result, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:

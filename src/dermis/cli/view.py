@@ -83,15 +83,8 @@ def view(
 
     window = scene.settings.get("size", _WINDOW)
     if browser:
-        serve(
-            load,
-            adapter,
-            window,
-            host or _HOST,
-            _PORT if port is None else port,
-            _print_url,
-            require_token=token,
-        )
+        address = host or _HOST, _PORT if port is None else port
+        serve(load, adapter, window, *address, _print_url, require_token=token)
     else:
         with spinner("loading"):
             state, motion_clip = load()

@@ -170,25 +170,14 @@ class ViewerState:
 def states_equal(a: ViewerState, b: ViewerState) -> bool:
     """Return whether two states are equal; heads are compared by identity."""
 
-    def comparable_values(state: ViewerState) -> tuple[object, ...]:
+    def values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
         scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (
-            *scene_values,
-            state.settings,
-            state.table,
-            state.view,
-            state.rig,
-            state.atlas_view,
-            state.seconds,
-        )
+        view_values = state.view, state.rig, state.atlas_view, state.seconds
+        return *scene_values, state.settings, state.table, *view_values
 
-    first, second = a.scene, b.scene
-    return (
-        first.head is second.head
-        and poses_equal(first.pose, second.pose)
-        and comparable_values(a) == comparable_values(b)
-    )
+    is_head_same = a.scene.head is b.scene.head and poses_equal(a.scene.pose, b.scene.pose)
+    return is_head_same and values(a) == values(b)
 
 
 def validated_copy(values: P, **fields: object) -> P:
@@ -223,12 +212,13 @@ def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[s
     """
     if isinstance(subject, ViewerState):
         return subject
+    settings = Settings(**PHOTOGRAPHIC_SETTINGS)
     if isinstance(subject, Human):
-        return ViewerState(Scene(subject.head(), skin=skin_of(subject)), Settings(**PHOTOGRAPHIC_SETTINGS))
+        return ViewerState(Scene(subject.head(), skin=skin_of(subject)), settings)
     if isinstance(subject, Head):
-        return ViewerState(Scene(subject), Settings(**PHOTOGRAPHIC_SETTINGS))
+        return ViewerState(Scene(subject), settings)
     if isinstance(subject, Scene):
-        return ViewerState(subject, Settings(**PHOTOGRAPHIC_SETTINGS), rig="")
+        return ViewerState(subject, settings, rig="")
     if not isinstance(subject, str | os.PathLike):
         actual = f"got a {type(subject).__name__}"
         refuse("view", "a head, a person, a scene or a name", actual, "Try dermis.Human()")

@@ -74,10 +74,8 @@ class QualityController:
 
     def record_frame_time(self, frame_ms: float) -> None:
         """Record the time of the last frame in motion, without preparation [ms]."""
-        is_slow, is_fast = (
-            frame_ms > _SLOW_RATIO * self._budget_ms,
-            frame_ms < _FAST_RATIO * self._budget_ms,
-        )
+        is_slow = frame_ms > _SLOW_RATIO * self._budget_ms
+        is_fast = frame_ms < _FAST_RATIO * self._budget_ms
         step = is_slow - is_fast
         self._streak = self._streak + step if step * self._streak >= 0 else step
         if not step:
@@ -183,11 +181,8 @@ class ViewRenderer:
         """
         self._size = size
         settings = self._settings(state, size, moving)
-        is_cached = (
-            self._image_inputs
-            and self._image_inputs[0] is state
-            and self._image_inputs[1:] == (camera, settings)
-        )
+        inputs = self._image_inputs
+        is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
             return self.last_image
         last_rendered = self.rendered

@@ -84,9 +84,8 @@ class IntermediateViews:
         inputs = self._renderer.prepare(scene, settings, side)
         layer, scale = self._atlas_layer(inputs, atlas_view.layer, settings)
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
-        record = self._atlas_shader.record(
-            "AtlasView", quantity=_QUANTITIES.get(atlas_view.layer, 0), **values
-        )
+        quantity = _QUANTITIES.get(atlas_view.layer, 0)
+        record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
     def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:

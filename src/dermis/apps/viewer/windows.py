@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import signal
-import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,7 +23,6 @@ from dermis.scene.model import Scene
 Size = tuple[int, int]
 _TITLE = "dermis"
 _MAX_FPS = 60
-_SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
 
 def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
@@ -89,7 +85,7 @@ def serve(
     from dermis.apps.viewer.browser.server import bind, make_server, prepare_viewer, run_server
 
     listener, address = bind(host, port, require_token=require_token)
-    with _exit_on_signals(), listener, TemporaryDirectory(prefix="dermis-") as folder:
+    with listener, TemporaryDirectory(prefix="dermis-") as folder:
         canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
         canvas._size_info.set_physical_size(*size, 1.0)
         http_server = make_server(address, canvas, Path(folder))
@@ -176,26 +172,6 @@ def _load_backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
             advice = f'Install it: pip install "dermis[{extra}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", advice)
     return importlib.import_module(f"rendercanvas.{name}")
-
-
-@contextmanager
-def _exit_on_signals() -> Iterator[None]:
-    """Exit cleanly after SIGTERM and SIGHUP, as after Ctrl+C."""
-    replaced = {}
-    is_main = threading.current_thread() is threading.main_thread()  # only the main thread handles signals
-    for name in ("SIGTERM", "SIGHUP") if is_main else ():
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-            replaced[number] = signal.signal(number, _exit)
-    try:
-        yield
-    finally:
-        for number, handler in replaced.items():
-            signal.signal(number, handler)
-
-
-def _exit(number: int, _: object) -> None:
-    sys.exit(_SIGNAL_EXIT_BASE + number)
 
 
 def _refuse_display(reason: object) -> NoReturn:

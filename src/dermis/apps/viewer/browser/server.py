@@ -192,15 +192,11 @@ def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uv
     from rendercanvas.http import asgi, resources
 
     package_folder = Path(__file__).parent
-    resources["index.html"] = (
-        "text/html; charset=utf-8",
-        (package_folder / "page.html").read_text(encoding="utf-8"),
-    )
+    page = (package_folder / "page.html").read_text(encoding="utf-8")
+    resources["index.html"] = "text/html; charset=utf-8", page
     for name, content_type in _PAGE_FILES.items():
-        resources[name] = (
-            f"text/{content_type}; charset=utf-8",
-            (package_folder / name).read_text(encoding="utf-8"),
-        )
+        text = (package_folder / name).read_text(encoding="utf-8")
+        resources[name] = f"text/{content_type}; charset=utf-8", text
     config = uvicorn.Config(
         RequestFilter(Uploads(asgi, canvas, upload_folder), address.token, f"dermis-{address.port}"),
         http=LimitedConnection,

@@ -66,9 +66,7 @@ class Uploads:
         """Return the suffix of the file, one of `HEAD_FILES`, and its handler, if the upload is permitted."""
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
-            refuse(
-                "upload", "a file from the page that has control", "another page sent it", "Close that page"
-            )
+            refuse("upload", "the page that has control", "another page sent it", "Close that page")
         kind = next((one for one in HEAD_FILES if name.lower().endswith(one)), None)
         if kind is None:
             kinds = ", ".join(HEAD_FILES)

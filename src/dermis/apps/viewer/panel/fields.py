@@ -22,8 +22,8 @@ from dermis.scene.frozen_model import (
     field_slider_range,
 )
 
-ApplyFields = Callable[..., ViewerState]
-ApplyValue = Callable[[Any], ViewerState]
+FieldsToState = Callable[..., ViewerState]
+ToState = Callable[[Any], ViewerState]
 _LOG = int(imgui.SliderFlags_.logarithmic)
 _HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
@@ -46,7 +46,7 @@ class FieldStyle:
     unit : value of one displayed unit, in units of the field
     number_format : printf format of the number
     options : integers to choose from
-    display_names : text to show for each keyword of the field
+    names : text to show for each keyword of the field
     custom_value : function that returns the first custom value of a field that may also be a keyword
     """
 
@@ -55,7 +55,7 @@ class FieldStyle:
     unit: float = 1.0
     number_format: str = ""
     options: tuple[int, ...] = ()
-    display_names: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
     custom_value: Callable[[Session], object] | None = None
 
 
@@ -66,31 +66,31 @@ _COLOUR: Any = Colour
 def draw_fields(
     session: Session,
     values: FrozenModel,
-    make_state: ApplyFields,
+    make_state: FieldsToState,
     styles: Mapping[str, FieldStyle],
     names: Iterable[str] | None = None,
-    label_suffix: str = "",
+    suffix: str = "",
 ) -> None:
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
     make_state : function that returns a state, given the new value of a field as keyword argument
     names : names of the fields, all by default
-    label_suffix : "##id" that distinguishes controls with equal labels
+    suffix : "##id" that distinguishes controls with equal labels
     """
     for name in type(values).model_fields if names is None else names:
-        _draw_field(session, values, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
+        _draw_field(session, values, name, make_state, styles.get(name, _DEFAULT_STYLE), suffix)
 
 
 def _draw_field(
     session: Session,
     values: FrozenModel,
     name: str,
-    make_state: ApplyFields,
+    make_state: FieldsToState,
     style: FieldStyle,
-    label_suffix: str,
+    suffix: str,
 ) -> None:
     kind, value = type(values), getattr(values, name)
-    label = (style.label or _field_label(name)) + label_suffix
+    label = (style.label or _field_label(name)) + suffix
     value_range = style.value_range or field_slider_range(kind, name) or SliderRange(0.0, 1.0)
 
     def with_value(new_value: object) -> ViewerState:
@@ -107,17 +107,10 @@ def _draw_field(
         combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
     elif isinstance(value, (int, float)):
         unit, convert = style.unit, round if isinstance(value, int) else float
-        formats = (_UNIT_FORMATS[suffix] for suffix in _UNIT_FORMATS if name.endswith(suffix))
-        number_format = style.number_format or next(formats, "%.3f")
+        formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if name.endswith(end))
+        number = style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
-        slider(
-            session,
-            label,
-            value / unit,
-            lambda new: with_value(convert(unit * new)),
-            displayed,
-            number_format,
-        )
+        slider(session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number)
     elif kind.model_fields[name].annotation == _COLOUR:
         result = imgui.color_edit3(label, list(value), _HDR)
         edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
@@ -125,7 +118,7 @@ def _draw_field(
         result = imgui.slider_float3(label, list(value), value_range.low, value_range.high, "%.3g", _LOG)
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
     elif len(keywords := field_choices(kind, name)) > 1:
-        combo(session, label, str(value), keywords, with_value, display_names=style.display_names)
+        combo(session, label, str(value), keywords, with_value, style.names)
     else:
         return
     draw_tooltip(field_help(kind, name))
@@ -136,7 +129,7 @@ def _draw_keywords(
     label: str,
     value: object,
     keywords: tuple[str, ...],
-    with_value: ApplyValue,
+    with_value: ToState,
     style: FieldStyle,
 ) -> None:
     """Draw a list of the keywords that a number or colour can be instead of a value."""
@@ -185,7 +178,7 @@ def slider(
     session: Session,
     label: str,
     value: float,
-    with_value: ApplyValue,
+    with_value: ToState,
     value_range: SliderRange,
     number_format: str,
 ) -> None:
@@ -200,7 +193,7 @@ def clamp(value: float, value_range: SliderRange) -> float:
     return min(value_range.high, max(value_range.low, value))
 
 
-def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ApplyValue) -> None:
+def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ToState) -> None:
     """Apply the new value of a control; all changes while it is held are one step of the undo history."""
     record_position(session, label)
     is_changed, new_value = result
@@ -215,7 +208,7 @@ def combo(
     label: str,
     current: str,
     names: Iterable[str],
-    with_value: ApplyValue,
+    with_value: ToState,
     display_names: Mapping[str, str] = _NO_DISPLAY_NAMES,
 ) -> None:
     """Draw a drop-down list that changes the state.
@@ -295,7 +288,7 @@ SURFACE = {
     "rho_s": FieldStyle("specular strength ρ_s###rho_s"),
     "specular": FieldStyle(
         "specular BRDF###BRDF",
-        display_names={
+        names={
             "kelemen": "Kelemen, Szirmay-Kalos",
             "torrance-sparrow": "Torrance-Sparrow",
             "torrance-sparrow-smith": "Torrance-Sparrow, Smith's G",
@@ -307,41 +300,31 @@ SURFACE = {
             "kelemen-direct": "Kelemen, without table",
         },
     ),
-    "fresnel": FieldStyle(
-        "Fresnel###Fresnel", display_names={"schlick": "Schlick", "exact": "exact dielectric"}
-    ),
-    "specular_colour": FieldStyle(
-        "reflection colour###reflection", display_names={"wrong": "albedo (wrong)"}
-    ),
-    "energy": FieldStyle(
-        "energy conserved###energy", display_names={"none": "no", "published": "as published"}
-    ),
-    "direction": FieldStyle("exit direction###direction", display_names={"lambertian": "Lambertian"}),
+    "fresnel": FieldStyle("Fresnel###Fresnel", names={"schlick": "Schlick", "exact": "exact dielectric"}),
+    "specular_colour": FieldStyle("reflection colour###reflection", names={"wrong": "albedo (wrong)"}),
+    "energy": FieldStyle("energy conserved###energy", names={"none": "no", "published": "as published"}),
+    "direction": FieldStyle("exit direction###direction", names={"lambertian": "Lambertian"}),
 }
 """Labels of the surface fields of `Skin`."""
 
-ALBEDO = {
-    "albedo": FieldStyle("colour by###colour from", display_names={"map": "albedo map", "profile": "profile"})
-}
+ALBEDO = {"albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})}
 """Labels of the profile fields of `Skin`."""
 
 TECHNIQUE = {
     "technique": FieldStyle(
-        display_names={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
+        names={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
     ),
     "stretch": FieldStyle(
-        "stretch correction###stretch", display_names={"full": "stretch and shear", "axes": "along u and v"}
+        "stretch correction###stretch", names={"full": "stretch and shear", "axes": "along u and v"}
     ),
-    "seams": FieldStyle("uv seams###seams", display_names={"stitch": "stitched", "none": "left open"}),
-    "transmission": FieldStyle("translucency###transmission", display_names={"thin": "thin parts"}),
+    "seams": FieldStyle("uv seams###seams", names={"stitch": "stitched", "none": "left open"}),
+    "transmission": FieldStyle("translucency###transmission", names={"thin": "thin parts"}),
     "occlusion": FieldStyle(
-        "ambient occlusion###occlusion", display_names={"baked": "as posed", "rest": "of the rest pose"}
+        "ambient occlusion###occlusion", names={"baked": "as posed", "rest": "of the rest pose"}
     ),
     "strands": FieldStyle("hairs###strands"),
-    "tone": FieldStyle(
-        "tone curve###tone", display_names={"none": "none (linear)", "neutral": "Khronos neutral"}
-    ),
-    "gamma": FieldStyle(display_names={"right": "gamma-correct", "wrong": "not gamma-correct"}),
+    "tone": FieldStyle("tone curve###tone", names={"none": "none (linear)", "neutral": "Khronos neutral"}),
+    "gamma": FieldStyle(names={"right": "gamma-correct", "wrong": "not gamma-correct"}),
 }
 """Labels of `Settings`."""
 

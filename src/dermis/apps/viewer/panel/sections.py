@@ -14,6 +14,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 from numpy.typing import NDArray
 
+from dermis.apps.viewer import posing
 from dermis.apps.viewer.controls import CAMERAS
 from dermis.apps.viewer.panel.fields import (
     LIGHT,
@@ -35,14 +36,6 @@ from dermis.apps.viewer.panel.fields import (
     slider,
 )
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
-from dermis.apps.viewer.posing import (
-    bone_angles,
-    filter_names,
-    rest_pose,
-    target_weight,
-    with_bone_angles,
-    with_target_weight,
-)
 from dermis.apps.viewer.session import Session, built_in_heads
 from dermis.apps.viewer.state import ATLAS, ViewerState, validated_copy
 from dermis.apps.viewer.views import LAYERS, VIEWS
@@ -95,9 +88,7 @@ def _add_light(session: Session, kind: str) -> ViewerState:
     """Return the state with a new light of the given kind, and select that light."""
     values: dict[str, Any] = {"position": _NEW_LIGHT_MM, "direction": tuple(-x for x in _NEW_LIGHT_MM)}
     fields = LIGHTS[kind].model_fields
-    required = {
-        name: value for name, value in values.items() if name in fields and fields[name].is_required()
-    }
+    required = {name: values[name] for name in values.keys() & fields.keys() if fields[name].is_required()}
     lights = session.state.scene.lights
     state = session.state.with_lights([*lights, LIGHTS[kind](**required)])
     session.controls.light = len(lights)
@@ -189,8 +180,9 @@ def draw_expressions(session: Session) -> None:
     imgui.same_line()
     if button(session, "rest"):
         session.player.stop()
-        session.change(session.state.with_pose(rest_pose(session.state.scene)))
-    targets, bones = filter_names(head.targets, session.search), filter_names(head.bones, session.search)
+        session.change(session.state.with_pose(posing.rest_pose(session.state.scene)))
+    targets = posing.filter_names(head.targets, session.search)
+    bones = posing.filter_names(head.bones, session.search)
     animated = _animated_names(session)
     if targets:
         draw_rows("targets", len(targets), lambda row: _draw_weight(session, targets[row], animated))
@@ -233,9 +225,9 @@ def _animated_names(session: Session) -> frozenset[str]:
 
 def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
     def with_value(weight: float) -> ViewerState:
-        return session.state.with_pose(with_target_weight(session.state.scene, name, weight))
+        return session.state.with_pose(posing.with_target_weight(session.state.scene, name, weight))
 
-    weight = target_weight(session.displayed_state.scene, name)
+    weight = posing.target_weight(session.displayed_state.scene, name)
     imgui.begin_disabled(name in animated)
     slider(session, f"{name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
@@ -245,14 +237,14 @@ def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
 
 def _draw_angles(session: Session, name: str, animated: frozenset[str]) -> None:
     """Draw three angle sliders; only the one that is moved changes, even if others are out of range."""
-    angles = bone_angles(session.displayed_state.scene, name)
+    angles = posing.bone_angles(session.displayed_state.scene, name)
 
     def with_value(new_angles: list[float]) -> ViewerState:
         axis = max(range(3), key=lambda k: abs(new_angles[k] - angles[k]))
         degrees = [*angles]
         degrees[axis] = clamp(new_angles[axis], _ANGLE_RANGE)
         x, y, z = degrees
-        return session.state.with_pose(with_bone_angles(session.state.scene, name, (x, y, z)))
+        return session.state.with_pose(posing.with_bone_angles(session.state.scene, name, (x, y, z)))
 
     imgui.begin_disabled(name in animated)
     result = imgui.slider_float3(f"{name}##bone", [*angles], _ANGLE_RANGE.low, _ANGLE_RANGE.high, "%.0f")
@@ -276,8 +268,9 @@ def draw_head(session: Session) -> None:
         session.heads.open(f"{HUMAN}:{random.randrange(_SEED_COUNT)}")
     draw_tooltip("Another random person.")
     if session.request_file is None:
+        hint = "path of a file"
         is_path_entered, session.head_file = imgui.input_text_with_hint(
-            "###path", "path of a file", session.head_file, _ON_ENTER
+            "###path", hint, session.head_file, _ON_ENTER
         )
         record_position(session, "path")
         draw_tooltip("A mesh (.glb .gltf .obj .ply), a person (.json) or a scene (.toml).")

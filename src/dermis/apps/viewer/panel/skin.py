@@ -148,7 +148,7 @@ def _draw_layer(session: Session, layers: Layers, index: int) -> None:
     def make_state(**fields: object) -> ViewerState:
         return _replace_layer(session, layers, index, validated_copy(layer, **fields))
 
-    draw_fields(session, layer, make_state, LAYER, label_suffix=label_suffix)
+    draw_fields(session, layer, make_state, LAYER, suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MAX_LAYERS and button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_MM)
