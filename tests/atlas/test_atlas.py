@@ -1,4 +1,4 @@
-"""The atlas: texels know their surface, charts keep apart, what cannot be held is left out."""
+"""The atlas of a mesh's own layout: surface points of texels, separate charts, and what is left out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Square = tuple[float, float, float]  # left, top, side in uv
 
 
 def patches(*squares: Square) -> Mesh:
-    """Squares of 10 mm that stand apart in space, each with its own square of uv."""
+    """Return squares of 10 mm that are apart in space, each with its own square of uv."""
     parts = [plane(10.0, 2) for _ in squares]
     shift = [np.array([20.0 * k, 0, 0], np.float32) for k in range(len(parts))]
     first = np.cumsum([0, *(len(p.positions) for p in parts[:-1])])
@@ -36,13 +36,13 @@ def chart_map(atlas: Atlas, mesh: Mesh) -> NDArray[np.int32]:
 
 
 def centres(size: int) -> NDArray[np.float64]:
-    """(n, n, 2) uv of the texels' centres."""
+    """Return the uv (n, n, 2) of the texels' centres."""
     x = (np.arange(size) + 0.5) / size
     return np.stack(np.meshgrid(x, x), axis=-1)
 
 
 def own_texels(atlas: Atlas, mesh: Mesh) -> NDArray[np.bool_]:
-    """Texels whose centre lies in their triangle, by brute force: those of the gutter do not."""
+    """Return the texels whose centre is in their triangle, by brute force; gutter texels are not."""
     corners = mesh.uv[mesh.triangles[np.maximum(atlas.triangle, 0)]].astype(float)
     p, c = np.moveaxis(corners, 2, 0), centres(atlas.size)
     sides = [edge(p[k], p[(k + 1) % 3], c) for k in range(3)]
@@ -76,7 +76,7 @@ def test_texels_stand_for_their_own_uv(name: str, size: int) -> None:
 
 
 def test_every_centre_on_the_surface_is_covered() -> None:
-    """Counted without triangles: the plane's uv is the square 0..0.61."""
+    """Count covered texels without triangles: the plane's uv is the square 0..0.61."""
     atlas = build_atlas(plane(50.0, 2, uv_scale=0.61), 100)
     inside = np.arange(100) + 0.5 < 61
     grown = np.arange(100) + 0.5 < 61 + GUTTER_TEXELS
@@ -106,7 +106,7 @@ def test_stretch_of_a_plane(scale: float) -> None:
 
 
 def test_stretch_of_a_sphere() -> None:
-    """Along v a half circle, along u a circle that narrows towards the poles."""
+    """Check stretch along v on a half circle, and along u on circles that narrow towards the poles."""
     atlas = build_atlas(uv_sphere(40.0, 96, 48), 128)
     rows = slice(20, 108)  # the poles' own fans are no part of the formula
     v = (np.arange(128)[rows] + 0.5) / 128
@@ -165,7 +165,10 @@ def test_reach_goes_all_the_way() -> None:
 
 
 def test_of_mirrored_halves_one_is_mapped() -> None:
-    """Two halves on the same uv, joined at their centre line: one chart; the turned half is lit directly."""
+    """Check two mirrored halves on the same uv, joined at their centre line, as one chart.
+
+    The mirrored half is lit directly.
+    """
     positions = np.array([[x, y, 0] for x in (-50, 0, 50) for y in (-50, 50)], np.float32)
     uv = np.array([[u, v] for u in (0.9, 0.1, 0.9) for v in (0.9, 0.1)], np.float32)
     triangles = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]], np.int32)
@@ -202,7 +205,7 @@ def test_small_atlases_are_refused(size: int) -> None:
 
 @pytest.mark.samples
 def test_the_scan() -> None:
-    """Its eye shells are collapsed; the eight other islands fill most of the map."""
+    """Check that the eye shells are collapsed and the eight other islands fill most of the map."""
     from loaded_mesh import load_mesh
 
     from dermis.formats.samples import fetch

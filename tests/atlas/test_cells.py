@@ -1,4 +1,4 @@
-"""The atlas in coarse cells: what they hold, and which triangles and gutters show them."""
+"""Coarse cells of the atlas: sources, receivers, triangles and gutters."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_tiles_list_all_triangles_that_they_show(divided: Divided) -> None:
 
 
 def test_receivers_belong_to_the_tile_of_their_place(divided: Divided) -> None:
-    """Also in gutters, which show places elsewhere."""
+    """Check the tiles of receivers, also in gutters, which show other points."""
     _, atlas, cells = divided
     b = np.stack([cells.receiver_points[:, 1] & 0xFFFF, cells.receiver_points[:, 1] >> 16], axis=-1) / 65535.0
     weights = np.column_stack([1.0 - b.sum(axis=1), b])

@@ -1,4 +1,4 @@
-"""Form factors between patches: rooms and balls from inside, and a body that sees nothing of itself."""
+"""Form factors between patches: rooms and balls from inside, and a convex body."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ CLOSE = 0.01
 
 
 def inside_out(mesh: Mesh) -> Mesh:
-    """The same surface seen from within."""
+    """Return the same surface seen from inside."""
     return replace(mesh, normals=-mesh.normals, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]))
 
 
 def room() -> Mesh:
-    """A cube of side 2 seen from within, each face on a sixth of the uv square: -x, +x, -y, +y, -z, +z."""
+    """Return a cube of side 2 seen from inside, with faces in sixths of the uv square.
+
+    Their order is -x, +x, -y, +y, -z, +z.
+    """
     points, uv, triangles = [], [], []
     for face in range(6):
         axis, sign = face // 2, 2.0 * (face % 2) - 1.0

@@ -1,4 +1,4 @@
-"""The stitched atlas: every triangle has texels, and beyond every edge lies what the surface has there."""
+"""The stitched atlas: texels of all triangles, and gutters that continue the surface across seams."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from atlas_reading import lit_at, random_points, read, shown
 from cut_meshes import (
     CYLINDER_LAYS,
     SPHERE_LAYS,
-    Lay,
+    ChartPlacement,
     cut_cone,
     cut_cylinder,
     cut_sphere,
@@ -49,7 +49,7 @@ def case(name: str) -> tuple[Mesh, Atlas]:
 
 
 def texel_mm(atlas: Atlas) -> Floats:
-    """(n, n) longer side of each texel on the surface [mm]."""
+    """Return the longer side (n, n) of each texel on the surface [mm]."""
     return np.asarray(1.0 / np.maximum(atlas.stretch.astype(np.float64).min(axis=-1), 1e-3))
 
 
@@ -66,7 +66,7 @@ def test_all_triangles_have_texels(name: str) -> None:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_light_is_found_at_every_place(name: str) -> None:
-    """Positions stored in texels and read where the atlas has a point give it: no piece is overlaid."""
+    """Check that positions stored in texels are read back at random points: no pieces overlap."""
     mesh, atlas = case(name)
     points = random_points(mesh, 4000)
     found = lit_at(shown(atlas, mesh, own=True), atlas, points)
@@ -97,7 +97,7 @@ def _cross(a: Floats, b: Floats, c: NDArray[np.integer]) -> Floats:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_sources_hold_the_light_of_the_point_shown(name: str) -> None:
-    """And are read from texels that compute their own light, never from a gutter."""
+    """Check that gutters copy texels whose light is computed, not other gutters."""
     mesh, atlas = case(name)
     x, y = atlas.gutter.T
     assert len(x) > 300
@@ -127,7 +127,7 @@ def test_steps_into_the_gutter_are_as_long_as_the_metric_says(name: str) -> None
 
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "cone"])
 def test_runs_cross_no_gap(name: str) -> None:
-    """A tap never shows a point farther away than the way to it is long, as a jump to elsewhere would be."""
+    """Check that the surface points of texels in a run are no farther apart than the run is long."""
     mesh, atlas = case(name)
     points, reach = shown(atlas, mesh), atlas.edge_distance.astype(int)
     y, x = np.nonzero(atlas.lit)
@@ -181,7 +181,7 @@ def test_light_does_not_cross_to_what_is_no_skin() -> None:
 
 
 def test_triangles_may_face_either_way_round() -> None:
-    """Adjacency is by place; a chart whose triangles are listed the other way round changes nothing."""
+    """Check that reversed triangles of a chart change nothing, as adjacency is by position."""
     mesh, atlas = case("cylinder")
     triangles = mesh.triangles.copy()
     part = find_charts(mesh) == 0
@@ -197,7 +197,7 @@ def test_triangles_may_face_either_way_round() -> None:
 
 
 def test_folded_halves_both_get_texels() -> None:
-    """On the mesh's own uv one of them has none."""
+    """Check that both halves get texels, of which one has none on the mesh's own uv."""
     mesh, atlas = case("fold")
     assert not build_atlas(mesh, atlas.size).mapped.all()
     both = uv_cross(atlas.corner_uv)
@@ -220,7 +220,7 @@ def test_densities_that_differ_little_are_left_and_others_come_closer() -> None:
 
 
 def test_a_collapsed_chart_is_left_out() -> None:
-    lays = [*CYLINDER_LAYS[:2], Lay((0.9, 0.9), 1e-5)]
+    lays = [*CYLINDER_LAYS[:2], ChartPlacement((0.9, 0.9), 1e-5)]
     mesh = cut_cylinder(30.0, 80.0, 6, lays)
     atlas = build_atlas(mesh, 128, "stitched")
     assert np.bincount(find_charts(mesh), atlas.mapped).tolist() == [72, 72, 0]
@@ -230,7 +230,7 @@ def test_a_collapsed_chart_is_left_out() -> None:
 
 def test_too_many_charts_for_so_few_texels_stay_where_they_are() -> None:
     middles = [((column + 0.5) / 20, (row + 0.5) / 20) for row in range(20) for column in range(20)]
-    mesh = cut_cylinder(300.0, 10.0, 1, [Lay(middle, 0.002) for middle in middles])
+    mesh = cut_cylinder(300.0, 10.0, 1, [ChartPlacement(middle, 0.002) for middle in middles])
     stitched, plain = build_atlas(mesh, 64, "stitched"), build_atlas(mesh, 64)
     assert len(stitched.gutter) == 0
     assert np.array_equal(stitched.triangle, plain.triangle)

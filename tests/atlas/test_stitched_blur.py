@@ -1,4 +1,4 @@
-"""Light blurred over seams: without a jump on the stitched layout, with the mesh's own uv as the contrast."""
+"""Light blurred across seams: continuous on the stitched layout, compared with the mesh's own uv."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ VARIANCES = (0.567, 1.99, 7.41)  # [mm2] those of the widely used profile that a
 
 
 def blurred(atlas: Atlas, light: Floats) -> list[Floats]:
-    """The blurred levels (n, n, 1) of light (n, n), gutters filled anew before each."""
+    """Return the blurred levels (n, n, 1) of light (n, n), with gutters filled before each blur."""
     metric = np.dstack([atlas.stretch, atlas.shear]).astype(np.float64)
     made, before = [np.dstack([light, light, light, atlas.coverage])], 0.0
     x, y = atlas.gutter.T
@@ -40,12 +40,12 @@ def lit(atlas: Atlas, mesh: Mesh, light: Callable[[Floats], Floats]) -> Floats:
 
 
 def stripes(points: Floats) -> Floats:
-    """Soft bands 10 mm wide that cross seams at all angles; light and dark 8 to 1."""
+    """Return soft bands 10 mm wide that cross seams at all angles, with a contrast of 8 to 1."""
     return np.asarray(0.9 + 0.7 * np.sin(points @ np.array([0.6, 0.5, 0.62]) * np.pi / 10.0))
 
 
 def jumps(mesh: Mesh, atlas: Atlas) -> Floats:
-    """(levels, points) change of the light from one side of each seam to the other, of the light there."""
+    """Return the relative change (levels, points) of the light across each seam."""
     one, other = seam_points(mesh)
     sides = [
         np.column_stack([lit_at(level, atlas, points) for points in (one, other)])
@@ -73,7 +73,7 @@ def test_folded_halves_are_one_surface() -> None:
 
 
 def test_blurs_near_seams_are_those_of_the_sphere() -> None:
-    """A zonal harmonic on a sphere stays one and fades by exp(-l (l + 1) v / 2 r2)."""
+    """Check that a zonal harmonic on a sphere keeps its shape and fades by exp(-l (l + 1) v / 2 r2)."""
     radius, degree = 30.0, 8
     mesh = cut_sphere(radius, 20)
     one, _ = seam_points(mesh)

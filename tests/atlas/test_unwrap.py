@@ -1,4 +1,4 @@
-"""Uv layouts: what can be flat without stretch is, and nothing is ever mirrored or laid on top of itself."""
+"""Unwrapping: isometric layouts of developable surfaces, and no mirrored or overlapping triangles."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SIZE = 1024
 
 
 def square(cells: int = 12, jitter: float = 0.2) -> Shape:
-    """A flat square with uneven triangles, tilted in space."""
+    """Return a flat square with uneven triangles, tilted in space."""
     mesh = plane(10.0, cells)
     places = mesh.positions.astype(np.float64)
     inner = (np.abs(places[:, :2]) < 4.99).all(axis=1)
@@ -39,7 +39,7 @@ def square(cells: int = 12, jitter: float = 0.2) -> Shape:
 
 
 def tube(around: int = 40, along: int = 20) -> Shape:
-    """A round tube along y, open at both ends, of radius 5 and height 12."""
+    """Return a round tube along y, open at both ends, of radius 5 and height 12."""
     angle, height = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.linspace(0, 12, along + 1))
     places = np.column_stack((5 * np.sin(angle).ravel(), height.ravel(), 5 * np.cos(angle).ravel()))
     row, column = (axis.ravel() for axis in np.mgrid[:along, :around])
@@ -71,7 +71,7 @@ def as_mesh(layout: UvLayout, positions: Doubles) -> Mesh:
 
 
 def owners_of_texels(mesh: Mesh, layout: UvLayout, size: int = SIZE) -> Index:
-    """Chart (size, size) at each texel, -1 where none; no texel lies in two triangles."""
+    """Return the chart (size, size) of each texel, -1 for none; no texel is in two triangles."""
     corners = mesh.uv[mesh.triangles]
     # a little smaller, for a texel whose centre lies on an edge is in both its triangles
     corners += 1e-3 * (corners.mean(axis=1, keepdims=True) - corners)
@@ -123,7 +123,7 @@ def test_what_cannot_be_flat_is_halved(shape: Shape) -> None:
 
 
 def test_cap_of_a_sphere() -> None:
-    """A cap of 60 degrees: conformal maps change its scale by 4/3, lengths kept along rays stretch by 1.2."""
+    """Check a cap of 60 degrees, between the stretch of a conformal and that of an equidistant map."""
     positions, triangles = sphere()
     cap = triangles[positions[triangles].mean(axis=1)[:, 2] > 2.5]
     layout = unwrap(positions, cap, one_chart(cap))

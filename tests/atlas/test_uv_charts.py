@@ -1,4 +1,4 @@
-"""Charts of the uv layout and which of them are of use."""
+"""Charts of the uv layout, and which triangles are usable."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SKIN = (Material("skin"),)
 
 
 def _two_planes(scale: float) -> Mesh:
-    """The two halves of a plane with a uv seam between them, the right one's uv shrunk by `scale`."""
+    """Return the two halves of a plane with a uv seam between them, the right one's uv scaled by `scale`."""
     flat = plane(10, 2)
     right = flat.positions[flat.triangles].mean(axis=1)[:, 0] > 0
     triangles = np.where(right[:, None], flat.triangles + len(flat.uv), flat.triangles)

@@ -1,4 +1,4 @@
-"""Which adapter is taken, and what is said when none fits."""
+"""Selection of adapters, and the errors when none fits."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Give this machine other adapters: machine(handle, ...)."""
+    """Return a function that replaces the adapters of this machine: machine(handle, ...)."""
     import_module("wgpu.backends.wgpu_native")  # which a device asks for, whatever stands for its package
 
     def pretend(*handles: Any) -> None:
@@ -130,7 +130,7 @@ def test_a_name_that_is_none_lists_those_that_are() -> None:
 
 
 def broken(**limits: int) -> Any:
-    """An adapter that does not open."""
+    """Return an adapter that cannot be opened."""
 
     def fail(**_: Any) -> None:
         raise RuntimeError("out of everything")

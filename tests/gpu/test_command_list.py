@@ -1,4 +1,4 @@
-"""Passes run in order, are timed by stage, and share their uniforms."""
+"""Command lists: order of passes, stage times and uniforms."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) 
 
 
 def staged_times(device: Device, scale: ComputeProgram, timed: Timing) -> tuple[dict[str, float] | None, int]:
-    """Times of a frame of two stages in turn, and how many timestamps it took."""
+    """Return the stage times of a frame with two alternating stages, and the number of its timestamps."""
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     frame = CommandList(device, timed=timed)
     for stage in ("one", "two", "one"):
@@ -74,7 +74,7 @@ def staged_times(device: Device, scale: ComputeProgram, timed: Timing) -> tuple[
 def test_a_frame_timed_as_a_whole_is_not_divided(
     device: Device, scale: ComputeProgram, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two timestamps, whatever the device makes of them; those of software adapters are wrong."""
+    """Check that two timestamps are written; on software adapters their values are wrong."""
     if not device.has_timestamps:
         pytest.skip("no timestamps")
     monkeypatch.setattr(device, "adapter", replace(device.adapter, kind="DiscreteGPU"))
@@ -105,9 +105,7 @@ def record_of(scale: ComputeProgram, value: float) -> Any:
 def test_a_record_keeps_its_place_and_no_other_one_gets_it(device: Device, scale: ComputeProgram) -> None:
     uniforms, record = Uniforms(device), record_of(scale, 1.25)
     first, same = (uniforms.position(record) for _ in range(2))
-    others = [
-        uniforms.position(record_of(scale, 1.5)) for _ in range(4)
-    ]  # each released before the next
+    others = [uniforms.position(record_of(scale, 1.5)) for _ in range(4)]  # each released before the next
     assert first == same and len({first, *others}) == 5
 
 
@@ -137,7 +135,7 @@ def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, sc
 
 
 def test_frames_in_flight_keep_their_uniforms(device: Device, scale: ComputeProgram) -> None:
-    """All frames write to one buffer; each must read its own numbers, whichever was recorded first."""
+    """Check that frames which share uniform buffers each read their own values, in any order of recording."""
     image = texture_from_array(device, np.ones((64, 64), np.float32), "r32float")
     made = [make_texture(device, (64, 64), "r32float") for _ in range(20)]
     frames = [CommandList(device, timed=False) for _ in made]
@@ -158,7 +156,7 @@ def test_bind_groups_are_kept(device: Device, scale: ComputeProgram) -> None:
 
 
 def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
-    """A group that stayed would hold on to the memory of textures that nobody uses any more."""
+    """Check that bind groups do not keep textures alive."""
     program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
     uniforms, image = Uniforms(device), make_texture(device, SIZE, "r32float")
     for _ in range(3):
@@ -173,7 +171,7 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
 
 
 def test_what_goes_before_the_submit_is_still_read(device: Device, scale: ComputeProgram) -> None:
-    """The library holds on to what a pass binds; here only the result is."""
+    """Check that the library keeps a bound texture alive until the submission."""
     into, frame = make_texture(device, SIZE, "r32float"), CommandList(device, timed=False)
     image = texture_from_array(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
     bound = {"factor": record_of(scale, 2.0), "image": image, "scaled": into}
@@ -186,11 +184,11 @@ def test_what_goes_before_the_submit_is_still_read(device: Device, scale: Comput
 
 
 class Resource:
-    """Something to bind."""
+    """An object that can be bound."""
 
 
 def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
-    """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
+    """Check that a new resource at the same address cannot be mistaken for a released one."""
     groups, first, second = ResourceCache[str](), Resource(), Resource()
     groups.add(resource_key([first, second]), [first, second], "group")
     del first

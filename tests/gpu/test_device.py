@@ -1,4 +1,4 @@
-"""A device has what WebGPU promises and what it names, and lets go of its threads."""
+"""Devices: WebGPU's default limits, named features, and threads that end with the device."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_limits_are_the_default_ones(device: Device, bare: Device) -> None:
 
 
 def test_only_named_features_are_asked_for(device: Device, bare: Device) -> None:
-    """wgpu's own devices have `core-features-and-limits` in any case."""
+    """Check the requested features; wgpu always adds `core-features-and-limits`."""
     known = set(device.handle.features) - set(bare.handle.features)
     assert known <= set(OPTIONAL_FEATURES)
     assert not set(bare.handle.features) & set(device.adapter.handle.features) - {"core-features-and-limits"}
@@ -54,7 +54,7 @@ def test_programs_beyond_the_limits_are_refused(device: Device, tmp_path: Path, 
 
 
 def test_a_device_that_is_dropped_begins_nothing_more(device: Device) -> None:
-    """What is compiled for nobody would hold memory and cores, and the end of the process up."""
+    """Check that no compilation starts after the device is dropped, which would delay exit."""
     gate = threading.Event()
     dropped = open_device(device.adapter.name)
     busy = [dropped.executor.submit(gate.wait) for _ in range(os.cpu_count() or 1)]

@@ -1,4 +1,4 @@
-"""Render passes that fill whole targets."""
+"""Render passes that run for each texel of their targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A graph runs what has to be run, and leaves what all of its passes would leave."""
+"""The frame graph: only stale passes run, and the result is that of all passes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Chain:
         self.textures = [first, *(make_texture(device, SIZE, "r32float") for _ in range(count))]
 
     def frame(self, *passes: tuple[int, int, float]) -> list[str]:
-        """Which of the passes (from, into, factor) ran, as "0-1"."""
+        """Return which of the passes (source, destination, factor) ran, as "0-1"."""
         self.graph.begin()
         for source, into, factor in passes:
             record = self.scale.record("Factor", value=factor)
@@ -61,7 +61,10 @@ def test_who_forgets_runs_everything(device: Device, scale: ComputeProgram) -> N
 
 
 def test_what_another_frame_left_there_is_replaced(device: Device, scale: ComputeProgram) -> None:
-    """Also where its own result is there still: back and forth between two ends of one beginning."""
+    """Check that a pass runs again after another frame has overwritten its output.
+
+    This includes the case in which the output of a later pass is still valid.
+    """
     chain = Chain(device, scale, 3)
     one, other = ((0, 1, 2.0), (1, 2, 3.0)), ((0, 1, 5.0), (1, 3, 3.0))
     assert [chain.frame(*one), chain.frame(*other)] == [["0-1", "1-2"], ["0-1", "1-3"]]
@@ -70,7 +73,7 @@ def test_what_another_frame_left_there_is_replaced(device: Device, scale: Comput
 
 
 def test_scratch_may_hold_anything(device: Device, scale: ComputeProgram) -> None:
-    """No pass runs only for what it leaves there, but for one that reads it."""
+    """Check that no pass runs only to update a scratch texture."""
     chain = Chain(device, scale, 3)
     mark_scratch(device, chain.textures[1])
     one, other = ((0, 1, 2.0), (1, 2, 3.0)), ((0, 1, 5.0), (1, 3, 3.0))
@@ -92,7 +95,7 @@ def test_what_is_written_twice_in_a_frame_is_read_as_it_was_then(
 
 
 def test_a_pass_is_the_same_after_however_many_others(device: Device, scale: ComputeProgram) -> None:
-    """Its numbers lie elsewhere then, and its frames are of more kinds than a graph keeps in mind."""
+    """Check a pass at many positions of its record, in more kinds of frames than are cached."""
     chain = Chain(device, scale, 20)
     for _ in range(2):
         for others in range(19):
@@ -103,7 +106,7 @@ def test_a_pass_is_the_same_after_however_many_others(device: Device, scale: Com
 
 @pytest.mark.parametrize("looks_at_view", [True, False])
 def test_a_view_and_its_texture_are_one(device: Device, scale: ComputeProgram, looks_at_view: bool) -> None:
-    """Who reads the one sees what was written to the other, also by frames that did not read it."""
+    """Check that writes to a texture are seen through its view, and vice versa, in later frames too."""
     graph, image = Graph(device), texture_from_array(device, np.ones(SIZE[::-1], np.float32), "r32float")
     whole, copy = (make_texture(device, SIZE, "r32float") for _ in range(2))
     view = whole.create_view()

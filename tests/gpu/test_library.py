@@ -1,4 +1,4 @@
-"""The toolkit's own WGSL against numpy."""
+"""The toolkit's WGSL functions compared with NumPy."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_bilinear_reading(device: Device) -> None:
 
 @pytest.mark.parametrize("scale", [0.004, 1.0, 3.0])
 def test_srgb_encoding(device: Device, scale: float) -> None:
-    """Dark values (the straight piece), display values, and values over white, which become white."""
+    """Check dark values (the linear part), display values, and values above white, which become white."""
     values = np.linspace(-0.1, 1.0, 4 * 256).reshape(16, 16, 4) * scale
     centres = (np.mgrid[:16, :16][::-1].transpose(1, 2, 0) + 0.5) / 16
     _, encoded = run(device, values, centres)

@@ -1,4 +1,4 @@
-"""What is kept from frame to frame."""
+"""The cache of function results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dermis.gpu.memo import are_equal
 
 
 class Log:
-    """Makes things and notes for which arguments."""
+    """A function that logs its calls."""
 
     def __init__(self) -> None:
         self.made = ""
@@ -25,7 +25,7 @@ class Log:
         return key.upper()
 
     def asked(self, memo: Memo, keys: str) -> str:
-        """The keys for which something is made when all of these are asked for."""
+        """Return the keys for which the function is called when all of these are requested."""
         self.made = ""
         assert "".join(memo.get(self.make, key) for key in keys) == keys.upper()
         return self.made
@@ -40,7 +40,7 @@ def test_the_things_used_last_are_kept(depth: int, keys: str, expected: str) -> 
 
 
 def test_room_is_made_before_a_thing_is() -> None:
-    """So that memory never holds one more than is kept."""
+    """Check that an old result is dropped before a new one is computed, to limit memory."""
     memo, log, left = Memo(2), Log(), list[Any]()
 
     def make(key: str) -> str:
@@ -64,7 +64,7 @@ def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, asked: int, rou
 
 
 def test_parts_of_what_is_asked_for_stay() -> None:
-    """They are asked for only while it is made."""
+    """Check that nested results stay cached while only the outer result is requested."""
     memo, log = Memo(), Log()
 
     def whole() -> str:
@@ -77,7 +77,7 @@ def test_parts_of_what_is_asked_for_stay() -> None:
 
 
 def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
-    """Else who goes back to a whole has its parts made again for the next one that is like it."""
+    """Check that using a result marks its nested results as recently used."""
     memo, log = Memo(2), Log()
 
     def whole(key: str) -> str:
@@ -115,7 +115,7 @@ class Value:
 
 @dataclass(eq=False)
 class Thing:
-    """Stands for itself, as textures do."""
+    """An object that is compared by identity, like a texture."""
 
     number: int = 0
 
@@ -170,7 +170,7 @@ def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
 
 
 def test_equal_arguments_are_compared_by_what_they_say_only_once() -> None:
-    """Another head with the same arrays must not cost their comparison in every frame."""
+    """Check that an equal copy of an argument is compared by value only the first time."""
 
     class Counted:
         compared = 0

@@ -1,4 +1,4 @@
-"""The C types told to cffi are those that it would have found by itself."""
+"""C types registered with cffi, compared with those that it parses itself."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_types_are_cffis_own() -> None:
 
 
 def test_wgpu_is_told_what_it_asks_for() -> None:
-    """By us: what it has already asked for itself, cffi knows anyway."""
+    """Check that all names are registered that wgpu looks up."""
     from wgpu.backends.wgpu_native import ffi
 
     declared = ffi._parser._declarations

@@ -1,4 +1,4 @@
-"""Too little address space is told before a driver is loaded: those end the process where they get none."""
+"""Refusal of too little address space before drivers are loaded, which would abort the process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DRAW = "render", "ball.obj", "--size", "32x32", "--atlas", "64", "--shadow-size"
 
 
 def limited(limit: float, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """`dermis` with these words under a limit of address space [bytes]."""
+    """Run `dermis` with these arguments under a limit of address space [bytes]."""
     return subprocess.run(
         [sys.executable, "-m", "dermis", *words],
         env=os.environ | {"LP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"},
@@ -50,7 +50,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("limit", [0.6, TOO_LITTLE, 2.5, ENOUGH])
 def test_a_picture_under_a_limit_is_drawn_or_refused(folder: Path, limit: float) -> None:
-    """Between the two, what the machine's own libraries take decides; it never ends in a driver."""
+    """Check that the picture is rendered or refused, and that no driver aborts.
+
+    Between the two limits the outcome depends on the machine's own libraries.
+    """
     ended = limited(limit * GB, folder, *DRAW, "-o", f"{limit}.png")
     drawn = ended.returncode == 0
     assert drawn or TOLD.fullmatch(ended.stderr), ended.stderr[-1000:]
@@ -85,7 +88,7 @@ def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """As in containers: the system kills a process that takes more than its control group may."""
+    """Check the memory limit of a control group, as in containers."""
     machine, group = memory.main_memory(), tmp_path / "job"
     group.mkdir()
     (tmp_path / "memory.max").write_text("max\n")

@@ -1,4 +1,4 @@
-"""Pipelines: compiled on other threads, and those used last are kept."""
+"""Programs: pipelines compiled on other threads, and the cache of recent variants."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_a_pipeline_is_the_same_each_time(device: Device) -> None:
 
 
 def test_what_does_not_compile_is_told_to_who_needs_it(device: Device) -> None:
-    """And again to who comes back."""
+    """Check that a compilation error is raised whenever the pipeline is used."""
     program = ComputeProgram(device, SHADER, constants={"NO_SUCH_SWITCH": 1})
     for _ in range(2):
         with pytest.raises(wgpu.GPUError, match="NO_SUCH_SWITCH"):
@@ -29,7 +29,7 @@ def test_what_does_not_compile_is_told_to_who_needs_it(device: Device) -> None:
 
 
 class Made:
-    """Stands in for a kind of program, and notes what is compiled."""
+    """A replacement for a program class that logs what is compiled."""
 
     def __init__(self) -> None:
         self.constants: list[dict[str, float]] = []
@@ -39,7 +39,7 @@ class Made:
         return object()
 
     def found(self, device: Device, models: Sequence[int]) -> list[Any]:
-        """Programs of these models, one after the other."""
+        """Return the programs of these models."""
         return [
             cached_program(device, "shader", (("MODEL", model),), partial(self.compile, {"MODEL": model}))
             for model in models

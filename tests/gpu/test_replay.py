@@ -1,4 +1,4 @@
-"""Passes recorded once do in each frame what they did in the first, as long as what they bind lives."""
+"""Recorded passes: replay in later frames while their resources exist."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def scale(device: Device) -> ComputeProgram:
 
 
 class Chain:
-    """Two passes in a row, counting how often they are recorded."""
+    """Two successive passes that count how often they are recorded."""
 
     def __init__(self, device: Device, scale: ComputeProgram) -> None:
         self.graph = Graph(device)
@@ -35,14 +35,14 @@ class Chain:
         return 10.0 * self.recorded
 
     def repeated(self, factor: float) -> float:
-        """What the recording returned, of a frame of its passes alone."""
+        """Run a frame of the passes only and return the result of the recording."""
         self.graph.begin()
         returned = self.graph.repeat(self.record, *self.textures, factor)
         self.graph.submit()
         return returned
 
     def drawn(self, value: float, factor: float = 3.0) -> Any:
-        """What the passes make of an image of one value."""
+        """Return the output of the passes for an image of one value."""
         upload(self.graph.device, self.textures[0], np.full(SIZE[::-1], value, np.float32))
         self.graph.invalidate()  # it does not know of uploads
         self.repeated(factor)
@@ -102,7 +102,7 @@ def test_a_recording_keeps_nothing_alive(device: Device, scale: ComputeProgram) 
 
 
 def test_a_recording_whose_arguments_live_may_be_void_too(device: Device, scale: ComputeProgram) -> None:
-    """What it binds beside its arguments is gone: it would read nothing that anybody knows."""
+    """Check that a recording becomes invalid when a resource is released that is not among its arguments."""
     chain, graph, held = Chain(device, scale), Graph(device), [make_texture(device, SIZE, "r32float")]
 
     def record(recorder: Recorder, first: Any, last: Any) -> None:

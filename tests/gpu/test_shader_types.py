@@ -1,4 +1,4 @@
-"""Struct offsets by hand from the WGSL specification, and bindings as wgpu wants them."""
+"""Struct offsets by hand from the WGSL specification, and bindings in wgpu's form."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_padded_array_elements_are_refused() -> None:
 
 
 def test_shader_reads_what_numpy_wrote(device: Device) -> None:
-    """Every kind of member, read back by a shader, so that the offsets are the device's own."""
+    """Check all kinds of members by a shader that reads them on the device."""
     program = ComputeProgram(device, Path(__file__).parent / "layout_probe.wgsl")
     record = program.record("Probe")
     numbers = iter(range(1, 100))
@@ -78,7 +78,7 @@ def test_shader_reads_what_numpy_wrote(device: Device) -> None:
 
 
 def fill(record: Any, member: str, numbers: Any) -> list[int]:
-    """Consecutive numbers in a member of a record, in the order of its scalars."""
+    """Return consecutive numbers that are written to a member of a record, in the order of its scalars."""
     if record[member].dtype.names:
         parts = [(one, name) for one in record[member].reshape(-1) for name in one.dtype.names]
         return [n for one, name in parts for n in fill(one, name, numbers)]
@@ -130,6 +130,6 @@ def test_bindings_come_in_order() -> None:
 
 @pytest.mark.parametrize("path", SHADERS, ids=lambda p: p.stem)
 def test_every_binding_of_the_package_is_understood(path: Path) -> None:
-    """A declaration that the parser skips would leave a hole in the layout."""
+    """Check that the parser skips no declaration."""
     text = path.read_text(encoding="utf-8")
     assert len(bindings(text)) == text.count("@binding(")

@@ -1,4 +1,4 @@
-"""Arrays come back from the device as they went, whatever the format, the width, the mip and the layer."""
+"""Upload and download of textures of all formats, widths, mip levels and layers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Includes: each file once, and errors that name the file and line they come from."""
+"""Includes and directives of WGSL files, and errors that name file and line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faces that a subdivided mesh comes from, where the surface is near them."""
+"""Removal of subdivision levels where the surface is flat."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Connected components against SciPy's."""
+"""Connected components compared with SciPy's."""
 
 from __future__ import annotations
 

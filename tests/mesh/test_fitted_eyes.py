@@ -1,4 +1,4 @@
-"""The package's eyes in heads from files: where they are put, when they are not, and what moves them."""
+"""Eyeballs fitted to heads from files: position, rig, and files that are refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eyed_head import EYE_MM, MIRROR, ball, ball_with_cornea, write_head
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.formats.load import names_eye
+from dermis.formats.load import is_eye_name
 from dermis.mesh.fitted_eyes.balls import Sphere, corneal_axis, fit_sphere
 from dermis.mesh.fitted_eyes.lids import lids_before
 from dermis.mesh.head import Head
@@ -29,15 +29,15 @@ def head(path: Path, **options: object) -> Head:
 
 
 def eyes_of(made: Head, pose: Pose | None = None) -> tuple[Floats, Floats, Floats]:
-    """Middles of the balls [mm], ways in which they look, and radii [mm]."""
+    """Return the centres of the balls [mm], their directions of gaze, and radii [mm]."""
     assert made.eyes is not None
     frames = made.eyes.frames(made.control, (pose or Pose()).motion(made.control))
     scale = np.linalg.norm(frames[:, 2, :3], axis=1)
-    middle = np.column_stack([np.zeros((2, 2)), made.eyes.middle_mm])
+    middle = np.column_stack([np.zeros((2, 2)), made.eyes.centre_offset_mm])
     inverse = np.linalg.inv(frames)
     places = np.einsum("kij,kj->ki", inverse, np.column_stack([middle, np.ones(2)]))[:, :3]
-    ways = np.einsum("kji,kj->ki", frames[:, :3, :3], made.eyes.sight)
-    return places, ways / np.linalg.norm(ways, axis=1, keepdims=True), made.eyes.ball_mm / scale
+    ways = np.einsum("kji,kj->ki", frames[:, :3, :3], made.eyes.gaze)
+    return places, ways / np.linalg.norm(ways, axis=1, keepdims=True), made.eyes.radius_mm / scale
 
 
 def triangles_of(made: Head, name: str) -> NDArray[np.int32]:
@@ -55,13 +55,13 @@ NEAR = "skin eyelash Eyelashes eye_brow eyelids CC_Base_EyeOcclusion TearLine ey
 
 @pytest.mark.parametrize("name", EYES.split())
 def test_names_of_eyes(name: str) -> None:
-    assert names_eye((name,))
-    assert names_eye(("white", name)) and not names_eye(("skin", name))
+    assert is_eye_name((name,))
+    assert is_eye_name(("white", name)) and not is_eye_name(("skin", name))
 
 
 @pytest.mark.parametrize("name", NEAR.split())
 def test_names_of_what_is_near_eyes(name: str) -> None:
-    assert not names_eye((name,))
+    assert not is_eye_name((name,))
 
 
 @pytest.mark.parametrize("radius", [9.0, 12.0, 16.0])
@@ -101,8 +101,8 @@ def test_a_cornea_does_not_widen_the_ball() -> None:
     area = np.ones(len(points))
     found = fit_sphere(points + 100.0, area)
     assert found.radius == pytest.approx(12.0, rel=5e-3)
-    np.testing.assert_allclose(found.middle, 100.0, atol=0.1)
-    assert corneal_axis(points, area, found._replace(middle=np.zeros(3)), AHEAD) is not None
+    np.testing.assert_allclose(found.centre, 100.0, atol=0.1)
+    assert corneal_axis(points, area, found._replace(centre=np.zeros(3)), AHEAD) is not None
     plain = ball(12.0)[0]
     assert corneal_axis(plain, np.ones(len(plain)), Sphere(np.zeros(3), 12.0, 0.0), AHEAD) is None
 
@@ -110,10 +110,10 @@ def test_a_cornea_does_not_widen_the_ball() -> None:
 @pytest.mark.parametrize(
     ("left", "right", "words"),
     [
-        (ball(25.0), ball(25.0), "ball of 25.0 mm, where 8 to 20 pass"),
+        (ball(25.0), ball(25.0), "ball of 25.0 mm radius, not of 8 to 20 mm"),
         (ball(6.0), ball(6.0), "ball of 6.0 mm"),
-        (ball(12.0, 1.5), ball(12.0, 1.5), "off the nearest ball"),
-        (ball(12.0), ball(5.0), "1 ball, where two are eyes"),
+        (ball(12.0, 1.5), ball(12.0, 1.5), "deviates from a ball"),
+        (ball(12.0), ball(5.0), "1 ball instead of two"),
     ],
 )
 def test_what_is_no_eye_stays_plain(tmp_path: Path, left: object, right: object, words: str) -> None:
@@ -204,7 +204,7 @@ def test_places_of_the_files_points_take_them_along(tmp_path: Path) -> None:
 
 
 def lid(low_mm: float, high_mm: float, depth_mm: float) -> Floats:
-    """(2, 3, 3) a wall across a ball's front."""
+    """Return a wall (2, 3, 3) across the front of a ball."""
     a, b, c, d = ([x, y, depth_mm] for x, y in ((-40, low_mm), (40, low_mm), (40, high_mm), (-40, high_mm)))
     return np.array([[a, b, c], [c, d, a]], float)
 

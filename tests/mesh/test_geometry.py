@@ -1,4 +1,4 @@
-"""Welding, normals and tangents against shapes whose answer is known."""
+"""Welding, normals and tangents of shapes with known answers."""
 
 from __future__ import annotations
 

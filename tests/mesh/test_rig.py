@@ -34,14 +34,14 @@ def _rig(weight: float = 1.0) -> Rig:
 
 
 def test_targets_add_up() -> None:
-    posed = _rig().posed(np.array([0.5, 2.0]))
+    posed = _rig().pose(np.array([0.5, 2.0]))
     np.testing.assert_allclose(posed, [[0, 0.5, 0], [2, 2, 0], [4, 4, 0]])
 
 
 def test_bones_at_rest_leave_points_where_they_are() -> None:
     rig = _rig()
     assert rig.skeleton is not None
-    np.testing.assert_allclose(rig.posed(np.zeros(2), rig.skeleton.matrices()), rig.positions_mm, atol=1e-12)
+    np.testing.assert_allclose(rig.pose(np.zeros(2), rig.skeleton.matrices()), rig.positions_mm, atol=1e-12)
 
 
 def test_a_bone_turns_what_follows_it() -> None:
@@ -49,7 +49,7 @@ def test_a_bone_turns_what_follows_it() -> None:
     assert rig.skeleton is not None
     local = rig.skeleton.local.copy()
     local[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]  # a quarter turn about z
-    posed = rig.posed(np.zeros(2), rig.skeleton.matrices(local))
+    posed = rig.pose(np.zeros(2), rig.skeleton.matrices(local))
     np.testing.assert_allclose(posed[2], [-2, 2, 0], atol=1e-12)
     np.testing.assert_allclose(posed[0], [0, 0, 0], atol=1e-12)
 

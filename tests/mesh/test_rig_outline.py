@@ -1,4 +1,4 @@
-"""The few points that bound a head in any pose, against all of its points."""
+"""The outline of a rig in any pose compared with all of its points."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from random_rig import random_rig
 
-from dermis.mesh.outline import outermost
+from dermis.mesh.outline import extreme_points
 from dermis.mesh.rig import Motion, Rig
 
 RNG = np.random.default_rng(11)
@@ -21,15 +21,15 @@ def _pose(rig: Rig, rng: np.random.Generator) -> Motion:
     if rig.skeleton is None:
         return rig.rest._replace(weights=weights)
     bones = [k for k in range(4) if rng.random() < 0.6]
-    turns = [rig.skeleton.turned(bone, rng.uniform(-45, 45, 3).tolist()) for bone in bones]
-    matrices = rig.skeleton.moved(bones, np.array(turns).reshape(-1, 4, 4))
+    turns = [rig.skeleton.bone_rotation(bone, rng.uniform(-45, 45, 3).tolist()) for bone in bones]
+    matrices = rig.skeleton.moved_matrices(bones, np.array(turns).reshape(-1, 4, 4))
     return Motion(weights, matrices, rig.positions_mm)
 
 
 def _missed_mm(rig: Rig, motion: Motion) -> float:
-    """How much farther any point lies out than the outline, in any direction [mm]."""
+    """Return the largest distance of any point beyond the outline, in any direction [mm]."""
     at_rest = Rig(motion.positions_mm, rig.targets, rig.skeleton)
-    every = at_rest.posed(motion.weights.astype(float), motion.matrices.astype(float))
+    every = at_rest.pose(motion.weights.astype(float), motion.matrices.astype(float))
     few = rig.outline_mm(motion)
     assert few.shape == (len(few), 3) and len(few) < len(every) / 2
     gap = (ANYWHERE @ every.T).max(axis=1) - (ANYWHERE @ few.T).max(axis=1)
@@ -65,4 +65,4 @@ def test_the_outline_of_a_rig_is_found_once() -> None:
 def test_points_alone_have_an_outline() -> None:
     rig = Rig(random_rig().positions_mm)
     assert _missed_mm(rig, rig.rest) < 1.0
-    assert len(outermost(rig.positions_mm)) <= 256
+    assert len(extreme_points(rig.positions_mm)) <= 256

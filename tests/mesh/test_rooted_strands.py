@@ -1,4 +1,4 @@
-"""Hairs on a mesh: rooted in its quads, whatever its subdivision, and moved by it."""
+"""Hair strands on a mesh: roots in quads, subdivision and movement."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.strands import Roots, Strands, finer_roots, frames, seen_from
+from dermis.mesh.strands import Roots, Strands, refine_roots, root_frames, to_root_frames
 from dermis.mesh.subdivide import subdivide_head
 
 Floats = NDArray[np.float64]
 
 
 def _sheet(bent: float = 0.0) -> Mesh:
-    """A sheet of 3 x 3 quads, 60 mm a side."""
+    """Return a sheet of 3 x 3 quads with sides of 60 mm."""
     row, column = (axis.ravel() for axis in np.mgrid[:4, :4])
     number = np.arange(16).reshape(4, 4)
     around = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
@@ -25,7 +25,7 @@ def _sheet(bent: float = 0.0) -> Mesh:
     places = np.column_stack((20.0 * column, -20.0 * row, bent * np.sin(column) * np.cos(row)))
     uv, pairs = np.column_stack((column / 3, row / 3)), np.arange(18).reshape(-1, 2)
     flat = np.zeros(18, np.int32)
-    return build_mesh(places, uv, halves(quads), flat, (Material("skin"),), quads=pairs)
+    return build_mesh(places, uv, split_quads(quads), flat, (Material("skin"),), quads=pairs)
 
 
 def _roots(mesh: Mesh, count: int = 40) -> Roots:
@@ -41,7 +41,7 @@ def _strands(mesh: Mesh) -> Strands:
     ways[:, 0] = 0.0
     return Strands(
         roots,
-        seen_from(mesh, roots, ways),
+        to_root_frames(mesh, roots, ways),
         np.full((count, 5), 0.04, np.float32),
         np.zeros((count, 3), np.float32),
     )
@@ -49,26 +49,26 @@ def _strands(mesh: Mesh) -> Strands:
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_roots_stay_where_they_are_on_a_finer_mesh(levels: int) -> None:
-    """In the middle of a flat sheet: only its corners are rounded."""
+    """Check roots in the middle of a flat sheet, where subdivision moves nothing."""
     mesh = _sheet()
     inside = np.flatnonzero(_roots(mesh, 400).quad == 4)
     roots = Roots(*(part[inside] for part in _roots(mesh, 400)))
     finer = subdivide_head(Head("sheet", mesh, Maps()), levels).mesh
-    before, _ = frames(mesh, roots, mesh.points_mm)
-    after, _ = frames(finer, finer_roots(mesh, roots, levels), finer.points_mm)
+    before, _ = root_frames(mesh, roots, mesh.points_mm)
+    after, _ = root_frames(finer, refine_roots(mesh, roots, levels), finer.points_mm)
     assert np.abs(before - after).max() < 0.6
     if levels == 3:  # borders are smoothed, and bring the rest along by a little
         assert np.abs(before - after).mean() < 0.3
 
 
 def test_a_subdivided_head_keeps_its_hairs() -> None:
-    """In space they point as before, from where their roots have gone."""
+    """Check that strands keep their directions in space after subdivision."""
     mesh = _sheet(bent=6.0)
     head = Head("sheet", mesh, Maps(), strands=_strands(mesh))
     finer = subdivide_head(head, 2)
     assert head.strands is not None and finer.strands is not None
-    before = head.strands.places_mm(mesh, mesh.points_mm)
-    after = finer.strands.places_mm(finer.mesh, finer.mesh.points_mm)
+    before = head.strands.knot_positions_mm(mesh, mesh.points_mm)
+    after = finer.strands.knot_positions_mm(finer.mesh, finer.mesh.points_mm)
     assert np.abs((after - after[:, :1]) - (before - before[:, :1])).max() < 1e-4
 
 
@@ -77,13 +77,13 @@ def test_hairs_turn_with_their_quad() -> None:
     strands, points = _strands(mesh), mesh.points_mm
     turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
-    still = strands.places_mm(mesh, points)
-    moved = strands.places_mm(mesh, points @ turn.T + 5.0)
+    still = strands.knot_positions_mm(mesh, points)
+    moved = strands.knot_positions_mm(mesh, points @ turn.T + 5.0)
     assert np.abs(moved - (still @ turn.T + 5.0)).max() < 1e-6
 
 
 def test_frames_are_orthonormal() -> None:
     mesh = _sheet(bent=9.0)
-    _, frame = frames(mesh, _roots(mesh), mesh.points_mm)
+    _, frame = root_frames(mesh, _roots(mesh), mesh.points_mm)
     assert np.abs(np.einsum("nic,njc->nij", frame, frame) - np.eye(3)).max() < 1e-12
     assert np.allclose(np.linalg.det(frame), 1.0)

@@ -1,4 +1,4 @@
-"""Quaternions, angles and matrices against each other and against scipy."""
+"""Quaternions, angles and matrices compared with each other and with SciPy."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Loop subdivision: topology, seams, borders and the surface it tends to."""
+"""Loop subdivision: topology, seams, borders and the limit surface."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from dermis.atlas.raster import chart_uv_area, charts
+from dermis.atlas.raster import chart_uv_area, find_charts
 from dermis.base.errors import DermisError
 from dermis.formats.mesh_checks import check_mesh
 from dermis.mesh.geometry import edges, weld
@@ -102,7 +102,7 @@ def test_seam_stays_welded_and_uncreased_and_uv_stays_cut() -> None:
 def test_uv_is_linear_and_no_chart_changes() -> None:
     sphere = uv_sphere(50, 16, 8)
     finer = subdivide(sphere, 2).mesh
-    before, after = charts(sphere), charts(finer)
+    before, after = find_charts(sphere), find_charts(finer)
     np.testing.assert_array_equal(np.repeat(before, 16), after)
     np.testing.assert_allclose(chart_uv_area(sphere, before), chart_uv_area(finer, after), rtol=1e-6)
     a, b, c = sphere.uv[sphere.triangles[7]]

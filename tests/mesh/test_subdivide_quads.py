@@ -1,4 +1,4 @@
-"""Catmull-Clark subdivision against its published rules, B-splines and formulas of limits."""
+"""Catmull-Clark subdivision compared with published rules, B-splines and formulas of limits."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def _quad_mesh(positions: np.ndarray, quads: np.ndarray, uv: np.ndarray | None =
 
 
 def _grid(rows: int, columns: int) -> np.ndarray:
-    """Quads of a grid of points, row after row."""
+    """Return the quads of a grid of points, row by row."""
     number = np.arange(rows * columns).reshape(rows, columns)
     corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
     return np.stack([corner.ravel() for corner in corners], axis=1)
 
 
 def _torus(major: float, minor: float, around: int = 32, across: int = 16) -> Mesh:
-    """Of quads alone, with uv seams along both circles."""
+    """Return a torus of quads with uv seams along both circles."""
     j, i = (axis.ravel() for axis in np.mgrid[: across + 1, : around + 1])
     phi, theta = 2 * np.pi * (i % around) / around, 2 * np.pi * (j % across) / across
     ring = major + minor * np.cos(theta)
@@ -47,7 +47,7 @@ def _torus(major: float, minor: float, around: int = 32, across: int = 16) -> Me
 
 
 def _on_grid(mesh: Mesh, size: int, values: np.ndarray) -> np.ndarray:
-    """Values of a mesh's vertices as (size, size, ...) by their uv."""
+    """Return the values of a mesh's vertices as (size, size, ...) by their uv."""
     column, row = np.rint(mesh.uv * (size - 1)).astype(int).T
     table = np.full((size, size, *values.shape[1:]), np.nan)
     table[row, column] = values

@@ -1,4 +1,4 @@
-"""Each point of a subdivided mesh as a mean of control points, and heads that move with them."""
+"""Stencils of subdivided meshes, and heads that move with them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dermis.mesh import subdivide as module
-from dermis.mesh.geometry import halves
+from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
@@ -20,7 +20,7 @@ from dermis.scene.heads import load_head
 
 
 def _quads() -> Mesh:
-    """An open, bent sheet of quads."""
+    """Return an open, bent sheet of quads."""
     row, column = (axis.ravel() for axis in np.mgrid[:6, :5])
     number = np.arange(30).reshape(6, 5)
     quads = np.stack(
@@ -30,7 +30,7 @@ def _quads() -> Mesh:
     uv = np.column_stack((column / 4, row / 5))
     pairs = np.arange(2 * len(quads)).reshape(-1, 2)
     return build_mesh(
-        positions, uv, halves(quads), np.zeros(2 * len(quads)), (Material("skin"),), quads=pairs
+        positions, uv, split_quads(quads), np.zeros(2 * len(quads)), (Material("skin"),), quads=pairs
     )
 
 
@@ -68,7 +68,7 @@ def test_a_moved_control_mesh_moves_the_finer_one(mesh: Mesh) -> None:
     finer = subdivide_head(head, 2)
     assert finer.targets == ("up",) and finer.rig is not None and finer.rig.stencils is not None
     np.testing.assert_array_equal(finer.positions_mm, head.positions_mm)
-    posed = finer.rig.posed(np.array([0.5]))
+    posed = finer.rig.pose(np.array([0.5]))
     loaded_anew = replace(mesh, positions=posed[mesh.point].astype(np.float32))
     expected = subdivide(loaded_anew, 2).mesh
     np.testing.assert_allclose(
@@ -95,7 +95,7 @@ def test_a_loaded_head_has_its_stencils(tmp_path: Path) -> None:
 def test_weights_of_large_meshes_are_kept_by_topology(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = _quads()
     expected = subdivide(mesh, 2)
-    monkeypatch.setattr(module, "_MANY", 0)
+    monkeypatch.setattr(module, "_CACHED_TRIANGLES", 0)
     made = subdivide(mesh, 2)
     monkeypatch.setattr(module, "_refined", None)  # another shape of the same topology computes no weights
     wider = subdivide(replace(mesh, positions=2 * mesh.positions), 2)

@@ -1,4 +1,4 @@
-"""Graphics adapters of the machine and their limits, and faster start of wgpu.
+"""Graphics adapters of the machine, their limits, and a faster start of wgpu.
 
 C types that wgpu looks up by name are registered in advance: cffi parses each new name together with all
 typedefs of the header, which takes some ten milliseconds, and a first frame looks up seventy-five.

@@ -46,7 +46,7 @@ def make_bind_group(
     values: Sequence[Untyped],
     records: Sequence[int],
 ) -> BindGroup:
-    """Create the bind group of some values.
+    """Create a bind group.
 
     values : a buffer, texture, texture view or sampler for each binding; the last ones are uniform buffers
     records : sizes of the records in the uniform buffers [byte]
@@ -69,7 +69,7 @@ def make_bind_group(
 
 
 class ResourceCache(Generic[T]):
-    """Cache keyed by the identity of resources, from which an entry goes with the first of its resources.
+    """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
 
     A bind group keeps the memory of its resources allocated, so it has to be dropped as soon as one of them
     is no longer used elsewhere.

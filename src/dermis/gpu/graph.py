@@ -137,7 +137,7 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Frame graph that runs only the stale ones of the passes that are declared on it.
+    """Frame graph that runs only those of the declared passes whose output is stale.
 
     The resources that a pass reads and writes follow from the bindings of its shader. The version that it
     writes follows from its program, its resources and their versions, the workgroups, and the uniforms that

@@ -84,7 +84,7 @@ def make_texture(
 
 
 def make_view(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
-    """Create a 2-D view of one mip level of one layer, with these two as its `layer_and_mip`."""
+    """Create a 2-D view of one mip level of one layer of a texture."""
     view = texture.create_view(
         dimension="2d", base_array_layer=layer, array_layer_count=1, base_mip_level=mip, mip_level_count=1
     )

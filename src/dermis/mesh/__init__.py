@@ -1,1 +1,1 @@
-"""Heads as geometry: polygons, rigs and poses, eyes, hairs, and the maps that come with them."""
+"""Meshes and heads: geometry, rigs, poses, eyeballs, hair strands and subdivision."""

@@ -1,4 +1,4 @@
-"""A motion of a head over time."""
+"""Motion of a head over time."""
 
 from __future__ import annotations
 
@@ -10,28 +10,48 @@ from dermis.base.quantities import checked_number
 from dermis.base.summary import ShortRepr
 from dermis.mesh.pose import Pose
 
-_SHOWN = 8  # names in a note
+_MAX_NAMES = 8  # in a note
 MAX_DURATION_S = 86_400.0
-_LATEST_S = 1e9
-_SLOWEST, _FASTEST = 0.001, 1000.0
-_EARLY = 1e-6  # of a frame: how far a frame that rounding lost may lie before the end
+_MAX_TIME_S = 1e9
+_MIN_RATE, _MAX_RATE = 0.001, 1000.0
+_ROUNDING = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
 def check_rate(culprit: object, rate: object) -> float:
-    """Frames a second; raises DermisError for what are none."""
-    return checked_number(culprit, rate, _SLOWEST, _FASTEST, "frames a second")
+    """Return a frame rate [1/s]; raise DermisError if it is not one."""
+    return checked_number(culprit, rate, _MIN_RATE, _MAX_RATE, "frames a second")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clip(ShortRepr):
-    """A motion that a file holds, for one head: `pose_at` gives its pose at any time.
+    """Motion of a head over time, as read from a file by `load_motion`.
 
-    name : of the clip, else of its file
-    duration_s : the time of its last frame [s]
-    rate : its own frames a second; None where it has none
-    targets, bones : names of the head's that it moves
-    left_out : names in the file that the head lacks
-    sample : the pose at a time from 0 to its duration [s]
+    Parameters
+    ----------
+    name : str
+        Name of the clip, or of its file.
+    duration_s : float
+        Time of the last frame [s].
+    rate : float or None
+        Frame rate of the file [1/s], if it has one.
+    targets, bones : tuple of str
+        Names of the morph targets and bones that the clip moves.
+    left_out : tuple of str
+        Names in the file that the head does not have.
+    sample : callable
+        Function that returns the pose at a time from 0 to the duration [s].
+
+    Raises
+    ------
+    DermisError
+        For a duration of more than a day.
+
+    Examples
+    --------
+    >>> from dermis import Clip, Pose
+    >>> clip = Clip("nod", 2.0, None, ("jawOpen",), (), (), lambda t: Pose({"jawOpen": t / 2}))
+    >>> clip.pose_at(1.0).weights["jawOpen"], clip.frame_count(30.0)
+    (0.5, 61)
     """
 
     name: str
@@ -43,31 +63,61 @@ class Clip(ShortRepr):
     sample: Callable[[float], Pose]
 
     def pose_at(self, seconds: float) -> Pose:
-        """The pose at a time [s]; before its beginning and after its end the first and the last.
+        """Return the pose at a time.
 
-        Raises DermisError for a time that is none, and for a frame that cannot be read.
+        Parameters
+        ----------
+        seconds : float
+            Time [s]; before the start and after the end the first and the last pose are returned.
+
+        Returns
+        -------
+        Pose
+            Pose of the head.
+
+        Raises
+        ------
+        DermisError
+            For an invalid time, and for a frame that cannot be read.
         """
-        time_s = checked_number(f"{self.name}: time", seconds, -_LATEST_S, _LATEST_S, "s")
+        time_s = checked_number(f"{self.name}: time", seconds, -_MAX_TIME_S, _MAX_TIME_S, "s")
         return self.sample(min(max(time_s, 0.0), self.duration_s))
 
     def frame_count(self, rate: float) -> int:
-        """How many frames it has at a rate [1/s]: frame k is at k / rate, the last not after its end."""
-        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _EARLY) + 1
+        """Return the number of frames at a frame rate.
+
+        Parameters
+        ----------
+        rate : float
+            Frame rate [1/s]; frame k is at the time k / rate, and the last one is not after the end.
+
+        Returns
+        -------
+        int
+            Number of frames.
+
+        Raises
+        ------
+        DermisError
+            For an invalid rate.
+        """
+        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING) + 1
 
     def __post_init__(self) -> None:
+        """Check the duration."""
         checked_number(
             f"{self.name}: duration",
             self.duration_s,
             0.0,
             MAX_DURATION_S,
-            "s: no motion lasts longer than a day",
+            "s: no motion is longer than a day",
         )
 
     @property
     def note(self) -> str:
-        """What is left out, in a sentence; empty when all of it is used."""
+        """Return a sentence about the names that are left out, empty if all are used."""
         if not self.left_out:
             return ""
-        names = ", ".join(self.left_out[:_SHOWN])
-        more = f" and {len(self.left_out) - _SHOWN} more" if len(self.left_out) > _SHOWN else ""
+        names = ", ".join(self.left_out[:_MAX_NAMES])
+        more = f" and {len(self.left_out) - _MAX_NAMES} more" if len(self.left_out) > _MAX_NAMES else ""
         return f"{self.name}: the head has no {names}{more}; left out."

@@ -1,4 +1,4 @@
-"""What makes eyes look different from others."""
+"""Appearance of the eyes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,29 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class EyeLook:
-    """What makes eyes look different.
+    """Appearance of the eyes.
 
-    eumelanin : of the iris, from none, which leaves it blue, to the darkest brown, 0 to 1 [-]
-    pupil_mm : radius of the pupil, 1 to 4 [mm]
-    redness : of the white of the eye, 0 to 1 [-]
-    seed : which fibres and vessels, any integer from 0
+    Parameters
+    ----------
+    eumelanin : float, optional
+        Eumelanin of the iris, from 0 for blue to 1 for the darkest brown [-].
+    pupil_mm : float, optional
+        Radius of the pupil, 1 to 4 [mm].
+    redness : float, optional
+        Redness of the white of the eye, 0 to 1 [-].
+    seed : int, optional
+        Seed of the pattern of fibres and vessels, from 0.
+
+    Raises
+    ------
+    DermisError
+        For values outside these ranges.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.EyeLook(eumelanin=0.1).pupil_mm
+    1.9
     """
 
     eumelanin: float = 0.6
@@ -31,4 +48,5 @@ class EyeLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        """Check the ranges of all fields."""
         check_fields(self, LIMITS, "eyes: ")

@@ -27,27 +27,27 @@ UV_FALLOFF = 0.9
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
-    """How far before the middle of a ball the cornea begins, at the limbus [mm]."""
+    """Return the distance of the plane of the limbus from the centre of a ball of this radius [mm]."""
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
 
 def cornea_centre_mm() -> float:
-    """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
+    """Return the position of the centre of the cornea's front on the axis [mm]."""
     return limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(CORNEA_MM)
 
 
 def apex_mm() -> float:
-    """Where on the axis the cornea's apex lies [mm]."""
+    """Return the position of the cornea's apex on the axis [mm]."""
     return cornea_centre_mm() + CORNEA_MM
 
 
 def iris_mm() -> float:
-    """Where on the axis the plane of the iris lies [mm]."""
+    """Return the position of the plane of the iris on the axis [mm]."""
     return apex_mm() - IRIS_BEHIND_MM
 
 
 def profile_mm(angle: Doubles) -> Doubles:
-    """Distance from the ball's centre to its surface, by the angle from its axis [rad] [mm]."""
+    """Return the distance of the surface from the ball's centre at an angle from the axis [rad] [mm]."""
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
     edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
@@ -55,9 +55,9 @@ def profile_mm(angle: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
-    """How far places (..., 3) lie from the centre and how far the surface does on the way to them [mm].
+    """Return the distances of points (..., 3) from the centre, and of the surface in their directions [mm].
 
-    axis : (..., 3) unit vectors along which the eye looks
+    axis : (..., 3) unit vectors of the eyes' axes
     """
     distance = np.linalg.norm(points, axis=-1)
     cosine = (points * axis).sum(axis=-1) / np.maximum(distance, 1e-9)
@@ -66,13 +66,13 @@ def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Double
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LidContact(ShortRepr):
-    """Control points that stay off the eyeballs of a head, cornea included, wherever these look.
+    """Control points of the lids that stay outside the eyeballs, cornea included, in any pose.
 
     point : (n,) control points of lids
-    ball : (n,) which of the eyeballs each slides over
-    clear_mm : (n,) least distance from its surface, in mm of a usual eye
-    apex, back : (k,) control points of each eyeball: the cornea's apex and the one opposite
-    edge : (k, r) those of the lids' edges, which touch the eye, once around each opening
+    ball : (n,) eyeball over which each of them slides
+    min_clearance_mm : (n,) smallest distance from its surface, in mm of an adult eye
+    apex, back : (k,) control points of each eyeball: apex of the cornea and the point opposite to it
+    edge : (k, r) control points along the edges of the lids, once around each opening
     """
 
     point: Ints
@@ -83,7 +83,7 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """(p, 3) all control points of a posed head, with those of the lids pushed out of the eyes [mm]."""
+        """Return the control points (p, 3) of a posed head, with lids pushed out of the eyes [mm]."""
         apex, back = points_mm[self.apex], points_mm[self.back]
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
         scale, axis = length / (apex_mm() + SCLERA_MM), (apex - back) / length
@@ -98,9 +98,10 @@ class LidContact(ShortRepr):
 
 @cache
 def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]:
-    """(n, 3) points of an eyeball around its centre, looking along +Z [mm], and (q, 4) quads.
+    """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
-    swell : by how much control points lie outside of the smooth surface that they make
+    side : quads along each edge of the cube that becomes the ball
+    scale : factor of the points, for control points outside the smooth surface that they produce
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # even in angle
@@ -123,7 +124,7 @@ def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]
 
 @cache
 def eyeball_uv(side: int = SIDE) -> Doubles:
-    """(n, 2) uv of an eyeball's points: seen along its axis, by the angle from there; the back is the rim."""
+    """Return the uv (n, 2) of an eyeball's points: a polar map about its axis, with the back at the rim."""
     x, y, z = _directions(side).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
     radius = UV_RIM * angle / np.pi
@@ -131,7 +132,7 @@ def eyeball_uv(side: int = SIDE) -> Doubles:
 
 
 def axis_points(side: int = SIDE) -> tuple[int, int, int]:
-    """Points of an eyeball: the cornea's apex, the one opposite, and the one of the equator along +X."""
+    """Return the indices of the cornea's apex, the point opposite, and the point on the equator at +X."""
     directions, axes = _directions(side), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
     apex, back, right = (int(np.argmax(directions @ np.array(axis))) for axis in axes)
     return apex, back, right
@@ -144,10 +145,10 @@ def _directions(side: int) -> Doubles:
 
 @dataclass(frozen=True, eq=False)
 class EyeTextures:
-    """An eyeball as it is seen along its axis, by the layout, row 0 at v = 0.
+    """Textures of an eyeball as seen along its axis, in the layout of `eye_uv`, with row 0 at v = 0.
 
     colour : (n, n, 3) linear [-]
-    normal : (n, n, 3) unit, of what lies below the film of tears, by the axes of the layout, green up
+    normal : (n, n, 3) unit normals of the surface below the tear film, in the axes of the layout, green up
     """
 
     colour: Floats
@@ -155,7 +156,7 @@ class EyeTextures:
 
 
 def eye_uv(points: Doubles) -> Floats:
-    """(n, 2) uv of places around an eyeball's middle (n, 3), z along its axis."""
+    """Return the texture uv (n, 2) of points (n, 3) around an eyeball's centre, with z along its axis."""
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])
     radius = UV_RIM * np.expm1(-angle / UV_FALLOFF) / np.expm1(-np.pi / UV_FALLOFF)

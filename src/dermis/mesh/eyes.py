@@ -1,4 +1,4 @@
-"""Eyeballs of true shape in a head: which of its points tell where they are and where they look."""
+"""Eyeballs of realistic shape in a head, given by control points."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from dermis.mesh.rig import Motion, Rig
 
 @dataclass(frozen=True, repr=False)
 class Eyes(ShortRepr):
-    """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
+    """The eyeballs of a head: balls with a cornea, see mesh/eyeball.py.
 
-    apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to
-        the right of who looks out of it
-    material : (k,) index of what its triangles are made of
-    look : of both
-    ball_mm, middle_mm : (k,) radius of each ball, and where on the axis its middle lies, in mm of a usual
-        eye, whose cornea it has; 0 for the middle of one of usual size
-    sight : (k, 3) the way each looks in its own space: along the axis, unless lids show it elsewhere
+    apex, back, side : (k,) control points of each eyeball: apex of the cornea, the point opposite to it, and
+        the point of the equator towards +X when the head looks along +Z
+    material : (k,) index of the material
+    look : appearance of both eyes
+    radius_mm : (k,) radius of the ball, relative to an eye with a cornea of adult size
+    centre_offset_mm : (k,) position of the ball's centre on the axis, 0 for a ball of adult size
+    gaze : (k, 3) direction of gaze in the eye's own coordinates: the axis, or another one that the lids
+        suggest
     """
 
     apex: Ints
@@ -36,9 +37,10 @@ class Eyes(ShortRepr):
     gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
-        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis.
+        """Return the matrices (k, 4, 4) from the head's coordinates [mm] to those of each eye.
 
-        The cornea lies in all spaces where a usual eye has it, whatever the size of the ball behind.
+        An eye's coordinates are in mm of an eye with a cornea of adult size, with z along its axis. The
+        cornea is at the same position in all of them, whatever the size of the ball.
         """
         count = len(self.apex)
         points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), motion)
@@ -57,5 +59,5 @@ class Eyes(ShortRepr):
         return frames
 
     def with_look(self, look: EyeLook) -> Eyes:
-        """The same eyes of another look."""
+        """Return the eyes with another appearance."""
         return replace(self, look=look)

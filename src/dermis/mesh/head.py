@@ -1,4 +1,4 @@
-"""A head to render: mesh and maps in one."""
+"""Heads: a mesh with maps, rig, eyes and hair."""
 
 from __future__ import annotations
 
@@ -18,18 +18,40 @@ from dermis.mesh.strands import Strands
 
 @dataclass(frozen=True, repr=False)
 class Head:
-    """A mesh in mm with its maps.
+    """A head to render: a mesh in millimetres with maps, rig, eyes and hair.
 
-    name : sample or file
-    attribution : whom to credit when a picture of it is shown, empty when that is not required
-    rig : what moves it; None for a head whose points move only if all their places are given
-    eyes : its eyeballs, where they are of true shape
-    strands : its brows and lashes, None for none
-    hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
-    note : what could not be made of its file, and why; empty for nothing
-    levels : of subdivision that its mesh has come through
-    template : the head whose atlas and tables serve this one too, and all others with its layout, triangles
-        and points; None for a head with its own
+    `load_head` reads heads from files; `Human.head` generates them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the sample or of the file.
+    mesh : Mesh
+        Triangles with uv [mm].
+    maps : Maps
+        Colour, relief and other maps.
+    attribution : str, optional
+        Credit that pictures of the head require, empty for none.
+    rig : Rig, optional
+        Morph targets and bones; None for a head that moves only by the positions of all its points.
+    eyes : Eyes, optional
+        Eyeballs of realistic shape.
+    strands, hair : Strands, optional
+        Brows and lashes; hair of head and beard in random order, so that a few can represent all from afar.
+    note : str, optional
+        Parts of the file that are not used, and why; empty for none.
+    levels : int, optional
+        Levels of subdivision of the mesh.
+    template : Head, optional
+        Head of the same topology and uv layout whose atlas and tables serve this one too.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps()).positions_mm.shape
+    (26, 3)
     """
 
     name: str
@@ -45,25 +67,25 @@ class Head:
     template: Head | None = None
 
     def __repr__(self) -> str:
-        """Name, size, maps and what moves it, on two lines."""
+        """Return name, size, maps and rig on two lines."""
         maps = [one.name for one in fields(Maps) if getattr(self.maps, one.name) is not None]
-        told = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.is_painted else [])]) or 'none'}"]
+        parts = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.is_painted else [])]) or 'none'}"]
         counts = {"targets": len(self.targets), "bones": len(self.bones)}
-        told += [f"{count} {name}" for name, count in counts.items() if count]
-        told += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
+        parts += [f"{count} {name}" for name, count in counts.items() if count]
+        parts += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
         size = f"{len(self.mesh.triangles):,} triangles at level {self.levels} of subdivision"
-        return f"<Head {self.name!r}: {size}\n {'; '.join(told)}>"
+        return f"<Head {self.name!r}: {size}\n {'; '.join(parts)}>"
 
     @cached_property
     def control(self) -> Rig:
-        """Its rig, or that of its points alone."""
+        """Return the rig, or for a head without one a rig of its points only."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
 
     @cached_property
     def bare(self) -> Head:
-        """Its shape and what moves it, the same whatever it looks like."""
+        """Return the head without maps and eye colours, which is equal for looks of one shape."""
         if self.rig is None:
             return self
         eyes = self.eyes and self.eyes.with_look(EyeLook())
@@ -71,40 +93,41 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """The bare head that atlas and tables are made for: the template of its rig, or itself."""
-        shared = self.template
-        own = shared is None or self.rig is None or self.rig.template is not shared.rig
-        return self.bare if shared is None or own else shared
+        """Return the head whose atlas and tables serve this one: its template, or itself without a look."""
+        template = self.template
+        if template is None or self.rig is None or self.rig.template is not template.rig:
+            return self.bare
+        return template
 
     @property
     def positions_mm(self) -> Floats:
-        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm].
+        """Return the unique points (n, 3) of the mesh as loaded, before any subdivision [mm].
 
-        Without those of eyeballs that are not the file's own, see `Rig.rigid_followers`.
+        Points of eyeballs that are not in the file are left out, see `Rig.rigid_followers`.
         """
-        places = self.control.positions_mm
-        return places[: self.control.file_point_count] if self.control.rigid_followers else places
+        positions = self.control.positions_mm
+        return positions[: self.control.file_point_count] if self.control.rigid_followers else positions
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Names of its morph targets."""
+        """Return the names of the morph targets."""
         return self.control.targets.names
 
     @property
     def bones(self) -> tuple[str, ...]:
-        """Names of its bones."""
+        """Return the names of the bones."""
         skeleton = self.control.skeleton
         return skeleton.names if skeleton else ()
 
     @property
     def centre_mm(self) -> tuple[float, float, float]:
-        """The middle of the head itself, without neck and shoulders: scenes are placed around it [mm]."""
+        """Return the centre of the head without neck and shoulders, around which scenes are built [mm]."""
         return self.mesh.skull_centre_mm
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
-        """The point of the surface in front of (x, y), relative to the centre [mm]."""
+        """Return the frontmost point of the surface at (x, y), both relative to the centre [mm]."""
         p = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
-        off = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
-        near = off <= max(6.0, float(off.min()) + 1.0)
+        distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
+        near = distance <= max(6.0, float(distance.min()) + 1.0)
         x, y, z = p[near][np.argmax(p[near][:, 2])]
         return float(x), float(y), float(z)

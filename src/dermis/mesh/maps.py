@@ -1,4 +1,4 @@
-"""Maps of a mesh, in the units that the renderer works with."""
+"""Maps of the skin, in the units of the renderer."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.summary import ShortRepr
 
-_MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest stride
+_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # for means: samples along each side, and largest distance of them
 
 
 @dataclass(frozen=True, repr=False)
 class Maps(ShortRepr):
-    """Maps of the skin, None where there is none. Row 0 is the top; sizes may differ from map to map.
+    """Maps of the skin; None for a map that a head does not have.
+
+    Row 0 is the top of the map; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]
-    normal : (H, W, 2) slopes dh/du and dh/d(up) of the bumps, up being towards row 0 [-]
+    normal : (H, W, 2) slopes dh/du and dh/d(up) of the relief, where up is towards row 0 [-]
     height : (H, W) outwards, from an arbitrary zero [mm]
-    specular : (H, W) plain grey 0..1; the renderer scales it to a mean over the skin [-]
-    roughness : (H, W) plain grey 0..1 [-]
-    region : (H, W) uint8 part of the face, an index into the head's own list
+    specular : (H, W) grey 0..1, which the renderer scales to a mean over the skin [-]
+    roughness : (H, W) grey 0..1 [-]
+    region : (H, W) uint8 index of the facial region in the head's list
     """
 
     colour: Floats | None = None
@@ -37,15 +39,15 @@ class Maps(ShortRepr):
 
     @property
     def has_roughness(self) -> bool:
-        """Whether the roughness comes from a map."""
+        """Return whether there is a roughness map."""
         return self.roughness is not None
 
     @cached_property
     def mean_colour(self) -> Doubles | None:
-        """(3,) of the colour map, without the black texels of empty space [-]."""
+        """Return the mean (3,) of the colour map without its black, unused texels [-]; None without a map."""
         if self.colour is None:
             return None
-        apart = int(np.clip(min(self.colour.shape[:2]) // _MEAN_TEXELS, 1, _MOST_APART))
-        texels = self.colour[::apart, ::apart].reshape(-1, 3).astype(np.float64)
-        painted = texels[texels.sum(axis=1) > 0.0]
-        return np.asarray(painted.mean(axis=0)) if len(painted) else np.zeros(3)
+        stride = int(np.clip(min(self.colour.shape[:2]) // _MEAN_SAMPLES, 1, _MAX_STRIDE))
+        texels = self.colour[::stride, ::stride].reshape(-1, 3).astype(np.float64)
+        used = texels[texels.sum(axis=1) > 0.0]
+        return np.asarray(used.mean(axis=0)) if len(used) else np.zeros(3)

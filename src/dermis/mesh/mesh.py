@@ -1,4 +1,4 @@
-"""The one mesh type of the package: triangles with uv, in millimetres."""
+"""The mesh type of the package: triangles with uv, in millimetres."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ MOUTH_PARTS: tuple[MouthPart, ...] = ("upper teeth", "lower teeth", "tongue")
 
 @dataclass(frozen=True)
 class Material:
-    """What a group of triangles is made of.
+    """Material of a group of triangles.
 
-    name : the group's name in the file
-    kind : "skin" gets the whole technique, "opaque" plain diffuse and specular (eyeballs, teeth)
-    colour : diffuse albedo where no map gives one, linear Rec. 709 [-]
-    part : of a mouth whose layout tells where its teeth are, see mouth.wgsl
-    eye : whether the file says that eyeballs are made of it
+    name : name of the group in the file
+    kind : "skin" is rendered with subsurface scattering, "opaque" with a diffuse and a specular lobe
+    colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
+    part : part of the mouth, where the uv layout tells teeth and tongue apart, see mouth.wgsl
+    eye : whether the file declares the group to be an eyeball
     """
 
     name: str
@@ -41,17 +41,19 @@ class Material:
 
 @dataclass(frozen=True, repr=False)
 class Mesh(ShortRepr):
-    """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
+    """Triangles with attributes at vertices.
 
-    A point on a uv seam has one corner vertex for each of its uvs; `point` is the same for all of them.
+    Y is up and the face looks towards +Z; the outside of a triangle is where its corners are
+    counter-clockwise. A point on a uv seam has one vertex for each of its uvs; `point` is the same for all of
+    them.
 
     positions : (v, 3) [mm]
     normals : (v, 3) unit vectors
     uv : (v, 2) u to the right, v DOWN: (0, 0) is the top-left corner of every map, in [0, 1]
     point : (v,) index of the unique position
-    triangles : (f, 3) corner vertices
+    triangles : (f, 3) vertices
     material : (f,) index into `materials`
-    quads : (q, 2) triangles (a, b, c) and (c, d, a) that are the halves of a quad abcd; no rows for none
+    quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that are a quad abcd; no rows for none
     """
 
     positions: Floats
@@ -65,33 +67,33 @@ class Mesh(ShortRepr):
 
     @property
     def points_mm(self) -> Doubles:
-        """(p, 3) the unique positions [mm]."""
+        """Return the unique positions (p, 3) [mm]."""
         points = np.zeros((int(self.point.max()) + 1, 3))
         points[self.point] = self.positions
         return points
 
     @property
     def size_mm(self) -> Floats:
-        """Extent along x, y and z [mm]."""
+        """Return the extent along x, y and z [mm]."""
         return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
     def outline(self) -> Outline:
-        """Corners of the convex hull."""
+        """Return the corners of the convex hull."""
         return convex_hull(self.positions)
 
     @cached_property
     def skull_centre_mm(self) -> tuple[float, float, float]:
-        """The middle of a head, without neck and shoulders [mm]."""
+        """Return the centre of a head without neck and shoulders [mm]."""
         x, y, z = self.positions.T
         top = float(y.max())
         skull = y > top - 2 * _CROWN_TO_CENTRE_MM
-        middle_x, middle_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
-        return middle_x, top - _CROWN_TO_CENTRE_MM, middle_z
+        centre_x, centre_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
+        return centre_x, top - _CROWN_TO_CENTRE_MM, centre_z
 
     @cached_property
     def topology_key(self) -> bytes:
-        """The same for all meshes that differ in where their points are alone."""
+        """Return a digest that is equal for meshes which differ only in the positions of their points."""
         digest = hashlib.blake2b(digest_size=16)
         for part in (self.uv, self.point, self.triangles, self.material):
             digest.update(np.ascontiguousarray(part).tobytes())
@@ -99,25 +101,26 @@ class Mesh(ShortRepr):
 
     @property
     def dpdu(self) -> Floats:
-        """(v, 3) change of position with u, averaged over the faces around [mm per unit of uv]."""
+        """Return the derivative of the position by u (v, 3), a mean over adjacent faces [mm per unit]."""
         return self._tangents[0]
 
     @property
     def dpdv(self) -> Floats:
-        """(v, 3) the same with v."""
+        """Return the derivative of the position by v (v, 3), a mean over adjacent faces [mm per unit]."""
         return self._tangents[1]
 
     @cached_property
     def _tangents(self) -> tuple[Floats, Floats]:
-        # Only when asked: of a person, whose atlas is its template's, nobody does.
+        # Computed on demand, as a person that uses the atlas of its template needs none.
         return tangents(self.positions, self.uv, self.normals, self.triangles)
 
 
-def _trusted(given: Floats, computed: Floats) -> Floats:
-    """The given normals where they are finite and nearly unit, else the computed ones."""
-    length = np.linalg.norm(np.where(np.isfinite(given), given, 0).astype(np.float64), axis=1, keepdims=True)
-    good = np.isfinite(given).all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
-    return np.asarray(np.where(good, given / np.where(good, length, 1), computed).astype(np.float32))
+def _valid_normals(normals: Floats, computed: Floats) -> Floats:
+    """Return the normals where they are finite and nearly unit vectors, else the computed ones."""
+    finite = np.isfinite(normals)
+    length = np.linalg.norm(np.where(finite, normals, 0).astype(np.float64), axis=1, keepdims=True)
+    valid = finite.all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
+    return np.asarray(np.where(valid, normals / np.where(valid, length, 1), computed).astype(np.float32))
 
 
 def build_mesh(
@@ -130,23 +133,27 @@ def build_mesh(
     point: ArrayLike | None = None,
     quads: ArrayLike = (),
 ) -> Mesh:
-    """A `Mesh` with its points welded and its normals computed.
+    """Build a `Mesh`; points are welded and normals computed if they are not given.
 
     positions : (v, 3) finite [mm]
     uv : (v, 2) v down
-    triangles : (f, 3) corner vertices, at least one
+    triangles : (f, 3) vertices, at least one triangle
     material : (f,) index into `materials`
-    normals : (v, 3) kept where finite and of unit length; computed where not, or when None
-    point : (v,) welded points if known; positions that are equal are welded when None
-    quads : (q, 2) triangles that are the halves of a quad, as `Mesh` has them
+    normals : (v, 3) used where they are finite and of unit length, computed elsewhere
+    point : (v,) index of the unique position; if None, equal positions are welded
+    quads : (q, 2) pairs of triangles, see `Mesh`
     """
-    place = np.ascontiguousarray(positions, dtype=np.float32)
-    corner = np.ascontiguousarray(triangles, dtype=np.int32)
-    flat = np.ascontiguousarray(uv, dtype=np.float32)
-    points = weld(place) if point is None else np.asarray(point, dtype=np.int32)
-    normal = vertex_normals(place, points, corner)
-    if normals is not None:
-        normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
-    groups = np.ascontiguousarray(material, dtype=np.int32)
-    pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
-    return Mesh(place, normal, flat, points, corner, groups, tuple(materials), pairs)
+    positions = np.ascontiguousarray(positions, dtype=np.float32)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+    points = weld(positions) if point is None else np.asarray(point, dtype=np.int32)
+    computed = vertex_normals(positions, points, triangles)
+    return Mesh(
+        positions,
+        computed if normals is None else _valid_normals(np.asarray(normals, dtype=np.float32), computed),
+        np.ascontiguousarray(uv, dtype=np.float32),
+        points,
+        triangles,
+        np.ascontiguousarray(material, dtype=np.int32),
+        tuple(materials),
+        np.asarray(quads, dtype=np.int32).reshape(-1, 2),
+    )

@@ -1,4 +1,4 @@
-"""Morph targets: displacements of points by name."""
+"""Morph targets: named displacements of points."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from dermis.base.summary import ShortRepr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MorphTargets(ShortRepr):
-    """Displacements of some of the points by name, target after target.
+    """Displacements of some of the points, target after target.
 
     names : (t,)
-    first : (t + 1,) where each target's displacements begin
-    point : (n,) the point that each moves
-    delta_mm : (n, 3) by how much at weight 1
-    rest : (t,) weights with which the points at rest were made; None where all are 0
+    first : (t + 1,) index of the first displacement of each target
+    point : (n,) point of each displacement
+    delta_mm : (n, 3) displacement at weight 1
+    rest : (t,) weights in the rest pose; None if all are 0
     """
 
     names: tuple[str, ...]
@@ -30,22 +30,22 @@ class MorphTargets(ShortRepr):
 
     @cached_property
     def index(self) -> dict[str, int]:
-        """Number of each target by its name."""
+        """Return the index of each target by its name."""
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
     def point_order(self) -> Intp:
-        """(n,) the displacements in the order of their points, and of targets for each."""
+        """Return the order (n,) of the displacements by point, and by target for each point."""
         return np.argsort(self.point, kind="stable")
 
     def rows(self, target: int) -> slice:
-        """Which of the displacements are a target's."""
+        """Return the slice of a target's displacements."""
         return slice(int(self.first[target]), int(self.first[target + 1]))
 
     def dense(self, points: Intp, count: int) -> Floats:
-        """(t, n, 3) displacements of some points by all targets.
+        """Return the displacements (t, n, 3) of some points by all targets.
 
-        count : of all points
+        count : number of all points
         """
         column_of = np.full(count, -1, np.int64)
         column_of[points] = np.arange(len(points))
@@ -58,5 +58,5 @@ class MorphTargets(ShortRepr):
 
 
 def no_targets() -> MorphTargets:
-    """Of a head that has none."""
+    """Return morph targets without any target."""
     return MorphTargets((), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3), np.float32))

@@ -1,7 +1,7 @@
 """Outlines: the few points of a shape that bound it in every direction.
 
-Shadow maps and depth ranges are fitted to these points. For a rig they are found once, from the rest pose, each
-morph target and random poses, so that its bounds in any pose follow from few points.
+Shadow maps and depth ranges are fitted to these points. For a rig they are found once, from the rest pose,
+each morph target and random poses, so that its bounds in any pose follow from few points.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ _MIN_WEIGHT = 0.02  # of a bone for a point to follow it
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outline(ShortRepr):
-    """Places of a shape beyond which, seen from wherever, none of it lies.
+    """Points that bound a shape in every direction.
 
     points_mm : (n, 3)
-    margin_mm : how far out some of it may lie all the same; depth ranges leave so much room
+    margin_mm : largest distance of the shape beyond the bounds of these points, which depth ranges add
     """
 
     points_mm: NDArray[np.floating]
@@ -45,27 +45,24 @@ class Outline(ShortRepr):
 
     @cached_property
     def homogeneous(self) -> Floats:
-        """(4, n) the places as columns, each with a 1 below, for matrices from its left [mm].
-
-        As exact as a mesh's positions, and what comes of it in each frame takes half the memory.
-        """
+        """Return the points as homogeneous columns (4, n), in single precision like meshes [mm]."""
         return np.vstack([self.points_mm.T, np.ones(len(self.points_mm))]).astype(np.float32)
 
     @cached_property
     def centre_mm(self) -> tuple[float, float, float]:
-        """Halfway between the least and the largest coordinates [mm]."""
+        """Return the centre of the bounding box [mm]."""
         x, y, z = 0.5 * (self.points_mm.min(axis=0) + self.points_mm.max(axis=0))
         return float(x), float(y), float(z)
 
 
 def convex_hull(positions: NDArray[np.floating]) -> Outline:
-    """The corners of the convex hull of (n, 3) positions [mm]."""
+    """Return the corners of the convex hull of (n, 3) positions [mm]."""
     points = positions.astype(np.float64)
     return Outline(points[hull_vertices(points)])
 
 
 def hull_vertices(positions: NDArray[np.floating]) -> Intp:
-    """Numbers of the positions (n, 3) that are corners of the convex hull of all."""
+    """Return the indices of the positions (n, 3) that are corners of their convex hull."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -76,12 +73,12 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """Some of a rig's points, with all that moves them, dense; points are columns.
+    """Some points of a rig with dense morph targets and skin weights; points are columns.
 
-    rest_mm : (4, s) with a 1 below each
-    delta_mm : (t, 3 s) by each target at weight 1
-    weight : (b, s) of the bones that any of them follow; None without bones
-    bones : (b,) the numbers of these
+    rest_mm : (4, s) homogeneous points at rest
+    delta_mm : (t, 3 s) displacements by each target at weight 1
+    weight : (b, s) weights of the bones that move any of the points; None without bones
+    bones : (b,) indices of these bones
     """
 
     rest_mm: Floats
@@ -90,10 +87,10 @@ class RigOutline(ShortRepr):
     bones: Intp
 
     def pose(self, weights: Floats, matrices: Floats) -> Floats:
-        """(s, 3) where they are [mm].
+        """Return the points (s, 3) in a pose [mm].
 
-        weights : (t,) of the targets, beyond those at rest
-        matrices : of all bones, (b, 3, 4)
+        weights : (t,) of the targets, relative to the rest pose
+        matrices : (b, 3, 4) of all bones of the rig
         """
         columns, active = self.rest_mm, weights.nonzero()[0]
         if len(active):
@@ -107,8 +104,13 @@ class RigOutline(ShortRepr):
         return np.asarray((blended.reshape(3, 4, -1) * columns).sum(axis=1).T)
 
 
-def rig_outline(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp) -> RigOutline:
-    """Some points (s,) of a rig that rests at places (p, 3) [mm]."""
+def rig_outline(
+    positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp
+) -> RigOutline:
+    """Return some points (s,) of a rig with what moves them.
+
+    positions : (p, 3) of all points at rest [mm]
+    """
     rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])
     delta = targets.dense(points, len(positions)).transpose(0, 2, 1).reshape(-1, 3 * len(points))
     if skeleton is None:
@@ -128,12 +130,12 @@ def hull_corners(positions: Floats) -> Intp:
 
 
 def extreme_points(positions: Floats, count: int = _FEW_DIRECTIONS) -> Intp:
-    """Numbers of the points (p, 3) that lie farthest in any of some directions."""
+    """Return the indices of the points (p, 3) that are farthest in any of `count` directions."""
     return np.unique(np.concatenate([height.argmax(axis=1) for height in _heights(positions, count)]))
 
 
 def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Numbers of the points of a rig that are outermost at rest, with one target, or in some pose."""
+    """Return the indices of a rig's points that are extreme at rest, with one target, or in a random pose."""
     candidates = _candidates(positions, targets, skeleton)
     outline = rig_outline(positions, targets, skeleton, candidates)
     rest = np.zeros((0, 3, 4), np.float32) if skeleton is None else skeleton.rest_matrices
@@ -151,7 +153,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 
 
 def _add_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
-    """Take the points that lie farther out in one of some directions than those taken before."""
+    """Mark points as chosen that are farther in one of the directions than those chosen before."""
     for height in _heights(positions, count):
         top = height.argmax(axis=1)
         reached = height[:, chosen].max(axis=1, initial=-np.inf)
@@ -159,9 +161,9 @@ def _add_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> N
 
 
 def _heights(positions: Floats, count: int) -> Iterator[Floats]:
-    """How far out points (p, 3) lie in some directions, (n, p) for a few at a time.
+    """Yield the distances of points (p, 3) along directions, (n, p) for a few of these at a time.
 
-    A few, because a product as small as these is done by one thread: where others work, threads wait longer.
+    Products of this size are computed by one thread; larger ones wait for others where all cores are busy.
     """
     block = max(1, _BLOCK // len(positions))
     for start in range(0, count, block):
@@ -170,7 +172,7 @@ def _heights(positions: Floats, count: int) -> Iterator[Floats]:
 
 @lru_cache(maxsize=3)
 def _directions(count: int) -> Floats:
-    """(n, 3) unit vectors, even over the sphere: points of a golden spiral."""
+    """Return (n, 3) unit vectors that are evenly distributed over the sphere, on a golden spiral."""
     return np.ascontiguousarray(fibonacci_sphere(count)[:, [0, 2, 1]], np.float32)
 
 

@@ -1,4 +1,4 @@
-"""How a head is moved from where it rests."""
+"""Poses of heads."""
 
 from __future__ import annotations
 
@@ -28,14 +28,31 @@ _MIN_DETERMINANT = 1e-9  # of a matrix, relative to its size cubed
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose(ShortRepr):
-    """Weights of morph targets, turns of bones, or places of all points.
+    """Pose of a head: weights of morph targets, rotations of bones, or positions of all points.
 
-    weights : of targets by name, mostly 0 to 1; those that are left out keep the weight that they rest with
-    bones : by name; three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt) from where
-        the bone rests, done about z first, then x, then y; or a (4, 4) matrix from its space to its parent's
-        instead of the one at rest, in the file's units, as animations have
-    positions_mm : (n, 3) all points of the control mesh, as `Head.positions_mm` lists them, instead of those
-        at rest: another person of the same topology, or a motion from elsewhere
+    Parameters
+    ----------
+    weights : mapping of str to float, optional
+        Weights of morph targets by name, mostly 0 to 1; targets that are left out keep their weight at rest.
+    bones : mapping of str to array_like, optional
+        Bones by name: either three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt)
+        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the bone's
+        space to its parent's, in the units of the file, as animations have it.
+    positions_mm : (n, 3) array, optional
+        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
+        person of the same topology, or a motion from elsewhere.
+
+    Raises
+    ------
+    DermisError
+        If weights or bones are no mappings.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> pose = dermis.Pose(weights={"jawOpen": 0.3}, bones={"head": (0, 20, 0)})
+    >>> pose.weights["jawOpen"]
+    0.3
     """
 
     weights: Mapping[str, float] = field(default_factory=dict)
@@ -43,13 +60,14 @@ class Pose(ShortRepr):
     positions_mm: Floats | None = None
 
     def __post_init__(self) -> None:
+        """Check that weights and bones are mappings."""
         for part in ("weights", "bones"):
             if not isinstance(value := getattr(self, part), Mapping):
                 refuse(f"pose: {part}", "a mapping by name", f"got {format_value(value)}", "Correct it")
 
     @classmethod
     def coerce(cls, value: object) -> Pose | None:
-        """A pose, the pose of a plain mapping of weights, or None."""
+        """Return a pose as it is, a mapping of weights as a pose, and None as None."""
         if value is None or isinstance(value, Pose):
             return value
         if not isinstance(value, Mapping):
@@ -59,11 +77,24 @@ class Pose(ShortRepr):
         return cls(weights=value)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
-        """The pose as numbers for a rig.
+        """Return the pose as numbers for a rig.
 
-        culprit : named in messages
+        Parameters
+        ----------
+        rig : Rig
+            Rig of the head.
+        culprit : object, optional
+            Name of the pose in error messages.
 
-        Raises DermisError for names that the rig lacks, and for numbers and shapes that cannot be.
+        Returns
+        -------
+        Motion
+            Weights, matrices and rest positions.
+
+        Raises
+        ------
+        DermisError
+            For names that the rig does not have, and for invalid numbers and shapes.
         """
         return Motion(
             self._weights(rig, culprit), self._matrices(rig, culprit), self._positions(rig, culprit)
@@ -97,7 +128,7 @@ class Pose(ShortRepr):
         return rig.skeleton.moved_matrices(bones, _changes(rig.skeleton, ordered, bone_values, culprit))
 
     def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """The bones with the turns that targets make; a bone that a matrix is given for keeps to it."""
+        """Return the bones with the rotations that targets make; bones given by a matrix are unchanged."""
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
             return self.bones
@@ -140,7 +171,7 @@ def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
 def _changes(
     skeleton: Skeleton, ordered: list[tuple[int, str]], values: Mapping[str, Any], culprit: object
 ) -> Doubles:
-    """(n, 4, 4) what angles or matrices of bones do in the head's space at rest [mm]."""
+    """Return the head-space changes (n, 4, 4) that angles or matrices of bones make [mm]."""
     changes = np.empty((len(ordered), 4, 4))
     rows: list[list[float]] = []
     by_angles: list[int] = []
@@ -152,9 +183,7 @@ def _changes(
                 rows.append(skeleton.bone_rotation(bone, angles.tolist()))
                 by_angles.append(k)
             else:
-                changes[k] = checked_array(
-                    culprit, values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM
-                )
+                changes[k] = checked_array(culprit, values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM)
                 by_matrix.append(k)
         except (TypeError, DermisError):
             _refuse_bone_value(f"{culprit}: bones.{name}", values[name])
@@ -168,7 +197,7 @@ def _changes(
 
 
 def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
-    """Refuse matrices that flatten what they move."""
+    """Raise DermisError for a singular matrix."""
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     singular = np.abs(np.linalg.det(linear)) <= _MIN_DETERMINANT * size**3
@@ -183,7 +212,7 @@ def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
 
 
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
-    """Raise the error of the first weight that cannot be."""
+    """Raise DermisError for the first invalid weight."""
     for name, weight in weights.items():
         if name not in names:
             _refuse_name(f"{culprit}: weights", name, names, "morph target")
@@ -192,7 +221,7 @@ def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culpr
 
 
 def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) -> NoReturn:
-    """Raise the error of a name that the head lacks, with those that are nearest to it."""
+    """Raise DermisError for a name that the head does not have, with the most similar names."""
     names = list(known)
     if not names:
         actual = f"got {format_value(name)} and it has none"

@@ -1,4 +1,4 @@
-"""Meshes made by formula, for tests, spheres of material and calibration pictures."""
+"""Meshes of simple shapes, for tests, material spheres and calibration pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dermis.mesh.mesh import Material, Mesh, build_mesh
 
 SKIN = (Material("skin"),)
 # Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and
-# left, top and side of its chart.
+# left, top and side length of its chart.
 _FACES = (
     (((0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1)), (0.02, 0.02, 0.45)),
     (((1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0)), (0.52, 0.02, 0.45)),
@@ -22,9 +22,10 @@ _FACES = (
 
 
 def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
-    """Upper and lower triangles of the cells of a grid, each (rows * columns, 3), cell by cell.
+    """Return the upper and lower triangles of the cells of a grid, each (rows * columns, 3), cell by cell.
 
-    Vertices run along u first, (columns + 1) to a row, rows downwards; seen from outside u is to the right.
+    Vertices are numbered along u first, (columns + 1) per row, with rows downwards; seen from outside, u is
+    to the right.
     """
     row, column = np.mgrid[:rows, :columns].astype(np.int32)
     top_left = (row * (columns + 1) + column).ravel()
@@ -35,10 +36,10 @@ def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
 
 
 def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
-    """A square in the XY plane about the origin that faces +Z; u runs along +X, v along -Y.
+    """Return a square in the XY plane about the origin that faces +Z, with u along +X and v along -Y.
 
     size_mm : length of a side [mm]
-    segments : cells along a side
+    segments : cells along each side
     uv_scale : uv covers [0, uv_scale] along both sides, at most 1
     """
     if not (size_mm > 0 and segments >= 1 and 0 < uv_scale <= 1):
@@ -53,9 +54,9 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
 
 
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
-    """A closed sphere about the origin, u once around +Y from -Z by -X, v from the north pole to the south.
+    """Return a sphere about the origin, with u once around +Y from -Z by -X and v from north to south pole.
 
-    The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an apex corner of its own with u at
+    The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an apex vertex of its own, with u at
     the middle of its base, so that none is degenerate.
 
     radius_mm : [mm]
@@ -65,7 +66,7 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
         actual = f"got {radius_mm} mm, {segments} and {rings}"
         refuse("uv_sphere", "a radius above 0, 3 segments and 2 rings", actual, "Correct the arguments")
     row, column = (axis.ravel() for axis in np.mgrid[: rings + 1, : segments + 1])
-    # the last column is the first: exactly the same numbers, so that it welds
+    # the last column has exactly the numbers of the first, so that both are welded
     phi, theta = 2 * np.pi * (column % segments) / segments, np.pi * row / rings
     north, south = row == 0, row == rings
     sine = np.where(north | south, 0.0, np.sin(theta))
@@ -81,11 +82,11 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
 
 
 def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
-    """A closed slab about the origin, its front towards +Z, thin at -X and thick at +X, each face a chart.
+    """Return a closed slab about the origin with its front towards +Z, where each face is a chart.
 
-    side_mm : along X and Y [mm]
-    thin_mm, thick_mm : along Z at either end [mm]
-    cells : along a side
+    side_mm : length along X and Y [mm]
+    thin_mm, thick_mm : thickness along Z at -X and at +X [mm]
+    cells : cells along each side
     """
     if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
         actual = f"got {side_mm}, {thin_mm} and {thick_mm} mm and {cells}"
@@ -100,12 +101,12 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Me
         c[:, 2] = (c[:, 2] - 0.5) * np.where(c[:, 0] > 0, thick_mm, thin_mm)
         c[:, :2] = (c[:, :2] - 0.5) * side_mm
         upper = np.outer((1 - u) * (1 - v), c[0]) + np.outer(u * (1 - v), c[1])
-        places = upper + np.outer(u * v, c[2]) + np.outer((1 - u) * v, c[3])
+        points = upper + np.outer(u * v, c[2]) + np.outer((1 - u) * v, c[3])
         normal = np.cross(c[3] - c[0], c[1] - c[0])
-        positions.append(places)
-        normals.append(np.tile(normal / np.linalg.norm(normal), (len(places), 1)))
+        positions.append(points)
+        normals.append(np.tile(normal / np.linalg.norm(normal), (len(points), 1)))
         uv.append(np.column_stack((left + size * u, top + size * v)))
-        triangles.append(quads + index * len(places))
+        triangles.append(quads + index * len(points))
     count = sum(map(len, triangles))
     return build_mesh(
         np.vstack(positions), np.vstack(uv), np.vstack(triangles), np.zeros(count), SKIN, np.vstack(normals)

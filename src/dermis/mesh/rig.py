@@ -1,4 +1,4 @@
-"""What moves a head: morph targets, and bones with their skin weights."""
+"""Rigs: morph targets and skinned bones of a head."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ _CACHE_VERSION = "outline 6"  # to be changed when other points are found
 
 
 class Motion(NamedTuple):
-    """How a rig is moved, as numbers.
+    """State of a rig in numbers.
 
-    weights : (t,) of its targets, beyond those at rest
-    matrices : (b, 3, 4) of its bones, from where a point is at rest to where it is taken [mm]
-    positions_mm : (p, 3) its points at rest
+    weights : (t,) weights of the targets, relative to the rest pose
+    matrices : (b, 3, 4) matrices that the bones apply to points at rest [mm]
+    positions_mm : (p, 3) points at rest
     """
 
     weights: Floats
@@ -47,11 +47,11 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stencils(ShortRepr):
-    """Points of a subdivided mesh, each as a mean of some control points.
+    """Points of a subdivided mesh as weighted means of control points.
 
-    first : (q + 1,) where the control points of each begin
-    point : (n,) them
-    weight : (n,) their weights; those of one point add up to 1
+    first : (q + 1,) index of the first control point of each point
+    point : (n,) control points
+    weight : (n,) weights, which sum to 1 for each point
     """
 
     first: Ints
@@ -59,15 +59,15 @@ class Stencils(ShortRepr):
     weight: Floats
 
     def points(self, control_mm: Doubles) -> Doubles:
-        """(q, 3) the points [mm]; control_mm : (p, 3)."""
+        """Return the points (q, 3) for control points (p, 3) [mm]."""
         weighted = self.weight[:, None] * control_mm[self.point]
         return np.asarray(np.add.reduceat(weighted, self.first[:-1], axis=0))
 
 
 class BoneRotation(NamedTuple):
-    """What a target does by turning a bone, beside moving points.
+    """Rotation of a bone that a morph target makes in addition to its displacements.
 
-    degrees : about the head's x, y and z, at a weight of 1
+    degrees : angles about the head's x, y and z at weight 1
     """
 
     target: str
@@ -76,7 +76,7 @@ class BoneRotation(NamedTuple):
 
 
 class RigidFollowers(NamedTuple):
-    """Points that lie where others of the file take them, as one rigid body.
+    """Points that follow other points of the file as one rigid body.
 
     leaders : (n,) indices of points of the file
     points : (m,) indices of the points that follow them
@@ -88,17 +88,17 @@ class RigidFollowers(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rig(ShortRepr):
-    """The control points of a head and what moves them: morph targets first, then bones.
+    """Control points of a head, moved by morph targets first and then by bones.
 
-    positions_mm : (p, 3) the points at rest, before any subdivision, in the head's space
-    targets, skeleton : what moves them; None for no bones
-    stencils : from the control points to those of the mesh; None where they are the same
-    corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
-    turns : of bones, by targets
-    carried : points that the file has not, after all of its own
-    contact : points that stay off the eyes; None for none
-    template : a rig of the same points whose outermost ones are this one's too, beside the corners of its own
-        convex hull; None where they are looked for
+    positions_mm : (p, 3) points at rest, before any subdivision, in head space
+    targets, skeleton : morph targets and bones; None for no bones
+    stencils : stencils from the control points to the points of the mesh; None if they are the same
+    vertex_point : (v,) control point of each vertex of the file's mesh; None if it is `Mesh.point`
+    bone_rotations : rotations of bones by targets
+    rigid_followers : points that are not in the file, after all of its own
+    contact : points that stay outside the eyes; None for none
+    template : rig of the same topology whose outline points this one shares, in addition to the corners of
+        its own convex hull; None to search them
     """
 
     positions_mm: Floats
@@ -113,17 +113,17 @@ class Rig(ShortRepr):
 
     @cached_property
     def rest(self) -> Motion:
-        """That of a rig which nothing moves."""
+        """Return the motion of a rig at rest."""
         bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.rest_matrices
         return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
 
     @property
     def file_point_count(self) -> int:
-        """How many points are the file's own; they come first."""
+        """Return the number of points from the file, which come first."""
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """(p, 3) where all points rest, of those of the file [mm]."""
+        """Return the rest positions of all points (p, 3), given those of the points from the file [mm]."""
         positions = np.concatenate([file_positions_mm, self.positions_mm[len(file_positions_mm) :]])
         for leaders, points in self.rigid_followers:
             before, after = self.positions_mm[leaders], file_positions_mm[leaders]
@@ -133,25 +133,25 @@ class Rig(ShortRepr):
 
     @property
     def target_index(self) -> dict[str, int]:
-        """Number of each target by its name."""
+        """Return the index of each target by its name."""
         return self.targets.index
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Its outermost points; found once and kept on disk."""
+        """Return the outline of the rig, found once and cached on disk."""
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
-        """(s, 3) points that lie as far out as any other in each direction, to a millimetre or so [mm].
+        """Return points (s, 3) that bound the posed rig in every direction, to about a millimetre [mm].
 
-        Of a rig that rests elsewhere, the corners of its convex hull there are among them.
+        If the motion has other rest positions, the corners of their convex hull are among the points.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
         return self._outline_at(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_at(self, positions: Floats) -> RigOutline:
-        """The outline of a rig that rests elsewhere; the last one is kept, and checked by its own points."""
+        """Return the outline for other rest positions; the last one is cached and compared by its points."""
         points, outline = self._last_outline
         if not np.array_equal(positions[points].T, outline.rest_mm[:3]):
             points = np.union1d(self._outline_points, hull_corners(positions))
@@ -176,13 +176,13 @@ class Rig(ShortRepr):
         ).astype(np.intp)
 
     def points_mm(self, motion: Motion) -> Doubles:
-        """(q, 3) the points of the mesh in a motion, after any subdivision [mm]."""
+        """Return the points of the mesh (q, 3) in a motion, after any subdivision [mm]."""
         rig = replace(self, positions_mm=motion.positions_mm)
         control = rig.pose(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
     def lid_edges_mm(self, motion: Motion) -> Doubles:
-        """(k, r, 3) the edges of the lids around each eye, on the surface, in a motion [mm]."""
+        """Return the edges of the lids (k, r, 3) around each eye in a motion, on the finer surface [mm]."""
         assert self.contact is not None
         points, weights, outline = self._lid_edges
         rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
@@ -191,7 +191,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Control points around edges of lids, their shares in these, and what moves them."""
+        """Return control points near the edges of the lids, their weights in the edges, and their outline."""
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))
@@ -204,7 +204,7 @@ class Rig(ShortRepr):
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
     def pose_points(self, points: Ints, motion: Motion) -> Doubles:
-        """(n, 3) some points in a motion [mm]."""
+        """Return some control points (n, 3) in a motion [mm]."""
         positions = motion.positions_mm[points].astype(np.float64)
         if self._has_targets[points].any():
             positions += np.einsum("t,tpk->pk", motion.weights, self._dense(points))
@@ -216,13 +216,13 @@ class Rig(ShortRepr):
 
     @cached_property
     def _has_targets(self) -> Mask:
-        """(p,) whether a target moves a point."""
+        """Return the mask (p,) of points that any target moves."""
         displaced = np.zeros(len(self.positions_mm), bool)
         displaced[self.targets.point] = True
         return displaced
 
     def _dense(self, points: Ints) -> Floats:
-        """(t, n, 3) displacements of some points; the last ones are kept."""
+        """Return the displacements (t, n, 3) of some points; the last result is cached."""
         last_points, dense = vars(self).get("_last", (None, None))
         if dense is None or not np.array_equal(last_points, points):
             dense = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
@@ -230,10 +230,10 @@ class Rig(ShortRepr):
         return np.asarray(dense)
 
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
-        """(p, 3) the points in a pose, as the device computes them [mm].
+        """Return the control points (p, 3) in a pose, as the device computes them [mm].
 
-        weights : (t,) of the targets, beyond those at rest
-        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; None for those at rest
+        weights : (t,) of the targets, relative to the rest pose
+        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; those at rest if None
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         row_weights = np.repeat(weights, np.diff(targets.first))

@@ -1,7 +1,7 @@
 """Rotations as quaternions, angles and matrices.
 
-SciPy's Rotation takes over twenty times as long for the few numbers of a pose, and refuses quaternions of
-length 0.
+SciPy's Rotation is over twenty times slower for the few numbers of a pose, and refuses quaternions of length
+0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dermis.base.arrays import Doubles
 
 
 def quaternion_matrix(q: Doubles) -> Doubles:
-    """(..., 4, 4) the rotation of each quaternion (..., 4) x, y, z, w, of any length; identity for 0."""
+    """Return the (..., 4, 4) matrices of quaternions (..., 4) x, y, z, w of any length; identity for 0."""
     x, y, z, w = np.moveaxis(np.asarray(q, np.float64), -1, 0)
     squared = x * x + y * y + z * z + w * w
     s = np.where(squared > 0, 2.0 / np.where(squared > 0, squared, 1.0), 0.0)
@@ -29,11 +29,11 @@ def quaternion_matrix(q: Doubles) -> Doubles:
 
 
 def matrix_quaternion(matrix: Doubles) -> Doubles:
-    """(..., 4) the unit quaternion x, y, z, w of each rotation (..., 3, 3), with w not below 0."""
+    """Return the unit quaternions (..., 4) x, y, z, w of rotations (..., 3, 3), with w not below 0."""
     m = np.asarray(matrix, np.float64)
     d = np.diagonal(m, axis1=-2, axis2=-1)
     trace = d.sum(axis=-1)
-    # four times the squares of x, y, z and w; from the largest the others follow without cancellation
+    # four times the squares of x, y, z and w; the others follow from the largest without cancellation
     squares = np.concatenate([1 + 2 * d - trace[..., None], 1 + trace[..., None]], axis=-1)
     q = np.empty((*m.shape[:-2], 4, 4))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -46,9 +46,9 @@ def matrix_quaternion(matrix: Doubles) -> Doubles:
 
 
 def angles_matrix(degrees: Sequence[float]) -> list[list[float]]:
-    """(3, 3) the rotation by angles about x, y and z [degrees], done about z first, then x, then y.
+    """Return the (3, 3) rotation by angles about x, y and z [degrees], applied about z first, then x, then y.
 
-    In plain floats: numpy takes ten times as long for so few numbers.
+    It uses plain floats, as NumPy is ten times slower for so few numbers.
     """
     (sx, cx), (sy, cy), (sz, cz) = ((math.sin(r), math.cos(r)) for r in map(math.radians, degrees))
     return [
@@ -59,36 +59,36 @@ def angles_matrix(degrees: Sequence[float]) -> list[list[float]]:
 
 
 def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
-    """The angles about x, y and z [degrees] of which `angles_matrix` makes the rotation (3, 3)."""
+    """Return the angles about x, y and z [degrees] from which `angles_matrix` makes the rotation (3, 3)."""
     m = np.asarray(matrix, np.float64)
     x = math.asin(min(max(-m[1, 2], -1.0), 1.0))
-    if abs(m[1, 2]) > 1 - 1e-9:  # it looks straight up or down: turn and tilt are one
+    if abs(m[1, 2]) > 1 - 1e-9:  # gimbal lock: y and z have one axis
         return math.degrees(x), math.degrees(math.atan2(-m[2, 0], m[0, 0])), 0.0
     y, z = math.atan2(m[0, 2], m[2, 2]), math.atan2(m[1, 0], m[1, 1])
     return math.degrees(x), math.degrees(y), math.degrees(z)
 
 
 def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """The rotation (3, 3) and the shift (3,) after it that take points nearest to others, both (n, 3).
+    """Return the rotation (3, 3) and then the shift (3,) that best map points to others, both (n, 3).
 
-    Kabsch's, by the singular values of the covariance.
+    This is Kabsch's method: least squares by the singular values of the covariance.
     """
-    middle, end = before.mean(axis=0), after.mean(axis=0)
-    u, _, vh = np.linalg.svd((before - middle).T @ (after - end))
+    centre, new_centre = before.mean(axis=0), after.mean(axis=0)
+    u, _, vh = np.linalg.svd((before - centre).T @ (after - new_centre))
     mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(vh.T @ u.T)) or 1.0])
     matrix = vh.T @ mirror @ u.T
-    return np.asarray(matrix), np.asarray(end - matrix @ middle)
+    return np.asarray(matrix), np.asarray(new_centre - matrix @ centre)
 
 
 def slerp(a: Doubles, b: Doubles, s: float | Doubles) -> Doubles:
-    """(..., 4) on the shorter arc between unit quaternions (..., 4), a share s of the way from a to b."""
+    """Interpolate unit quaternions (..., 4) along the shorter arc, from a for s = 0 to b for s = 1."""
     cosine = np.sum(a * b, axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)
-    near = sine < 1e-6
-    divisor = np.where(near, 1.0, sine)
-    left = np.where(near, 1 - s, np.sin((1 - s) * angle) / divisor)
-    right = np.where(near, s, np.sin(s * angle) / divisor)
+    is_small = sine < 1e-6
+    divisor = np.where(is_small, 1.0, sine)
+    left = np.where(is_small, 1 - s, np.sin((1 - s) * angle) / divisor)
+    right = np.where(is_small, s, np.sin(s * angle) / divisor)
     mixed = left * a + right * b
     return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))

@@ -1,4 +1,4 @@
-"""Bones, and where they take the points that follow them."""
+"""Skeletons: bones, and the transforms of the points that follow them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _MAX_SEQUENTIAL = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Skeleton(ShortRepr):
-    """Bones, parents before children, and the points that follow them.
+    """Bones, parents before children, and the skin weights of points.
 
     names : (b,)
-    parent : (b,) -1 for a root
+    parent : (b,) index of the parent, -1 for a root
     local : (b, 4, 4) from each bone's space to its parent's, at rest
-    inverse_bind : (b, 4, 4) from the file's space to the bone's, where its points are bound
+    inverse_bind : (b, 4, 4) from the file's space to the bone's, in the bind pose
     to_head : (4, 4) from the file's space to the head's [mm]
-    bone, weight : (p, 4) bones that each point follows, and how much; the weights of a point add up to 1
+    bone, weight : (p, 4) bones that each point follows, and their weights, which sum to 1
     """
 
     names: tuple[str, ...]
@@ -39,9 +39,9 @@ class Skeleton(ShortRepr):
     weight: Floats
 
     def matrices(self, local: Doubles | None = None) -> Doubles:
-        """(b, 3, 4) from where a point is at rest to where each bone takes it, in the head's space [mm].
+        """Return the matrices (b, 3, 4) that each bone applies to points at rest, in head space [mm].
 
-        local : (b, 4, 4) instead of those at rest
+        local : (b, 4, 4) from each bone's space to its parent's; those at rest if None
         """
         world = self._bone_to_file(self.local if local is None else local)
         matrices = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
@@ -49,24 +49,24 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def index(self) -> dict[str, int]:
-        """Number of each bone by its name."""
+        """Return the index of each bone by its name."""
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
     def rest_matrices(self) -> Floats:
-        """(b, 3, 4) the matrices at rest."""
+        """Return the matrices (b, 3, 4) at rest."""
         return self.matrices().astype(np.float32)
 
     @cached_property
     def origin_mm(self) -> list[list[float]]:
-        """(b, 3) where each bone turns, at rest, in the head's space [mm]."""
+        """Return the position of each joint at rest (b, 3), in head space [mm]."""
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 
     def bone_rotation(self, bone: int, degrees: Sequence[float]) -> list[float]:
-        """The 16 numbers of what a turn does about where a bone rests, in the head's space [mm].
+        """Return the 16 numbers of the head-space matrix that rotates about a bone's joint at rest.
 
-        degrees : about x, y and z; see `angles_matrix`
+        degrees : angles about x, y and z, see `angles_matrix`
         """
         (a, b, c), (d, e, f), (g, h, i) = angles_matrix(degrees)
         x, y, z = self.origin_mm[bone]
@@ -74,17 +74,17 @@ class Skeleton(ShortRepr):
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
     def head_space_changes(self, bones: Sequence[int], local: Doubles) -> Doubles:
-        """(n, 4, 4) what other matrices from bones' spaces to their parents' do in the head's space [mm]."""
+        """Return the head-space changes (n, 4, 4) that other local matrices of some bones make [mm]."""
         index = list(bones)
         return np.asarray(self._parent_to_head[index] @ local @ self._head_to_bone[index])
 
     def moved_matrices(self, bones: Sequence[int], changes: Doubles) -> Floats:
-        """(b, 3, 4) the matrices when some bones move, and with them all below.
+        """Return the matrices (b, 3, 4) when some bones move, together with their descendants.
 
-        bones : (n,) their numbers, parents before children
-        changes : (n, 4, 4) what moves each in the head's space at rest [mm]
+        The cost for few bones depends on the number of changes, not on the number of bones.
 
-        Few cost as much as there are changes, not bones.
+        bones : (n,) indices, parents before children
+        changes : (n, 4, 4) head-space change of each bone at rest [mm]
         """
         transforms = self._transforms if len(bones) <= _MAX_SEQUENTIAL else self._transforms_by_depth
         transform = transforms(bones, changes)
@@ -96,7 +96,7 @@ class Skeleton(ShortRepr):
         return matrices.astype(np.float32)
 
     def _transforms(self, bones: Sequence[int], changes: Doubles) -> Doubles:
-        """(b, 4, 4) where each bone is taken, by one change after the other."""
+        """Return the head-space change (b, 4, 4) of each bone, computed one change after the other."""
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
         transform[0] = _IDENTITY
         for index, bone in enumerate(bones, start=1):
@@ -105,7 +105,7 @@ class Skeleton(ShortRepr):
         return transform[nearest]
 
     def _transforms_by_depth(self, bones: Sequence[int], changes: Doubles) -> Doubles:
-        """The same, all bones of one depth at once."""
+        """Return the head-space change (b, 4, 4) of each bone, computed level by level of the hierarchy."""
         transform = np.tile(_IDENTITY, (len(self.names), 1, 1))
         transform[list(bones)] = changes
         for bones_of_depth, parents in self._depths[1:]:
@@ -114,7 +114,7 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def _depths(self) -> list[tuple[Ints, Ints]]:
-        """Numbers of the bones at each depth, and of their parents."""
+        """Return the indices of the bones at each depth of the hierarchy, and of their parents."""
         depth = np.zeros(len(self.names), np.int64)
         for bone, parent in enumerate(self.parent.tolist()):
             depth[bone] = depth[parent] + 1 if parent >= 0 else 0
@@ -122,7 +122,7 @@ class Skeleton(ShortRepr):
         return [(level.astype(np.int32), self.parent[level]) for level in levels]
 
     def _bone_to_file(self, local: Doubles) -> Doubles:
-        """(b, 4, 4) from each bone's space to the file's."""
+        """Return the matrices (b, 4, 4) from each bone's space to the file's."""
         world = np.empty_like(local)
         for bone, parent in enumerate(self.parent.tolist()):
             world[bone] = world[parent] @ local[bone] if parent >= 0 else local[bone]
@@ -130,18 +130,18 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def _parent_to_head(self) -> Doubles:
-        """(b, 4, 4) from the space of each bone's parent to the head's, at rest."""
+        """Return the matrices (b, 4, 4) from the space of each bone's parent to the head's, at rest."""
         to_head = np.concatenate([self.to_head @ self._bone_to_file(self.local), self.to_head[None]])
         return np.asarray(to_head[self.parent])  # the last one is for roots, with parent -1
 
     @cached_property
     def _head_to_bone(self) -> Doubles:
-        """(b, 4, 4) from the head's space to each bone's, at rest."""
+        """Return the matrices (b, 4, 4) from the head's space to each bone's, at rest."""
         return np.asarray(np.linalg.pinv(self.to_head @ self._bone_to_file(self.local)))
 
     @cached_property
     def _descendants(self) -> list[Intp]:
-        """Numbers of each bone and of all below it."""
+        """Return the indices of each bone and its descendants."""
         descendants: list[list[int]] = [[] for _ in self.names]
         for bone in range(len(self.names)):
             ancestor = bone
@@ -152,11 +152,11 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def follower_counts(self) -> Doubles:
-        """(b,) how many points each bone moves with all below it, by their weights."""
+        """Return the number of points (b,) that each bone and its descendants move, by their weights."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
         return np.array([own[bones].sum() for bones in self._descendants])
 
     @cached_property
     def _is_bound_at_rest(self) -> bool:
-        """Whether the matrices at rest are those that change nothing."""
+        """Return whether the matrices at rest are identities."""
         return bool(np.abs(self.rest_matrices - np.eye(3, 4, dtype=np.float32)).max(initial=0) < 1e-3)

@@ -1,4 +1,4 @@
-"""Hairs on a mesh: each is rooted in a quad and follows it."""
+"""Hair strands on a mesh of quads: each is rooted in a quad and follows it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _MIN_LENGTH_MM = 1e-9
 
 
 class Roots(NamedTuple):
-    """Places on a mesh of quads.
+    """Points on a mesh of quads.
 
-    quad : (n,) rows of `Mesh.quads`
-    place : (n, 2) on the way from the quad's first corner to its second, and to its last, 0 to 1
+    quad : (n,) row of `Mesh.quads`
+    position : (n, 2) bilinear coordinates in the quad: towards its second and its last corner, 0 to 1
     """
 
     quad: Ints
@@ -29,13 +29,14 @@ class Roots(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Strands(ShortRepr):
-    """Hairs, thin round fibres through knots.
+    """Hair strands: thin round fibres, each a polyline of knots.
 
-    roots : where each begins
-    knots_mm : (n, k, 3) from the root, along the quad, beside that, and along its normal; from root to tip
-    radius_mm : (n, k) of the fibre
-    absorption : (n, 3) of its inside [1/mm]
-    cover : (n,) of each root by the hair that stands around it, over each other; None for next to nothing [-]
+    roots : root of each strand
+    knots_mm : (n, k, 3) knots from root to tip in the frame of the root: along the quad, across, and along
+        the normal
+    radius_mm : (n, k) radius of the fibre
+    absorption : (n, 3) absorption coefficient of the fibre [1/mm]
+    cover : (n,) optical coverage of each root by the hair around it; None for next to none [-]
     """
 
     roots: Roots
@@ -45,19 +46,20 @@ class Strands(ShortRepr):
     cover: Floats | None = None
 
     def __len__(self) -> int:
+        """Return the number of strands."""
         return len(self.roots.quad)
 
     def knot_positions_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
-        """(n, k, 3) the knots where the points of the mesh (p, 3) are [mm]."""
+        """Return the positions of the knots (n, k, 3) for given points (p, 3) of the mesh [mm]."""
         root, frame = root_frames(mesh, self.roots, points_mm)
         return np.asarray(root[:, None] + np.einsum("nic,nki->nkc", frame, self.knots_mm))
 
     def root_centre_mm(self, mesh: Mesh) -> Doubles:
-        """(3,) the mean of the roots on a mesh at rest [mm]."""
+        """Return the mean position (3,) of the roots on a mesh at rest [mm]."""
         return np.asarray(_root_positions(mesh, self.roots, mesh.points_mm)[0].mean(axis=1))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
-        """The same hairs on the mesh refined by Catmull's and Clark's rules."""
+        """Return the same strands on the mesh after Catmull-Clark subdivision."""
         _, frame = root_frames(mesh, self.roots, mesh.points_mm)
         offsets_mm = np.einsum("nic,nki->nkc", frame, self.knots_mm)
         roots = refine_roots(mesh, self.roots, levels)
@@ -65,17 +67,20 @@ class Strands(ShortRepr):
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
-    """(n, k, 3) ways in space from roots to knots, as `Strands.knots_mm` has them on a mesh at rest [mm]."""
+    """Return the offsets of knots from their roots in the frames of the roots, as in `Strands.knots_mm`.
+
+    offsets_mm : (n, k, 3) in space, on a mesh at rest
+    """
     return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
 def to_frames(frame: Doubles, offsets_mm: Doubles) -> Floats:
-    """The same in frames (n, 3, 3) of the roots, from `frames`."""
+    """Return the offsets (n, k, 3) of knots from their roots in the frames (n, 3, 3) of the roots."""
     return np.asarray(np.einsum("nic,nkc->nki", frame, offsets_mm), np.float32)
 
 
 def quad_corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
-    """(n, 4) points of the mesh around quads."""
+    """Return the points of the mesh (n, 4) at the corners of quads."""
     first, second = mesh.quads.take(quad, axis=0).T
     vertices = np.empty((4, len(quad)), np.int32)
     vertices[:3], vertices[3] = mesh.triangles.take(first, axis=0).T, mesh.triangles[:, 1].take(second)
@@ -83,13 +88,15 @@ def quad_corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
 
 
 def quad_weights(position: NDArray[np.floating]) -> Doubles:
-    """(n, 4) shares of a quad's corners in places on it."""
+    """Return the bilinear weights (n, 4) of a quad's corners."""
     s, t = position.astype(np.float64).T
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
 def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-    """Where roots are (n, 3) [mm], and unit vectors along the quad, beside that, along its normal (n, 3, 3).
+    """Return the positions of roots (n, 3) [mm] and their frames (n, 3, 3).
+
+    The rows of a frame are unit vectors along the quad, across, and along its normal.
 
     points_mm : (p, 3) of the mesh
     """
@@ -102,14 +109,16 @@ def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tu
 
 
 def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-    """Where roots are (3, n), and the corners of their quads (4, 3, n) [mm]."""
+    """Return the positions of roots (3, n) and of the corners of their quads (4, 3, n) [mm]."""
     columns = np.ascontiguousarray(points_mm.T, np.float64)
-    corners = columns.take(quad_corners(mesh, roots.quad).T, axis=1)  # `take` is ten times faster than indexing
+    corners = columns.take(
+        quad_corners(mesh, roots.quad).T, axis=1
+    )  # `take` is ten times faster than indexing
     return interpolate_quads(roots.position, corners), corners.transpose(1, 0, 2)
 
 
 def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubles:
-    """(c, n) means in places (n, 2) on quads of what is at their corners (c, 4, n)."""
+    """Interpolate values (c, 4, n) at the corners of quads bilinearly; return (c, n)."""
     weight = quad_weights(position).T
     result: Doubles = weight[0] * corners[:, 0]
     for k in range(1, 4):
@@ -118,9 +127,9 @@ def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubl
 
 
 def refine_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
-    """The same places on the mesh refined by Catmull's and Clark's rules, whose quads begin at old corners.
+    """Return the same points on the mesh after Catmull-Clark subdivision, whose quads start at old corners.
 
-    mesh : before it is refined
+    mesh : before subdivision
     """
     loose_triangles = len(mesh.triangles) - 2 * len(mesh.quads)
     quad, position = roots.quad.astype(np.int64), roots.position.astype(np.float64)

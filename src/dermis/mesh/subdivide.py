@@ -1,4 +1,4 @@
-"""Subdivision: a finer mesh, smoothed over the welded surface, whose points are means of control points."""
+"""Subdivision: a finer, smoother mesh, whose points are weighted means of control points."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Corners = NDArray[np.integer]
 
 
 class SubdividedMesh(NamedTuple):
-    """A finer mesh, and its points as means of those of the coarser one; None where they are the same."""
+    """A finer mesh, and stencils of its points; None for the stencils if the mesh is not subdivided."""
 
     mesh: Mesh
     stencils: Stencils | None
@@ -38,12 +38,12 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """How meshes of one topology are refined.
+    """Refinement of all meshes of one topology.
 
-    weights : (q, p) of the control points in each finer point
-    stencils : the same, as single numbers
+    weights : (q, p) weights of the control points in each finer point
+    stencils : the same weights in the form of a rig
     uv, point : (v, 2) and (v,) of the finer vertices
-    triangles, material, quads : as `Mesh` has them
+    triangles, material, quads : of the finer mesh, see `Mesh`
     """
 
     weights: csr_array
@@ -55,19 +55,17 @@ class Refinement:
     quads: Ints
 
     def mesh(self, coarse: Mesh) -> Mesh:
-        """The finer mesh of one with this topology."""
+        """Return the refined mesh of a mesh with this topology."""
         positions = (self.weights @ coarse.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
-        return build_mesh(
-            positions, self.uv, self.triangles, self.material, coarse.materials, **topology
-        )
+        return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
-    """The head on a finer mesh; what moved its points now moves the control points of that mesh.
+    """Return a head on a subdivided mesh, whose control points are moved by the head's rig.
 
-    head : not subdivided yet
-    levels : 0 to 3, or what finds them for the head
+    head : head that is not subdivided yet
+    levels : 0 to 3, or a function that returns the levels for the head
     """
     levels = resolve_levels(head, levels)
     mesh, stencils = subdivide(head.mesh, levels)
@@ -79,7 +77,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
 
 
 def resolve_levels(head: Head, levels: int | Callable[[Head], int]) -> int:
-    """Levels of subdivision, or those that are found for a head.
+    """Return the levels of subdivision, given as a number or as a function of the head.
 
     Raises DermisError for other numbers than 0 to 3.
     """
@@ -94,14 +92,14 @@ def _check_levels(levels: int) -> int:
 
 
 def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
-    """The mesh refined `levels` times: positions smoothed, uv halved linearly, materials kept.
+    """Return a mesh refined `levels` times, with smoothed positions and linearly interpolated uv.
 
-    A mesh of more quads than triangles is refined by Catmull's and Clark's rules and put on the surface that
-    further levels tend to; others are refined by Loop's. Positions follow the welded points, so uv seams
-    neither crack nor crease; open borders are smoothed as curves of their own. Normals and tangents are
-    computed anew, normals of the file are given up.
+    A mesh of more quads than triangles is refined by the rules of Catmull and Clark and moved to the limit
+    surface; others by those of Loop. Positions follow the unique points, so that uv seams neither crack nor
+    crease; open borders are smoothed as curves. Normals and tangents are computed from the result; normals of
+    the file are dropped.
 
-    levels : 0 to 3, each takes four times the triangles
+    levels : 0 to 3, each of which multiplies the number of triangles by four
     """
     if _check_levels(levels) == 0:
         return SubdividedMesh(mesh, None)
@@ -110,7 +108,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """How meshes of this one's topology are refined `levels` times, see `subdivide`.
+    """Return the refinement of meshes with this mesh's topology, see `subdivide`.
 
     levels : 1 to 3
     """
@@ -133,17 +131,19 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
 
 
 def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """What `_compute_refinement` returns, of large meshes kept on disk for all heads of the same topology."""
+    """Return `_compute_refinement`, cached on disk for large meshes."""
     if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
         return _compute_refinement(mesh, levels, by_quads)
     sources = [mesh.uv, mesh.point, mesh.triangles, mesh.material, mesh.quads]
     names = ["first", "control", "weight", "uv", "point", "corner", "material"]
-    return cached_arrays(sources, f"{_CACHE_VERSION} {levels}", names, lambda: _compute_refinement(mesh, levels, by_quads))
+    return cached_arrays(
+        sources, f"{_CACHE_VERSION} {levels}", names, lambda: _compute_refinement(mesh, levels, by_quads)
+    )
 
 
 @logged_step("subdividing the mesh")
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
+    """Return the corners of the finer faces, and the weights of control points, row by row."""
     triangles = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
     faces = polygons(mesh) if by_quads else triangles
     cage = Cage(mesh.uv.astype(np.float64), mesh.point.astype(np.int64), *faces)
@@ -167,7 +167,7 @@ def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 
 def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
-    """Corner vertices of all faces (n,), the number of each one's corners (f,) and its material (f,).
+    """Return the corner vertices of all faces (n,), the number of corners of each (f,) and its material (f,).
 
     Triangles come first, then quads.
     """
@@ -180,12 +180,12 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """(t, 3) vertices of the head's mesh: its triangles, less the levels of subdivision that can be spared.
+    """Return triangles (t, 3) of a subdivided head with levels of subdivision removed where it is flat.
 
-    Vertices stay where they are, on the finer surface.
+    The vertices are those of the subdivided mesh.
 
-    least : faces that are left at least
-    off_mm : by how much the middles of sides may move for that, at most
+    min_faces : smallest number of faces that is left
+    tolerance_mm : largest deviation of the midpoints of sides
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -202,7 +202,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """By Loop's rules four triangles come of one, the first three at its corners."""
+    """Coarsen triangles of Loop's rules: each became four, of which the first three are at its corners."""
     coarse, finer = triangles, triangles
     for _ in range(levels):
         coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
@@ -213,7 +213,7 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """By Catmull's and Clark's a quad for each corner of a polygon, from that to the polygon's middle."""
+    """Coarsen quads of Catmull and Clark's rules: a polygon became a quad from each corner to its centre."""
     coarse = quads
     for _ in range(levels - 1):
         coarse = coarse[:, 0].reshape(-1, 4)
@@ -231,6 +231,6 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
 
 
 def _deviation_mm(positions_mm: Floats, middle: Corners, start: Corners, end: Corners) -> Floats:
-    """How far the middles of sides are from halfway between their ends [mm]."""
+    """Return the distance of the refined midpoints of sides from the middle between their ends [mm]."""
     halfway = 0.5 * (positions_mm[start] + positions_mm[end])
     return np.asarray(np.linalg.norm(positions_mm[middle] - halfway, axis=-1))

@@ -1,4 +1,4 @@
-"""One level of Loop's and of Catmull's and Clark's subdivision: where each new point lies, as weights."""
+"""One level of Loop and of Catmull-Clark subdivision: the weights of old points in each new point."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 class Cage(NamedTuple):
-    """Polygons to be refined.
+    """Polygons that are refined.
 
-    uv : (v, 2) of each corner vertex
-    point : (v,) the point where it lies
-    corner : (n,) corner vertices, face after face
-    sides : (f,) the number of corners of each face
+    uv : (v, 2) of each vertex
+    point : (v,) point of each vertex
+    corner : (n,) vertices at the corners, face by face
+    sides : (f,) number of corners of each face
     material : (f,)
     """
 
@@ -34,16 +34,16 @@ class Cage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sides of all faces, each from a corner to the next, and the edges that they lie on.
+    """Sides of all faces, each from a corner to the next, and the edges that they are on.
 
-    points : how many there are
-    start : (n,) the point where each side begins
-    before : (n,) the side that ends there
-    face : (n,) whose side it is
+    points : number of points
+    start : (n,) point where each side starts
+    previous : (n,) side of the same face that ends there
+    face : (n,) face of each side
     ends : (e, 2) points of each edge
-    edge : (n,) of each side
+    edge : (n,) edge of each side
     border : (e,) whether an edge has another number of sides than two
-    cuts, cut : as `ends` and `edge` for corner vertices: an edge on a uv seam is two cuts
+    seam_edges, seam_edge : as `ends` and `edge` for vertices, where an edge on a uv seam counts twice
     """
 
     points: int
@@ -58,12 +58,12 @@ class _Sides:
 
     @cached_property
     def valence(self) -> Index:
-        """(p,) edges at each point."""
+        """Return the number of edges at each point (p,)."""
         return np.bincount(self.ends.ravel(), minlength=self.points)
 
     @cached_property
     def border_valence(self) -> Index:
-        """(p,) border edges at each point."""
+        """Return the number of border edges at each point (p,)."""
         return np.bincount(self.ends[self.border].ravel(), minlength=self.points)
 
 
@@ -77,13 +77,16 @@ def _sides(cage: Cage) -> _Sides:
     start = cage.point[cage.corner]
     ends, edge, counts = unique_sides(np.column_stack((start, start[following])))
     face = np.repeat(np.arange(len(cage.sides)), cage.sides)
-    return _Sides(int(cage.point.max()) + 1, start, previous, face, ends, edge, counts != 2, seam_edges, seam_edge)
+    return _Sides(
+        int(cage.point.max()) + 1, start, previous, face, ends, edge, counts != 2, seam_edges, seam_edge
+    )
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
-    """Weights (q, p) of the finer points, and four triangles for each: three at its corners, one between.
+    """Return the weights (q, p) of the finer points, and four triangles for each triangle.
 
-    Old points come first, then one on each edge. Borders become cubic B-splines.
+    Three of them are at its corners and one between. Old points come first, then one point on each edge.
+    Borders become cubic B-splines.
 
     Source: [Loop1987], with Warren's weights of the old points.
     """
@@ -94,7 +97,9 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
     neighbours = np.where(sides.valence == 3, 9 / 16, 3 / 8)
     old = _old_point_weights(sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), along=1 / 8)
     opposite = sides.start[sides.previous]
-    opposite_weights = _matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), (len(sides.ends), sides.points))
+    opposite_weights = _matrix(
+        sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), (len(sides.ends), sides.points)
+    )
     new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8)) + opposite_weights
     uv, point = _add_edge_vertices(cage, sides)
     a, b, c = cage.corner.reshape(-1, 3).T
@@ -105,10 +110,10 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
-    """Weights (q, p) of the finer points, and a quad for each corner of each face.
+    """Return the weights (q, p) of the finer points, and a quad for each corner of each face.
 
-    Old points come first, then one on each edge, then one in each face. A quad begins at its old corner and
-    has the middle of the face opposite to it. Borders become cubic B-splines.
+    Old points come first, then one point on each edge, then one in each face. A quad starts at its old
+    corner, and the centre of the face is opposite. Borders become cubic B-splines.
 
     Sources: [CatmullClark1978]; uv and borders as in [DeRose1998].
     """
@@ -117,9 +122,13 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
     sides = _sides(cage)
     n, count = np.maximum(sides.valence, 1), len(cage.sides)
     centres = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
-    face_weights = _matrix(sides.edge, sides.face, _inner_edge_weights(sides, 1 / 4), (len(sides.ends), count))
+    face_weights = _matrix(
+        sides.edge, sides.face, _inner_edge_weights(sides, 1 / 4), (len(sides.ends), count)
+    )
     new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4)) + face_weights @ centres
-    face_points = _matrix(sides.start, sides.face, _inner_point_weights(sides, 1 / n**2), (sides.points, count))
+    face_points = _matrix(
+        sides.start, sides.face, _inner_point_weights(sides, 1 / n**2), (sides.points, count)
+    )
     old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8) + face_points @ centres
     uv, point = _add_edge_vertices(cage, sides)
     centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
@@ -135,7 +144,7 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def catmull_clark_limit(cage: Cage) -> csr_array:
-    """Weights (p, p) that take the points of quads to where further levels would bring them.
+    """Return the weights (p, p) that move the points of quads to the limit surface.
 
     Source: [Halstead1993]; borders as cubic B-splines.
     """
@@ -149,26 +158,26 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
 
 
 def _inner_edge_weights(sides: _Sides, weight: float) -> Doubles:
-    """(n,) the weight for sides on inner edges, 0 for those on borders."""
+    """Return the weight (n,) for sides on inner edges, 0 for sides on borders."""
     return np.where(sides.border, 0, weight)[sides.edge]
 
 
 def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
-    """(n,) weight (p,) of the point where each side begins, 0 for points on borders."""
+    """Return the weight (p,) of the start of each side (n,), 0 for points on borders."""
     return np.where(sides.border_valence == 0, weight, 0)[sides.start]
 
 
 def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
-    """(e, p) the weight (e,) of either end of each edge."""
+    """Return the matrix (e, p) that weights both ends of each edge (e,)."""
     rows = np.repeat(np.arange(len(sides.ends)), 2)
     return _matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
 
 
 def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
-    """(p, p) weights of the old points.
+    """Return the weights (p, p) of the old points.
 
-    own, each : (p,) inside: of the point itself, and of each of its neighbours
-    along : on a border: of either neighbour along it
+    own, each : (p,) for inner points: weight of the point itself, and of each neighbour
+    along : for border points: weight of either neighbour on the border
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
@@ -178,11 +187,13 @@ def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float)
     own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
     index = np.arange(sides.points)
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
-    return _matrix(rows, columns, np.concatenate((own_weight, neighbour_weight)), (sides.points, sides.points))
+    return _matrix(
+        rows, columns, np.concatenate((own_weight, neighbour_weight)), (sides.points, sides.points)
+    )
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
-    """Uv and point of the old corner vertices and of one in the middle of each cut."""
+    """Return uv and point of the old vertices and of a vertex in the middle of each edge."""
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))
@@ -190,7 +201,7 @@ def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
 
 
 def _matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
-    """The weights that are not 0 in their rows and columns; those of one place are added."""
+    """Return the sparse matrix of the nonzero weights; those of the same row and column are summed."""
     from scipy.sparse import coo_array
 
     used = weights != 0

@@ -69,7 +69,7 @@ def _row_starts(n: int) -> int:
 
 
 class _Piece(NamedTuple):
-    """A piece by itself.
+    """A piece of the layout, prepared for packing.
 
     surface : triangles of the piece
     uv : (t, 3, 2) scaled corners, with the lowest at 0

@@ -1,1 +1,1 @@
-"""Eyeballs of true shape in the place of those that a file has."""
+"""Eyeballs of realistic shape in heads from files, fitted to the file's eyeballs and lids."""

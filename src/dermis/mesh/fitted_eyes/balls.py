@@ -1,4 +1,4 @@
-"""The two eyeballs of a head, among the pieces that its file calls eyes."""
+"""Detection of the two eyeballs of a head among the pieces that its file declares to be eyes."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _ITERATIONS = 12
 _MIN_BULGE, _MIN_CORNEA = 0.025, 0.045
 """Heights above the sphere, in radii: that of points which may be a cornea, and least height of a cornea."""
 _MIN_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
-_DEVIATION_QUANTILE = 0.85  # of the area, that is nearer to the sphere than its `deviation`
+_DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere than its `deviation`
 
 
 @dataclass(frozen=True, eq=False)
 class Ball:
     """An eyeball of a file.
 
-    sphere : that of its white
-    sight : (3,) unit vector along which it looks
-    cornea : whether a cornea shows that; else it is straight ahead
-    points : (n,) the mesh's points that it is made of
+    sphere : sphere of its white
+    gaze : (3,) unit vector along which it looks
+    cornea : whether a cornea shows the gaze; else it is straight ahead
+    points : (n,) points of the mesh that belong to it
     """
 
     sphere: Sphere
@@ -54,21 +54,23 @@ class _Piece:
 
     @property
     def fault(self) -> str:
-        """Why it is no eyeball; empty where it is one."""
+        """Return the reason why the piece is no eyeball, or an empty text if it is one."""
         (low, high), (_, radius, deviation) = RADIUS_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
         if deviation > MAX_DEVIATION:
-            return f"deviates from a ball by {deviation:.0%} of its radius, where {MAX_DEVIATION:.0%} pass"
+            return f"deviates from a ball by {deviation:.0%} of its radius, more than {MAX_DEVIATION:.0%}"
         if not low <= radius <= high:
-            return f"is a ball of {radius:.1f} mm, where {low:g} to {high:g} pass"
-        return "" if self.covered_fraction >= _MIN_COVERED else f"is only {self.covered_fraction:.0%} of a ball"
+            return f"is a ball of {radius:.1f} mm radius, not of {low:g} to {high:g} mm"
+        return (
+            "" if self.covered_fraction >= _MIN_COVERED else f"is only {self.covered_fraction:.0%} of a ball"
+        )
 
 
 def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
-    """The left and the right eyeball among what the file calls eyes, and why there are none of them.
+    """Return the left and right eyeball of a mesh, or None and the reason why there are not two.
 
-    Nothing is said where the file calls nothing so.
+    The reason is empty if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
@@ -83,12 +85,12 @@ def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
         left, right = sorted(chosen, key=lambda piece: -float(piece.sphere.centre[0]))
         return _with_gaze(mesh, left, right, pieces), ""
     names = ", ".join(sorted({repr(one.name) for one in mesh.materials if one.eye}))
-    count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)}, where two are eyes"
+    count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)} instead of two"
     return None, f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].fault}'}"
 
 
 def _pieces(mesh: Mesh, eye_triangles: Index) -> list[_Piece]:
-    """Connected pieces of some triangles."""
+    """Return the connected pieces of some triangles."""
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
     points, own = np.unique(corners, return_inverse=True)
     own = own.reshape(-1, 3)
@@ -105,19 +107,23 @@ def _pieces(mesh: Mesh, eye_triangles: Index) -> list[_Piece]:
 
 
 def _distance_in_radii(points: Doubles, piece: _Piece) -> Doubles:
-    """How many radii places (..., 3) lie from the middle of a ball."""
+    """Return the distance of points (..., 3) from the centre of a ball, in radii."""
     return np.asarray(np.linalg.norm(points - piece.sphere.centre, axis=-1) / piece.sphere.radius)
 
 
 def _with_gaze(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> tuple[Ball, Ball]:
-    """The balls with all that lies in them, each with its own way of looking or straight ahead."""
+    """Return both eyeballs with all pieces inside them, and their gaze by the cornea or straight ahead."""
     positions = mesh.points_mm
     centre = (left.sphere.centre + right.sphere.centre) / 2
     ahead = np.cross(left.sphere.centre - right.sphere.centre, (0.0, 1.0, 0.0))
     ahead /= np.linalg.norm(ahead)
     balls = []
     for ball in (left, right):
-        parts = [one for one in pieces if one is ball or _distance_in_radii(positions[one.points], ball).max() < _PART_RADII]
+        parts = [
+            one
+            for one in pieces
+            if one is ball or _distance_in_radii(positions[one.points], ball).max() < _PART_RADII
+        ]
         points = np.concatenate([one.points for one in parts])
         area = np.concatenate([one.area for one in parts])
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
@@ -127,11 +133,11 @@ def _with_gaze(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) ->
 
 
 class Sphere(NamedTuple):
-    """A sphere that points lie on.
+    """A sphere fitted to points.
 
-    middle : (3,) [mm]
+    centre : (3,) [mm]
     radius : [mm]
-    miss : how far most of them lie off it, as a share of the radius [-]
+    deviation : largest distance of most points from it, as a fraction of the radius [-]
     """
 
     centre: Doubles
@@ -140,12 +146,12 @@ class Sphere(NamedTuple):
 
 
 def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
-    """The sphere that most of a surface lies on; what stands out of it, as a cornea does, counts little.
+    """Fit a sphere to most of a surface; outliers such as a cornea count little.
+
+    This is a least squares fit of |p|^2 = 2 p.c + (r^2 - |c|^2), iterated with Cauchy weights.
 
     points : (n, 3) [mm]
-    area : (n,) of the surface around each [mm2]
-
-    Weighted least squares of |p|^2 = 2 p.c + (r^2 - |c|^2), again and again with Cauchy's weights.
+    area : (n,) area of the surface around each point [mm2]
     """
     weight, fraction = np.ones(len(points)), area / area.sum()
     start = points.mean(axis=0)
@@ -167,10 +173,10 @@ def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
 
 
 def corneal_axis(points: Doubles, area: Doubles, ball: Sphere, ahead: Doubles) -> Doubles | None:
-    """(3,) the way that a cornea on a ball looks; None where nothing stands out like one.
+    """Return the direction (3,) of the cornea on a ball, or None if nothing bulges like one.
 
-    points, area : of all of the eye, see `fit_sphere`
-    ahead : (3,) unit vector, about where the head looks
+    points, area : all points of the eye and their areas, see `fit_sphere`
+    ahead : (3,) unit vector, roughly where the head looks
     """
     offset = points - ball.centre
     distance = np.linalg.norm(offset, axis=1)

@@ -1,4 +1,4 @@
-"""What moves the eyeballs that replace a file's: the bones and the targets that moved those."""
+"""Rig of fitted eyeballs: they follow the bones and targets of those that they replace."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ class Eyeball(NamedTuple):
 
 
 def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
-    """The rig with eyeballs after all its points, which follow what moved those that they replace."""
+    """Return the rig with additional eyeballs, which follow the bones and targets of the old ones.
+
+    Their control points come after all others.
+    """
     skeleton, bones = _with_eye_bones(rig, eyeballs)
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
     rotations, targets = list(rig.bone_rotations), rig.targets
@@ -59,7 +62,7 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
 
 
 def _with_eye_bones(rig: Rig, eyeballs: Sequence[Eyeball]) -> tuple[Skeleton, list[int]]:
-    """The skeleton with a bone for each eyeball, its own where the file has one, and their numbers."""
+    """Return the skeleton with a bone for each eyeball, the file's own if it has one, and their indices."""
     skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
     bones = _eye_bones(skeleton, eyeballs)
     for k, eyeball in enumerate(eyeballs):
@@ -81,7 +84,7 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[Eyeball]) -> tuple[Skeleton, li
 
 
 def _single_bone(count: int) -> Skeleton:
-    """One bone that all points follow."""
+    """Return a skeleton of one bone that all points follow."""
     identity = np.eye(4)[None]
     bone, weight = np.zeros((count, INFLUENCES), np.int32), np.zeros((count, INFLUENCES), np.float32)
     weight[:, 0] = 1.0
@@ -89,7 +92,7 @@ def _single_bone(count: int) -> Skeleton:
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[Eyeball]) -> list[int]:
-    """The bone that moves each eyeball and nothing else, -1 where there is none."""
+    """Return the bone that moves each eyeball and nothing else, -1 for none."""
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
@@ -101,13 +104,13 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[Eyeball]) -> list[int]:
 
 
 def _follower_counts(skeleton: Skeleton, eyeball: Eyeball) -> Doubles:
-    """(b,) how many points of the replaced eyeball follow each bone."""
+    """Return the number of points (b,) of the replaced eyeball that follow each bone."""
     bone, weight = skeleton.bone[eyeball.replaced], skeleton.weight[eyeball.replaced]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
 def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -> Skeleton:
-    """The skeleton with a bone more, which rests at a place in the head's space [mm]."""
+    """Return the skeleton with another bone, whose joint is at a position in head space [mm]."""
     to_head = np.eye(4)
     to_head[:3, 3] = origin_mm
     world = np.linalg.inv(skeleton.to_head) @ to_head
@@ -123,7 +126,7 @@ def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -
 def _rigid_targets(
     rig: Rig, eyeball: Eyeball, bone: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
-    """Turns of a bone as targets turn the replaced eyeball, and by number how far they shift it [mm]."""
+    """Return how targets move an eyeball rigidly: rotations of its bone, and shifts by target index [mm]."""
     rest = rig.positions_mm[eyeball.replaced].astype(np.float64)
     deltas = rig.targets.dense(eyeball.replaced, len(rig.positions_mm)).astype(np.float64)
     rotations, shifts = list[BoneRotation](), dict[int, Doubles]()
@@ -144,7 +147,7 @@ def _rigid_targets(
 
 
 def _with_shifts(targets: MorphTargets, shifts: dict[int, Doubles], points: Index) -> MorphTargets:
-    """The targets that shift some points more, all of them alike."""
+    """Return the targets with a shift of some points added to them."""
     if not shifts:
         return targets
     point, delta, count = list[Ints](), list[Floats](), [0]

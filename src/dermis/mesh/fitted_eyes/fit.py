@@ -1,4 +1,4 @@
-"""A head from a file with eyeballs of true shape in the place of its own."""
+"""Replacement of a file's eyeballs by eyeballs of realistic shape."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dermis.mesh.eyeball import (
 )
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.fitted_eyes.balls import Ball, Sphere, find_balls
-from dermis.mesh.fitted_eyes.globe_rig import Eyeball, with_eyeballs
+from dermis.mesh.fitted_eyes.eyeball_rig import Eyeball, with_eyeballs
 from dermis.mesh.fitted_eyes.lids import eye_axes, lids_before
 from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
@@ -34,14 +34,14 @@ _INWARDS = np.radians(2.5)  # the iris is closer to the nose than the centre of 
 
 
 class _Shape(NamedTuple):
-    """Of a fitted eye.
+    """Shape of a fitted eye.
 
-    Corneas and irises hardly differ between people: those of larger balls are of usual size, and only smaller
-    balls are small in all.
+    Corneas and irises hardly differ between people: larger balls get a cornea of adult size, smaller ones are
+    scaled as a whole.
 
-    axis : (3,) unit vector along which its cornea lies
-    ball_mm, middle_mm : see `Eyes`
-    scale : how long a mm of a usual eye is in the head [mm]
+    axis : (3,) unit vector from the centre to the cornea
+    radius_mm, centre_offset_mm : see `Eyes`
+    scale : length of 1 mm of an adult eye in the head [mm]
     """
 
     axis: Doubles
@@ -52,14 +52,14 @@ class _Shape(NamedTuple):
 
 @logged_step("fitting the eyes")
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
-    """The head with the package's eyes where its file calls something eyes that is two balls.
+    """Return a head whose two eyeballs from a file are replaced by the package's own.
 
-    The new balls have the radius and the place of those, look along their corneas or straight ahead, and
-    follow their bones and targets rigidly. Where they cannot be fitted, the head remains as it is, and its
-    `note` says why.
+    The new eyeballs have the radius and position of the old ones, look along their corneas or straight ahead,
+    and follow their bones and targets rigidly. If they cannot be fitted, the head is returned as it is, with
+    the reason in its `note`.
 
-    coarse : the mesh of a head that is subdivided, as it was before, when the lids lay on the balls
-    look : of the eyes
+    coarse : for a subdivided head its mesh before subdivision, when the lids still touched the eyeballs
+    look : appearance of the eyes
     """
     mesh, control = head.mesh, head.control
     balls, reason = find_balls(coarse or mesh)
@@ -89,7 +89,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
 
 
 def _ball_triangles(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -> tuple[Index, Index]:
-    """The triangles of each ball in the mesh, which may be subdivided."""
+    """Return the triangles of each eyeball in a mesh that may be subdivided."""
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
         first = stencils.point[stencils.first[first]]
@@ -98,9 +98,9 @@ def _ball_triangles(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ba
 
 
 def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
-    """The shapes of both eyes; those that no cornea tells of fit the lids before them.
+    """Return the shapes of both eyes; eyes without a cornea are aligned with the lids before them.
 
-    corners_mm : (f, 3, 3) of all other triangles
+    corners_mm : (f, 3, 3) corners of all other triangles
     """
     lids = [lids_before(corners_mm, ball.sphere, ball.gaze) for ball in balls]
     (left, a), (right, b) = (one.iris for one in lids)
@@ -112,17 +112,19 @@ def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
             axis = lid.direction(side * outwards, up)
             sunk = lid.sunk_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
-        shapes.append(_Shape(axis, radius, limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk, scale))
+        shapes.append(
+            _Shape(axis, radius, limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk, scale)
+        )
     return shapes
 
 
 def _eyeball_points(ball: Sphere, shape: _Shape) -> Doubles:
-    """(n, 3) points of an eyeball in the head [mm]."""
+    """Return the points (n, 3) of an eyeball in the head [mm]."""
     return np.asarray(ball.centre + shape.scale * _shape_points(shape) @ eye_axes(shape.axis))
 
 
 def _shape_points(shape: _Shape) -> Doubles:
-    """(n, 3) points of an eyeball around its middle, of any radius, with a usual cornea [mm]."""
+    """Return the points (n, 3) of an eyeball around its centre, with a cornea of adult size [mm]."""
     points, _ = build_eyeball(_SIDE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
@@ -139,7 +141,10 @@ def _shape_points(shape: _Shape) -> Doubles:
 
 
 def _extended(stencils: Stencils, begin: int, count: int) -> Stencils:
-    """The stencils with control points more that are points themselves, from one number on."""
+    """Return stencils with additional control points that are points of the mesh themselves.
+
+    begin, count : index of the first one and their number
+    """
     own = np.arange(count, dtype=np.int32)
     return Stencils(
         np.concatenate([stencils.first, stencils.first[-1] + 1 + own]),
@@ -148,10 +153,8 @@ def _extended(stencils: Stencils, begin: int, count: int) -> Stencils:
     )
 
 
-def _replace_eyeballs(
-    mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index
-) -> Mesh:
-    """The mesh with eyeballs in the place of those of some triangles; its points keep their numbers."""
+def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index) -> Mesh:
+    """Return the mesh with its eyeballs replaced; other points keep their indices."""
     remains = np.ones(len(mesh.triangles), bool)
     remains[np.concatenate(balls)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
@@ -180,7 +183,7 @@ def _replace_eyeballs(
 
 
 def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Material, ...]) -> Mesh:
-    """Eyeballs alone, a material each."""
+    """Return a mesh of both eyeballs, each with its own material."""
     count, faces = len(positions[0]), len(quads)
     return build_mesh(
         np.concatenate(positions),

@@ -1,4 +1,4 @@
-"""Eyes behind a file's lids: the way in which they look through them, and corneas that stay behind."""
+"""Lids before an eyeball: the direction of gaze through their opening, and corneas that stay behind them."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Lids:
-    """What lies before an eyeball, seen from far ahead.
+    """Surfaces in front of an eyeball, sampled by parallel rays along its axis.
 
     ball : the eyeball
     axes : (3, 3) rows across, up and ahead
-    corners : (f, 3, 3) triangles around, from the ball's middle along the axes [mm]
+    corners : (f, 3, 3) triangles around the eyeball, relative to its centre in these axes [mm]
     """
 
     ball: Sphere
@@ -36,19 +36,19 @@ class Lids:
 
     @cached_property
     def ray_positions(self) -> Doubles:
-        """(n, 2) where the rays meet the plane through the ball's middle [mm]."""
+        """Return the positions (n, 2) of the rays in the plane through the ball's centre [mm]."""
         line = np.linspace(-_EXTENT, _EXTENT, _RAYS) * self.ball.radius
         x, y = np.meshgrid(line, line)
         return np.stack([x.ravel(), y.ravel()], axis=1)
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """(n,) how far before the ball's middle each ray meets it [mm]."""
+        """Return the depth (n,) of the ball's front along each ray, from its centre [mm]."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """(n,) how far before the ball's middle each ray meets anything else first, -inf for never [mm]."""
+        """Return the depth (n,) of the first other surface along each ray, -inf for none [mm]."""
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
         triangle, ray = self._candidate_pairs(corners)
         a, b, c = np.moveaxis(corners[triangle], 1, 0)
@@ -64,7 +64,7 @@ class Lids:
         return front
 
     def _candidate_pairs(self, corners: Doubles) -> tuple[Index, Index]:
-        """Triangles and rays, pair by pair, of which the rays lie within the triangles' bounds."""
+        """Return pairs of triangles and rays where the ray is within the triangle's bounding box."""
         extent = _EXTENT * self.ball.radius
         cell = (corners[:, :, :2] + extent) * (_RAYS - 1) / (2 * extent)
         first = np.maximum(np.ceil(cell.min(axis=1)), 0).astype(np.int64)
@@ -78,10 +78,10 @@ class Lids:
 
     @property
     def iris(self) -> tuple[float, float]:
-        """Where in the opening an iris lies that looks straight ahead, as angles across and up [rad].
+        """Return the angles across and up at which an iris is in the opening of the lids [rad].
 
-        Zeros without lids on all sides. Lids show best where a file's eyes look: balls and lids of artists
-        are seldom around one centre.
+        They are zero if there are not lids on all sides. In files, the lids are the best indication of the
+        gaze, as eyeballs and lids seldom have the same centre.
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_ABOVE_CENTRE)):
@@ -96,38 +96,40 @@ class Lids:
         return angles[0], angles[1]
 
     def direction(self, across: float, up: float) -> Doubles:
-        """(3,) unit vector by angles across and up [rad]."""
+        """Return the unit vector (3,) at angles across and up [rad]."""
         local = np.sin(across) * np.cos(up), np.sin(up), np.cos(across) * np.cos(up)
         return np.asarray(np.array(local) @ self.axes)
 
     def sunk_mm(self, axis: Doubles, scale: float) -> float:
-        """How far a cornea along an axis has to lie further in, to stay behind lids on the ball [mm].
+        """Return the distance by which a cornea has to be moved inwards to stay behind the lids [mm].
 
-        axis : (3,) unit vector along which the eye looks
-        scale : size of the cornea, 1 for a usual one
+        axis : (3,) unit vector of the gaze
+        scale : size of the cornea, 1 for that of an adult
         """
         local, radius = self.axes @ axis, CORNEA_MM * scale
         centre = scale * (limbus_plane_mm(self.ball.radius / scale) - limbus_plane_mm(CORNEA_MM))
         distance2 = ((self.ray_positions - centre * local[:2]) ** 2).sum(axis=1)
         cornea = centre * local[2] + np.sqrt(np.maximum(radius**2 - distance2, 0.0))
-        covered = (distance2 < radius**2) & (self.obstacle_front > self.ball_front) & (cornea > self.ball_front)
+        covered = (
+            (distance2 < radius**2) & (self.obstacle_front > self.ball_front) & (cornea > self.ball_front)
+        )
         protrusion = float((cornea - self.obstacle_front)[covered].max(initial=0.0))
         deepest = max(centre + radius - self.ball.radius - _MIN_BULGE_MM, 0.0)
         return float(np.clip(protrusion - _MAX_PROTRUSION_MM, 0.0, deepest))
 
 
 def lids_before(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
-    """What lies before an eyeball that looks a way.
+    """Return the lids before an eyeball.
 
-    corners_mm : (f, 3, 3) corners of all triangles but those of eyeballs, in the head's space
-    ahead : (3,) unit vector
+    corners_mm : (f, 3, 3) corners of all triangles but those of eyeballs, in head space
+    ahead : (3,) unit vector of the gaze
     """
     axes = eye_axes(ahead)
     return Lids(ball, axes, (corners_mm.astype(np.float64) - ball.centre) @ axes.T)
 
 
 def eye_axes(axis: Doubles) -> Doubles:
-    """(3, 3) rows across, up and along an axis."""
+    """Return the axes (3, 3) across, up and along a direction, as rows."""
     across = np.cross((0.0, 1.0, 0.0), axis)
     across /= np.linalg.norm(across)
     return np.stack([across, np.cross(axis, across), axis])

@@ -1,4 +1,4 @@
-"""Shapes of cells in a square: none overlap, and each has the first free place."""
+"""Placement of shapes on cells: none overlap, and each has the first free position."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Flags = NDArray[np.bool_]
 
 
 def spans_of(mask: Flags) -> list[Span]:
-    """Runs of true cells, found cell by cell."""
+    """Return the runs of true cells, found cell by cell."""
     found: list[Span] = []
     for y, x in np.argwhere(mask).tolist():
         if x > 0 and mask[y, x - 1]:
@@ -24,7 +24,7 @@ def spans_of(mask: Flags) -> list[Span]:
 
 
 def shapes(count: int) -> list[Flags]:
-    """Random ones with something in the first row and column."""
+    """Return random shapes with cells in the first row and column."""
     rng, made = np.random.default_rng(3), list[Flags]()
     for _ in range(count):
         mask = rng.random(rng.integers(1, 9, 2)) < 0.6

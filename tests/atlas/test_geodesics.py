@@ -1,4 +1,4 @@
-"""Walks over a surface against the same walk on it laid flat, and overlaps cut until gutters have room."""
+"""Geodesics compared with straight lines on the unrolled surface, and cuts of overlapping gutters."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ WIDTH = 2 * RADIUS * np.sin(np.pi / FACETS)  # of a facet: the mesh is a prism
 def go(
     surface: FlatSurface, triangle: NDArray[np.int32], start: Floats, target: Floats
 ) -> tuple[Floats, Floats]:
-    """Where walks end in space, and whether the surface went on so far."""
+    """Return the ends of geodesics in space, and whether they are complete."""
     ends = trace_geodesics(surface.adjacency, triangle, start, target)
     weights = np.column_stack((1 - ends.weights.sum(axis=1), ends.weights))
     return np.einsum("nk,nkc->nc", weights, surface.corners[ends.triangle]), ends.complete
 
 
 def around(points: Floats) -> Floats:
-    """Places (n, 2) on the prism unrolled: along its facets, and height."""
+    """Return the points (n, 2) on the unrolled prism: along its facets, and height."""
     angle = np.arctan2(points[:, 0], points[:, 2]) % (2 * np.pi)
     facet = np.floor(angle / (2 * np.pi / FACETS))
     middle = (facet + 0.5) * 2 * np.pi / FACETS
@@ -82,7 +82,7 @@ def _weights(surface: FlatSurface, triangle: NDArray[np.int32], place: Floats) -
 
 
 def _step(surface: FlatSurface, triangle: NDArray[np.int32], step: Floats) -> Floats:
-    """A step in a triangle's plane as one along the prism's facets and up."""
+    """Return a step in a triangle's plane as a step along the prism's facets and up."""
     corners = surface.corners[triangle]
     x = corners[:, 1] - corners[:, 0]
     x /= np.linalg.norm(x, axis=1, keepdims=True)
@@ -96,7 +96,7 @@ def _step(surface: FlatSurface, triangle: NDArray[np.int32], step: Floats) -> Fl
 
 
 def test_a_round_walk_on_a_sphere_comes_home() -> None:
-    """Great circles close; facets make them miss by a little."""
+    """Check that great circles close, up to an error by facets."""
     surface = flat_surface(cut_sphere(20.0, 32))
     triangle, start, target = random_walks(surface, 2 * np.pi * 20.0)
     ends, complete = go(surface, triangle, start, target)
@@ -106,7 +106,7 @@ def test_a_round_walk_on_a_sphere_comes_home() -> None:
 
 
 def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
-    """The unrolled cone's sides meet at the apex: both would need the same texels."""
+    """Check the unrolled cone, whose sides meet at the apex and would need the same texels."""
     surface = flat_surface(cut_cone(40.0, 50.0))
     piece, _ = find_pieces(surface)
     assert piece.max() == 0
