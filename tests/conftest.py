@@ -64,9 +64,12 @@ def device() -> Device:
 
 @pytest.fixture(scope="session", autouse=True)
 def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Use a cache folder of the tests instead of the user's."""
+    """Use a cache folder of the tests instead of the user's; parallel processes share it."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "cache"
+    folder.mkdir(mode=0o700, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DERMIS_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("DERMIS_CACHE", str(folder))
         yield
 
 

@@ -22,18 +22,18 @@ def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
     Recurrence in the degree [HolmesFeatherstone2002].
     """
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-    diagonal = np.full(cosine.shape, np.sqrt(0.25 / np.pi))
-    functions = []
-    for m in range(orders):
-        if m > 0:
-            diagonal = np.sqrt((2.0 * m + 1.0) / (2.0 * m)) * sine * diagonal
-        rows = [diagonal, np.sqrt(2.0 * m + 3.0) * cosine * diagonal]
-        for l in range(m + 2, degree + 1):
-            a = np.sqrt((4.0 * l * l - 1.0) / (l * l - m * m))
-            b = np.sqrt(((l - 1.0) ** 2 - m * m) / (4.0 * (l - 1.0) ** 2 - 1.0))
-            rows.append(a * (cosine * rows[-1] - b * rows[-2]))
-        functions.append(np.stack(rows[: degree + 1 - m]))
-    return functions
+    table = np.zeros((orders, degree + 1, *cosine.shape))
+    table[0, 0] = np.sqrt(0.25 / np.pi)
+    for m in range(1, orders):
+        table[m, m] = np.sqrt((2.0 * m + 1.0) / (2.0 * m)) * sine * table[m - 1, m - 1]
+    for l in range(1, degree + 1):
+        if l <= orders:
+            table[l - 1, l] = np.sqrt(2.0 * l + 1.0) * cosine * table[l - 1, l - 1]
+        m = np.arange(min(l - 1, orders), dtype=np.float64)[:, None]
+        a = np.sqrt((4.0 * l * l - 1.0) / (l * l - m * m))
+        b = np.sqrt(((l - 1.0) ** 2 - m * m) / (4.0 * (l - 1.0) ** 2 - 1.0))
+        table[: len(m), l] = a * (cosine * table[: len(m), l - 1] - b * table[: len(m), l - 2])
+    return [table[m, m:] for m in range(orders)]
 
 
 def analyse(radiance: Floats, degree: int) -> list[Complex]:
@@ -43,7 +43,7 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
     around = np.fft.rfft(weighted, axis=1)
     table = _legendre_table(height, degree)
     return [
-        table[m] @ (around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
+        _times(table[m], around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
         if m < around.shape[1]
         else np.zeros((degree + 1 - m, radiance.shape[2]), complex)
         for m in range(degree + 1)
@@ -64,15 +64,24 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return the panorama (height, 2 height, c) of coefficients multiplied by a factor for each degree."""
-    width = 2 * height
-    degree = len(factors) - 1
+    """Return panoramas (k, height, 2 height, c) of coefficients multiplied by factors.
+
+    factors : (k, degree + 1) factor of each panorama for each degree
+    """
+    width, channels = 2 * height, coefficients[0].shape[1]
+    count, degree = factors.shape[0], factors.shape[1] - 1
     table = _legendre_table(height, degree)
-    around = np.zeros((height, width // 2 + 1, coefficients[0].shape[1]), complex)
+    around = np.zeros((height, width // 2 + 1, count, channels), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
-        scaled = coefficients[m] * factors[m:, None]
-        around[:, m] = (table[m].T @ scaled) * np.exp(1j * m * _first_azimuth(width))
-    return np.fft.irfft(around, width, axis=1) * width
+        scaled = (coefficients[m][:, None] * factors.T[m:, :, None]).reshape(-1, count * channels)
+        rows = _times(table[m].T, scaled) * np.exp(1j * m * _first_azimuth(width))
+        around[:, m] = rows.reshape(height, count, channels)
+    return np.moveaxis(np.fft.irfft(around, width, axis=1) * width, 2, 0)
+
+
+def _times(matrix: Floats, values: Complex) -> Complex:
+    """Return the product of a real and a complex matrix; NumPy would first copy the real one as complex."""
+    return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
 
 @lru_cache(maxsize=2)  # input and output size; 51 kB a row at degree 112

@@ -44,8 +44,8 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
     is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the mirror
     direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns, the
     last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
-    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight 0
-    need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
+    which at grazing views is elongated, offset the mirror direction, and ends at the horizon. Lobes of weight
+    0 need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = " ".join(
@@ -56,11 +56,14 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
         if rows
         else _fit_model(model)
     )
-    angle, beside, roughness, weight = np.moveaxis(fits, -1, 0)
+    angle, out_of_plane, roughness, weight = np.moveaxis(fits, -1, 0)
     weight = weight / weight.sum(axis=-1, keepdims=True)
-    off = angle - np.arccos(LOBE_TABLE_COSINES)[:, None]
-    farther = 1.0 + np.cos(off) * np.cos(beside)
-    return np.stack([np.sin(off) * np.cos(beside) / farther, np.sin(beside) / farther, roughness, weight], -1)
+    offset = angle - np.arccos(LOBE_TABLE_COSINES)[:, None]
+    farther = 1.0 + np.cos(offset) * np.cos(out_of_plane)
+    return np.stack(
+        [np.sin(offset) * np.cos(out_of_plane) / farther, np.sin(out_of_plane) / farther, roughness, weight],
+        -1,
+    )
 
 
 @logged_step("finding what the surface reflects of the environment")

@@ -70,7 +70,7 @@ def prefilter(name: str) -> Prefiltered:
     radiance, suns = split_suns(load_panorama(name))
     coefficients = analyse(radiance, _DEGREE)
     kernels = [zonal(np.cos, _DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
-    layers = [synthesise(coefficients, factors, HEIGHT) for factors in kernels]
+    layers = synthesise(coefficients, np.stack(kernels), HEIGHT)
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
