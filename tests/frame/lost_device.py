@@ -118,7 +118,7 @@ def begun_to_read(renderer: Renderer) -> Any:
 def painting(renderer: Renderer) -> Any:
     """Render a person, whose skin the device paints."""
     person, small = Scene(Human().head()), settings_of(size=(32, 32), atlas=256)
-    with losing(paint, "draw"):
+    with losing(paint, "paint_textures"):
         found = renderer.draw(person, small).linear()
     renderer.clear_cache()
     assert np.array_equal(renderer.draw(person, small).linear(), found)

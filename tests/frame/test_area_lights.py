@@ -16,7 +16,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.lights import light_records, light_views
+from dermis.frame.lights.records import light_records, light_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
 from dermis.frame.programs import device_constants, strip_constants
 from dermis.frame.renderer import Renderer

@@ -7,7 +7,7 @@ import pytest
 from setups import head_of, place, scene_of
 
 from dermis.base.errors import DermisError
-from dermis.frame.lights import light_views
+from dermis.frame.lights.records import light_views
 from dermis.frame.projection import view_axes
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
@@ -46,7 +46,7 @@ def test_maps_hold_the_head_tightly(index: int) -> None:
 def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
     """A light inside the bounds, or so near that no map can cover the head, is refused by name."""
     lamp = PointLight(position=place(BALL, inside), target=(100.0, 0.0, 0.0))
-    with pytest.raises(DermisError, match=r"light 2.*a place outside the head"):
+    with pytest.raises(DermisError, match=r"light 2.*a position outside the head"):
         light_views(scene_of(BALL, LIGHTS[0], lamp), BALL.mesh.outline, 64)
 
 

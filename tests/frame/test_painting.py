@@ -88,7 +88,7 @@ def test_colours_are_those_of_the_pigments(device: Device, surface: PaintedSurfa
     melanin, blood = np.meshgrid(
         BARE.melanin * 2 ** np.linspace(-2, 2, 81), BARE.blood * 2 ** np.linspace(-2, 4, 121)
     )
-    known = table.read(melanin.ravel(), blood.ravel())
+    known = table.lookup(melanin.ravel(), blood.ravel())
     away = np.abs(bare[:, None, :] - known[None]).max(axis=-1).min(axis=1)
     assert away.max() < 0.012
 

@@ -54,7 +54,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[PaintInputs]:
 
 def bits(device: Device, made: RestMaps, animated: bool) -> list[Any]:
     maps = [download(device, one.texture) for one in (made.colour, made.specular, made.roughness)]
-    moved = [download(device, made.expression_deltas, layer=layer) for layer in range(2)] if animated else []
+    moved = [download(device, made.deltas, layer=layer) for layer in range(2)] if animated else []
     return [*maps, np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32), *moved]
 
 

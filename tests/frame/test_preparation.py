@@ -51,7 +51,7 @@ def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pyte
     assert len(log) == 1
     assert len({one.shadow_views.clips.tobytes() for one in found}) == 3
     assert len({one.view.tobytes() for one in found}) == 3
-    assert len({one.camera.clips.tobytes() for one in found}) == 3
+    assert len({one.camera_views.clips.tobytes() for one in found}) == 3
     assert len({one.bindings["lights"].tobytes() for one in found}) == 3
     assert len({id(one.resources.diffusion.levels) for one in found}) == 1
 

@@ -138,15 +138,15 @@ def test_even_light_stays_even(device: Device, width_mm: float) -> None:
 def test_table_is_the_kernel() -> None:
     """Interpolated values agree too; the light beyond the reach, less than 0.1 %, is added within it."""
     for distance in np.geomspace(1e-3, REACH, 40):
-        assert np.abs(share_within(distance) - KERNEL.one_side(distance)).max() < 6e-4
+        assert np.abs(share_within(distance) - KERNEL.half_line_integral(distance)).max() < 6e-4
     assert (share_within(REACH) == 0.5).all()
-    assert np.allclose(KERNEL.one_side(1e3), 0.5)
+    assert np.allclose(KERNEL.half_line_integral(1e3), 0.5)
 
 
 def across(kernel: SeparableKernel, pixel_mm: float, side: int) -> Floats:
     """Return the (side, side, 3) light from the middle pixel: the kernel integrated over pixels."""
     edges = (np.arange(side + 1) - side // 2 - 0.5) * pixel_mm
-    line = np.diff(kernel.one_side(edges), axis=0)
+    line = np.diff(kernel.half_line_integral(edges), axis=0)
     return np.asarray(line[:, None] * line[None, :])
 
 

@@ -12,7 +12,7 @@ from setups import AnyLight, frontal, head_of, joined, place, probe, run_frame, 
 from tolerances import LIT
 
 from dermis.atlas.build import cached_atlas
-from dermis.frame.lights import light_views
+from dermis.frame.lights.records import light_views
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import plane, uv_sphere

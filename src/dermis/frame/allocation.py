@@ -47,13 +47,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     """
     settings, cached = request.settings, memo.get
     check_limits(device, request)
-    map_files = (
-        *(device, request.head, request.albedo_from_map, settings.gamma == "right"),
-        *(request.painted_side, request.has_animated_maps),
-    )
-    maps = memo.submit(
-        device.executor, upload_maps, *map_files
-    )  # in the background: reading files takes long
+    map_options = request.albedo_from_map, settings.gamma == "right", request.painted_side
+    map_inputs = device, request.head, *map_options, request.has_animated_maps
+    maps = memo.submit(device.executor, upload_maps, *map_inputs)  # in the background, as files load slowly
     shadow_maps = _shadow_maps(memo, device, request)
     shapes = shape.make(memo, device, request)
     strands = hair.make(memo, device, request)
@@ -67,7 +63,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     )
     own = technique.make(memo, device, settings, request.profile)
     thin = [layout.translucency for layout in layouts]
-    blended = len(layouts) > 1
+    scattered = layouts[0].scattered
+    if len(layouts) > 1:
+        scattered = _sum(memo, device, request, technique, settings.atlas, "both")
     needs_layers = "diffuse" in request.outputs
     return Resources(
         shape=shapes,
@@ -75,9 +73,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         layouts=layouts,
         shadow_maps=shadow_maps,
         diffusion=diffusion.make(memo, device, request, technique, [textures for _, textures in atlases]),
-        scattered=_sum(memo, device, request, technique, settings.atlas, "both")
-        if blended
-        else layouts[0].scattered,
+        scattered=scattered,
         technique=own,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
         sky=_sky(memo, device, request, layouts[0], shapes) if request.occlusion_follows_shape else None,
@@ -204,17 +200,8 @@ def _layout(
     side = settings.atlas if request.blur_count else 1
     surfaces = cached(make_surface_texture, device, side, owner=number)
     scattered = _sum(memo, device, request, technique, side, number)
-    return AtlasLayout(
-        textures,
-        geometry,
-        bindings,
-        surfaces,
-        scattered,
-        gutter_update,
-        translucency,
-        moving_occlusion,
-        interreflection,
-    )
+    optional = gutter_update, translucency, moving_occlusion, interreflection
+    return AtlasLayout(textures, geometry, bindings, surfaces, scattered, *optional)
 
 
 def _gutter_update(tracing: GutterTracing, geometry: HeadGeometry, rest_shape: Shape) -> GutterUpdate:

@@ -27,10 +27,7 @@ Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
 _BATCH = 1 << 20  # surface points per pass; their results fit a buffer of the default limits of WebGPU
 _PICTURE = (64, 64)  # size of the frame that lights the atlas, which is not used
-_ALBEDO_ATLAS, _ALBEDO_SIDE = (
-    512,
-    2048,
-)  # for albedo alone: side of the atlas, and of the texels that are filtered
+_ALBEDO_ATLAS, _ALBEDO_SIDE = 512, 2048  # sides of the atlas and of the filtered texels, for albedo only
 _CONDITIONAL = {
     ("thickness",): "no light crosses thin parts: transmission is none, or no light is blurred",
     ("melanin", "blood"): "the skin is not made of pigments",

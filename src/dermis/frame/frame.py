@@ -43,27 +43,16 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     scattered = technique.scatter(graph, inputs)
     visibility.draw(graph, resources.visibility, inputs.camera_views, resources.head)
     image, layers = resources.post.picture.radiance, technique.subsurface_layers(resources.technique)
-    radiance = shading.draw(
-        graph,
-        bindings,
-        view,
-        inputs.constants,
-        resources.visibility,
-        scattered,
-        image,
-        inputs.settings.size,
-        layers,
-    )
+    targets = image, inputs.settings.size, layers
+    shaded = bindings, view, inputs.constants, resources.visibility, scattered
+    radiance = shading.draw(graph, *shaded, *targets)
     radiance = technique.finish(graph, inputs, radiance)
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
-    shared = bindings, view, inputs.light_constants
+    shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:
-        over, labels = (
-            (resources.visibility.texture, radiance),
-            outputs.hair_labels(graph, resources.outputs, stage_inputs),
-        )
-        radiance = hair.draw(graph, resources.hair, shared, resources.head, *over, labels)
-    post.draw(graph, resources.post, inputs.settings, radiance, *shared, resources.visibility.texture)
+        labels = outputs.hair_labels(graph, resources.outputs, stage_inputs)
+        radiance = hair.draw(graph, resources.hair, shared, resources.head, triangles, radiance, labels)
+    post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)
     outputs.draw(graph, resources.outputs, stage_inputs)
 
 

@@ -94,7 +94,7 @@ def observation_jobs(
 
 
 def _observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
-    picture, outputs, landmark_sets = readback.all()
+    picture, outputs, landmark_sets = readback.image_and_outputs()
     camera = scene.camera.to_opencv(settings.size)
     landmarks = {name: _landmarks(camera, *rows) for name, rows in landmark_sets.items()}
     return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))

@@ -26,8 +26,8 @@ from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import EyePoses, camera_views, pinhole, with_camera
 from dermis.frame.features.shape.shape import MotionBytes, rest_motion
 from dermis.frame.inputs import FrameInputs
-from dermis.frame.lights import light_constants, light_part_counts, light_records, light_views
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
+from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_views
 from dermis.frame.limits import out_of_memory_error
 from dermis.frame.projection import Views, shadow_map_views
 from dermis.frame.request import FrameRequest

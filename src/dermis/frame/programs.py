@@ -12,8 +12,8 @@ from types import ModuleType
 from dermis import specular
 from dermis.environment.isotropic_lobes import isotropic_lobe_constants
 from dermis.environment.prefilter import reflection_constants
-from dermis.frame.lights import light_shader_constants
 from dermis.frame.lights.kind import KINDS, light_shaders
+from dermis.frame.lights.records import light_shader_constants
 from dermis.gpu import ComputeProgram, Constants, Device, cached_program
 from dermis.gpu.program import used_constants
 from dermis.gpu.wgsl_source import Folder, Member, ShaderFolder
@@ -38,13 +38,13 @@ _SPLAT_STEP = 2.0  # step along hairs in shadow maps on software adapters [texel
 _MAX_SAMPLES = 64  # per invocation: a driver ends loops after 65,535 iterations
 
 
-_ALWAYS = (
+_ALWAYS = (  # shaders of most frames
     "shading/shade.wgsl",
     "surface/surface_texels.wgsl",
     "shadows/shadow_bounds.wgsl",
     "post/post.wgsl",
     "outputs/pack.wgsl",
-)  # shaders of most frames
+)
 
 
 def shader_folders(*options: str) -> tuple[Folder, ...]:

@@ -44,10 +44,7 @@ class Views(NamedTuple):
 
         size : of the picture [pixels]
         """
-        shift = (self.sample_positions - 0.5) * (
-            -2.0 / size[0],
-            2.0 / size[1],
-        )  # clip space is 2 wide and high
+        shift = (self.sample_positions - 0.5) * (-2.0 / size[0], 2.0 / size[1])  # in clip space
         matrices = np.repeat(self.clips[:, None], len(shift), axis=1)
         matrices[:, :, :2] += shift[..., None] * self.clips[:, None, 3:]
         return matrices.reshape(-1, 4, 4)

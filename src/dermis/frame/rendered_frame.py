@@ -46,7 +46,7 @@ class RenderedFrame(ShortRepr):
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles without a place in the atlas; light does not scatter there
+    unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
     suns : number of lights that the environment adds
     settings : settings of the frame
     start_readback : function that starts the readback of the picture, with the options of `start_readback`

@@ -168,7 +168,7 @@ class Renderer:
         self.graph.submit()
         return readback
 
-    def _submit_with_readback(
+    def _submit_readback(
         self,
         scene: Scene,
         previous: Scene | None = None,
@@ -362,9 +362,7 @@ class Renderer:
         DermisError
             As `draw` does.
         """
-        submit = partial(
-            self._submit_with_readback, settings=Settings(**settings), linear=linear, alpha=alpha
-        )
+        submit = partial(self._submit_readback, settings=Settings(**settings), linear=linear, alpha=alpha)
         frames = ((partial(submit, Scene.coerce(scene)), Readback.image) for scene in scenes)
         yield from pipeline_frames(self.reopening_device, lambda: self.device, frames)
 
@@ -409,13 +407,8 @@ class Renderer:
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
-        submit = partial(
-            self._submit_with_readback,
-            linear=linear,
-            alpha=alpha,
-            outputs=check_outputs(outputs),
-            landmarks=checked_landmarks(landmarks),
-        )
+        names, sets = check_outputs(outputs), checked_landmarks(landmarks)
+        submit = partial(self._submit_readback, linear=linear, alpha=alpha, outputs=names, landmarks=sets)
         jobs = observation_jobs(submit, scenes, previous, settings)
         return pipeline_frames(self.reopening_device, lambda: self.device, jobs)
 

@@ -46,7 +46,7 @@ class Resources:
     outputs : resources of the outputs besides the picture, None without any
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles without a place in the atlas; light does not scatter there
+    unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
     """
 
     shape: shape.Resources

@@ -60,7 +60,11 @@ class PreIntegratedSkin(Technique):
     ) -> None:
         """Write the scales of the tables to the shading record."""
         assert isinstance(resources, PreIntegratedTables)
-        scales = {"max_curvature": MAX_CURVATURE, "penumbra": resources.penumbra_width_mm, "relief": resources.relief_mm}
+        scales = {
+            "max_curvature": MAX_CURVATURE,
+            "penumbra": resources.penumbra_width_mm,
+            "relief": resources.relief_mm,
+        }
         view["pre"] = shade.record("PreIntegrated", **scales)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:

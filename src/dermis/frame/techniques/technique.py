@@ -41,9 +41,8 @@ from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
-_RELIT_MM2 = (
-    0.1**2
-)  # narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred
+# Narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred.
+_RELIT_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):

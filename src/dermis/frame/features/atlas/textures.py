@@ -174,9 +174,8 @@ def edge_distances(atlas: Atlas) -> NDArray[np.float32]:
     """Return the (n, n) approximate distances of texels to the edge of their chart [texels]."""
     from scipy.ndimage import distance_transform_edt
 
-    inner = atlas.lit & (atlas.edge_distance > 0).all(
-        axis=-1
-    )  # charts can be adjacent without an empty texel
+    # charts can be adjacent without an empty texel
+    inner = atlas.lit & (atlas.edge_distance > 0).all(axis=-1)
     texels = distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER_TEXELS
     return np.asarray(np.maximum(texels, 0.0), np.float32)
 

@@ -58,7 +58,7 @@ _NAMES: dict[str, Sequence[str]] = {
 }
 SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
 _MAX_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
-_VECTOR_FLOATS = 4
+_PADDING = (0, 0), (0, 2)  # from two to four columns
 _FOLDER = "painted"
 _WORD_BYTES = 4
 _MAPS = ("colour", "specular", "roughness")
@@ -72,14 +72,10 @@ def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
 
 def painting_constants() -> dict[str, float]:
     """Return the constants of the painting shaders, by their `//#fill` names."""
-    names = {name: len(names) for name, names in _NAMES.items()}
-    own = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM, "folding": FOLD_MOVEMENTS}
-    rows = {
-        "noise_rows": len(noise_table()),
-        "wander_rows": ZONE_BORDER_NOISES,
-        "amount_rows": len(ZONE_AMOUNTS) // 4,
-    }
-    return own | names | table_sizes() | rows
+    counts = {name: len(names) for name, names in _NAMES.items()} | table_sizes()
+    rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
+    sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
+    return sizes | counts | rows | {"folding": FOLD_MOVEMENTS, "wander_rows": ZONE_BORDER_NOISES}
 
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
@@ -133,33 +129,24 @@ def _face_tables(recession: float) -> bytes:
     """Return all tables of the face for spot.wgsl: noises, dots, zones, folds and the hairline."""
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
-    curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _VECTOR_FLOATS - 2)))
-    hairline = np.pad(
-        np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _VECTOR_FLOATS - 2))
-    )
-    tables = (
-        textures.noise_table(),
-        textures.dot_table(),
-        face.zone_table(recession),
-        curves,
-        folds.knots,
-        hairline,
-    )
-    return b"".join(table.tobytes() for table in tables)
+    curves = np.pad(np.hstack([folds.curves, ends]), _PADDING)
+    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _PADDING)
+    tables = textures.noise_table(), textures.dot_table(), face.zone_table(recession), curves, folds.knots
+    return b"".join(table.tobytes() for table in (*tables, hairline))
 
 
 class RestMaps(NamedTuple):
     """Painted maps at rest; only the finest mip levels are filled.
 
     heights : buffer of heights with a border of one texel [mm]
-    expression_deltas : changes by expressions, None unless requested
+    deltas : changes by expressions, None unless requested
     """
 
     colour: map_mips.MippedTexture
     specular: map_mips.MippedTexture
     roughness: map_mips.MippedTexture
     heights: Buffer
-    expression_deltas: Texture | None
+    deltas: Texture | None
 
 
 def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: bool = False) -> RestMaps:
@@ -173,13 +160,13 @@ def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: b
     if device.adapter.kind != "CPU":
         return paint_rest_maps(device, inputs, side)
     key, names = cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"), [*_MAPS, "heights"]
-    names += ["expression_deltas"] if animated else []
+    names += ["deltas"] if animated else []
     arrays = load_arrays(_FOLDER, key, names)
     if arrays is not None:
-        return _uploaded(device, arrays, side)
+        return _from_arrays(device, arrays, side)
     maps = paint_rest_maps(device, inputs, side)
     if device.cached("first painted", lambda: key) == key:
-        load_or_make(_FOLDER, key, names, lambda: _downloaded(device, maps, animated))
+        load_or_make(_FOLDER, key, names, lambda: _to_arrays(device, maps, animated))
     return maps
 
 
@@ -189,18 +176,18 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
     surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
-    expression_deltas = make_texture(device, (side, side), HALVES, layers=2)
+    deltas = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
         "colour_tables": _colours(device, inputs),
         "heights": heights,
-        "expression_deltas": expression_deltas,
+        "expression_deltas": deltas,
     }
     frame = CommandList(device, timed=False)
     frame.compute("maps", program(device, SKIN), {**surface, **tables, **into}, (side, side))
     frame.submit()
-    return RestMaps(**maps, heights=heights, expression_deltas=expression_deltas)
+    return RestMaps(**maps, heights=heights, deltas=deltas)
 
 
 def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str, Buffer]:
@@ -231,28 +218,24 @@ def _colours(device: Device, inputs: PaintInputs) -> Texture:
     return texture
 
 
-def _downloaded(device: Device, maps: RestMaps, animated: bool) -> Arrays:
+def _to_arrays(device: Device, maps: RestMaps, animated: bool) -> Arrays:
     arrays = {name: download(device, getattr(maps, name).texture) for name in _MAPS}
     arrays["heights"] = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
-    if animated and maps.expression_deltas is not None:
-        arrays["expression_deltas"] = np.stack(
-            [download(device, maps.expression_deltas, layer=layer) for layer in range(2)]
-        )
+    if animated and maps.deltas is not None:
+        arrays["deltas"] = np.stack([download(device, maps.deltas, layer=layer) for layer in range(2)])
     return arrays
 
 
-def _uploaded(device: Device, arrays: Arrays, side: int) -> RestMaps:
+def _from_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
     for name, one in maps.items():
         upload(device, one.texture, arrays[name])
-    expression_deltas = None
-    if "expression_deltas" in arrays:
-        expression_deltas = make_texture(device, (side, side), HALVES, layers=2)
-        for layer, texels in enumerate(arrays["expression_deltas"]):
-            upload(device, expression_deltas, texels, layer=layer)
-    return RestMaps(
-        **maps, heights=device.buffer(arrays["heights"], "STORAGE"), expression_deltas=expression_deltas
-    )
+    deltas = None
+    if "deltas" in arrays:
+        deltas = make_texture(device, (side, side), HALVES, layers=2)
+        for layer, texels in enumerate(arrays["deltas"]):
+            upload(device, deltas, texels, layer=layer)
+    return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,30 +251,6 @@ class ExpressionMaps:
     heights: Buffer
     colour: map_mips.MippedTexture
     relief: map_mips.MippedTexture
-
-
-def make_expression_maps(
-    device: Device,
-    colour_at_rest: Texture,
-    heights_at_rest: Buffer,
-    deltas: Texture,
-    into: tuple[map_mips.MippedTexture, map_mips.MippedTexture],
-) -> ExpressionMaps:
-    """Create the maps of a face that moves.
-
-    colour_at_rest, heights_at_rest : texture and buffer at rest
-    deltas : texture of the changes by full expressions
-    into : textures of colour and relief
-    """
-    colour, relief = into
-    heights = device.storage_buffer(heights_at_rest.size)
-    bindings: MutableBindings = {
-        "colour_at_rest": colour_at_rest,
-        "heights_at_rest": heights_at_rest,
-        "expression_deltas": deltas,
-        "heights": heights,
-    }
-    return ExpressionMaps(bindings | {"colour": colour.levels[0]}, heights, colour, relief)
 
 
 def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.float32]) -> None:
@@ -352,14 +311,14 @@ def paint_textures(
         map_mips.fill_mips(frame, one)
     frame.submit()
     gloss = maps.specular.texture, maps.roughness.texture
-    if not animated or maps.expression_deltas is None:
-        relief = map_mips.relief_from_buffers(device, [maps.heights], (side, side), side)
-        return PaintedTextures(colour.texture, *gloss, relief, None)
-    relief_texture = map_mips.empty_map(device, (side, side))
-    expression_maps = make_expression_maps(
-        device, maps.colour.texture, maps.heights, maps.expression_deltas, (colour, relief_texture)
-    )
-    return PaintedTextures(colour.texture, *gloss, relief_texture.texture, expression_maps)
+    if not animated or maps.deltas is None:
+        texture = map_mips.relief_from_buffers(device, [maps.heights], (side, side), side)
+        return PaintedTextures(colour.texture, *gloss, texture, None)
+    relief, heights = map_mips.empty_map(device, (side, side)), device.storage_buffer(maps.heights.size)
+    bindings: MutableBindings = {"colour_at_rest": maps.colour.texture, "heights_at_rest": maps.heights}
+    bindings |= {"expression_deltas": maps.deltas, "heights": heights, "colour": colour.levels[0]}
+    expression_maps = ExpressionMaps(bindings, heights, colour, relief)
+    return PaintedTextures(colour.texture, *gloss, relief.texture, expression_maps)
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> Maps:
