@@ -9,19 +9,9 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Self
 
+from dermis.apps.batch import shard_formats as formats
 from dermis.apps.batch.atomic_files import move_into_place, remove_path, temporary_path, unfinished_files
-from dermis.apps.batch.shard_formats import (
-    MANIFEST_NAME,
-    MAX_MANIFEST_BYTES,
-    FolderWriter,
-    ShardManifest,
-    TarWriter,
-    folder_sha256,
-    parse_manifest,
-    read_tar_manifest,
-    software_versions,
-    tar_sha256,
-)
+from dermis.apps.batch.shard_formats import FolderWriter, ShardManifest, TarWriter
 from dermis.apps.batch.spec import Spec
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import DermisError, refuse, shorten
@@ -119,10 +109,10 @@ class ShardWriter:
         if self._written + len(self._left_out) != shard.stop - shard.first:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out do not fill {shard}")
         left_out = tuple(sorted(self._left_out.items()))
-        sha256, versions = self._files.sha256(), software_versions(self._adapter)
+        sha256, versions = self._files.sha256(), formats.software_versions(self._adapter)
         images = shard.index, shard.first, shard.stop
         data = ShardManifest(spec.digest(), *images, left_out, sha256, versions).to_bytes()
-        if len(data) > MAX_MANIFEST_BYTES:
+        if len(data) > formats.MAX_MANIFEST_BYTES:
             actual = f"{len(left_out)} failed, for example: {left_out[0][1]}"
             advice = "Correct the spec"
             refuse(self._target, "a shard in which most images can be rendered", actual, advice)
@@ -135,9 +125,10 @@ def read_manifest(path: Path) -> ShardManifest:
     Raises DermisError if the manifest is missing or damaged.
     """
     if path.is_dir():
-        return parse_manifest(read_file(path / MANIFEST_NAME, SHARD_DESCRIPTION, MAX_MANIFEST_BYTES), path)
+        data = read_file(path / formats.MANIFEST_NAME, SHARD_DESCRIPTION, formats.MAX_MANIFEST_BYTES)
+        return formats.parse_manifest(data, path)
     with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
-        return parse_manifest(read_tar_manifest(file)[1], path)
+        return formats.parse_manifest(formats.read_tar_manifest(file)[1], path)
 
 
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
@@ -184,6 +175,7 @@ def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> Non
 def _sha256(path: Path) -> str:
     """Return the SHA-256 of all files of a shard before its manifest."""
     if path.is_dir():
-        return folder_sha256(path, sorted(one.name for one in path.iterdir() if one.name != MANIFEST_NAME))
+        names = {one.name for one in path.iterdir()} - {formats.MANIFEST_NAME}
+        return formats.folder_sha256(path, sorted(names))
     with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
-        return tar_sha256(file, read_tar_manifest(file)[0])
+        return formats.tar_sha256(file, formats.read_tar_manifest(file)[0])

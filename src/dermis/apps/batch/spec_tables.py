@@ -7,11 +7,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, model_validator
-from pydantic_core.core_schema import (
-    CoreSchema,
-    no_info_plain_validator_function,
-    plain_serializer_function_ser_schema,
-)
+from pydantic_core import core_schema
 
 from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution, require
 from dermis.human.makehuman import OLD, YOUNG
@@ -44,10 +40,14 @@ class DistributionField:
     def check_support(self, distribution: Distribution) -> None:
         """Raise ValueError for values that the field does not allow."""
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
         """Return the schema that parses and serialises a distribution."""
-        serialised = plain_serializer_function_ser_schema(lambda value: value and value.spec_value())
-        return no_info_plain_validator_function(self.check, serialization=serialised)
+        serialise = core_schema.plain_serializer_function_ser_schema(
+            lambda value: value and value.spec_value()
+        )
+        return core_schema.no_info_plain_validator_function(self.check, serialization=serialise)
 
 
 class NumberField(DistributionField):

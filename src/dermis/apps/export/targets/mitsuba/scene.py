@@ -137,10 +137,7 @@ def _scene_elements(
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
     sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
-    sensor["film"] |= {
-        "width": xml.Override("integer", "width"),
-        "height": xml.Override("integer", "height"),
-    }
+    sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}

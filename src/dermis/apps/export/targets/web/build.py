@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.target import floats
-from dermis.apps.export.targets.web.frame_json import (
-    Json,
-    NamedFrame,
-    PictureMap,
-    PictureMaps,
-    frames_json,
-)
+from dermis.apps.export.targets.web.frame_json import Json, NamedFrame, PictureMap, PictureMaps, frames_json
 from dermis.apps.export.targets.web.maps import (
     MapPictures,
     PictureKey,

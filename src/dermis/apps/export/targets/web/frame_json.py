@@ -47,18 +47,18 @@ class PictureMap(NamedTuple):
 
 Frames = list[CapturedFrame]
 PictureMaps = dict[int, PictureMap]
-QuantisedBuffers = dict[int, tuple[float, ...]]
-"""Steps of the columns of quantised float buffers, by the index of the buffer."""
 
 
 def frames_json(
     capture: FrameCapture,
     frames: list[NamedFrame],
     picture_maps: PictureMaps,
-    steps: QuantisedBuffers,
+    steps: dict[int, tuple[float, ...]],
     packer: Packer,
 ) -> Json:
     """Return the description of frames, whose bytes are added to the packer and referred to by number.
+
+    steps : steps of the columns of quantised float buffers, by the index of the buffer
 
     New resources are filled with zeros, so content of zeros is not stored.
     """

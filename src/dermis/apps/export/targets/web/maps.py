@@ -9,13 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.targets.web.frame_json import (
-    Frames,
-    PictureMap,
-    PictureMaps,
-    QuantisedBuffers,
-    resources_bound_as,
-)
+from dermis.apps.export.targets.web.frame_json import Frames, PictureMap, PictureMaps, resources_bound_as
 from dermis.apps.export.targets.web.packing import quantise
 from dermis.frame.capture import capture_mips, update_map
 from dermis.frame.renderer import Renderer
@@ -156,7 +150,7 @@ def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float3
     return np.asarray(mip_chain(values)[mip], np.float32)
 
 
-def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> QuantisedBuffers:
+def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
     """Quantise the hair knots in the device's buffers; return the step of each column by buffer."""
     buffers = resources_bound_as(capture, frames, ("knots",))
     for number in buffers:
