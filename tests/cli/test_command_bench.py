@@ -34,8 +34,8 @@ def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest
     )
     for name in cases.PRESETS:
         monkeypatch.setitem(cases.PRESETS, name, tiny)
-    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.ON_CPU", BRIEF)
-    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.Effort", lambda: BRIEF)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.CPU_FRAME_COUNTS", BRIEF)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.FrameCounts", lambda: BRIEF)
     return lambda *words: run("bench", "--head", "head.obj", "--adapter", device.adapter.name, *words)
 
 
@@ -85,7 +85,7 @@ def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPat
             raise KeyboardInterrupt
         return measure_case(renderer, case, *rest)
 
-    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.measure", interrupted)
+    monkeypatch.setattr("dermis.apps.validation.benchmarks.run.measure_case", interrupted)
     ended = bench("--preset", "cpu", "--json", "-o", "report.html")
     assert ended.code == 130 and ended.stdout == ""
     assert set(tmp_path.rglob("*")) == before

@@ -60,8 +60,8 @@ def test_table_names_models_and_why_some_are_not_reciprocal(compare: Run) -> Non
         row = next(line for line in ended.stdout.splitlines() if line.startswith(f"{name} "))
         assert len(row.split()) == 10
         assert model.reciprocal or f"{name}: {model.note}." in ended.stdout
-    said = re.search(r"reflects ([\d.]+)% of light", ended.stdout)
-    assert said and float(said[1]) == pytest.approx(7.68, abs=0.06)
+    percentage = re.search(r"reflects ([\d.]+)% of uniform illumination", ended.stdout)
+    assert percentage and float(percentage[1]) == pytest.approx(7.68, abs=0.06)
 
 
 def test_pictures_are_written_into_a_new_folder(compare: Run) -> None:

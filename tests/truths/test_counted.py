@@ -20,7 +20,7 @@ def test_per_entering_light_in_rings() -> None:
     assert (np.abs(profile.total - truth) < 4.0 * profile.total_error).all()
     assert profile.ring_energy.sum(axis=0) == pytest.approx(profile.total, rel=0.01)
     assert profile.reflectance.shape == profile.standard_error.shape == (len(profile.radius_mm), 3)
-    assert (np.diff(profile.radius_mm) > 0.0).all() and not profile.finite
+    assert (np.diff(profile.radius_mm) > 0.0).all() and not profile.finite_at_centre
     assert seen and seen[-1][0] == seen[-1][1]
 
 

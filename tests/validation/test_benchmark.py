@@ -10,25 +10,30 @@ import pytest
 
 from dermis.apps.validation.benchmarks import run as running
 from dermis.apps.validation.benchmarks.cases import (
-    FRAGMENTS,
+    FRAGMENT_TECHNIQUE,
     GPU_GEMS_3,
     PRESETS,
     Case,
-    scenes_of,
-    settings_of,
-    with_terms,
+    case_scenes,
+    case_settings,
+    with_gaussian_count,
 )
-from dermis.apps.validation.benchmarks.floor import copy_rate, moved_by, stage_bytes
-from dermis.apps.validation.benchmarks.measure import ON_CPU, Effort, Row, measure
+from dermis.apps.validation.benchmarks.floor import copy_rate, frame_traffic, stage_bytes
+from dermis.apps.validation.benchmarks.measure import (
+    CPU_FRAME_COUNTS,
+    BenchmarkRow,
+    FrameCounts,
+    measure_case,
+)
 from dermis.apps.validation.benchmarks.report import (
     COLUMNS,
     as_json,
     cells,
-    left_out_lines,
+    skipped_lines,
     stage_table,
     write_report,
 )
-from dermis.apps.validation.benchmarks.run import Benchmark, LeftOut, run
+from dermis.apps.validation.benchmarks.run import Benchmark, SkippedCase, run_benchmark
 from dermis.base.errors import DermisError
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
@@ -38,7 +43,7 @@ from dermis.optics.profiles import load_profile
 from dermis.scene.heads import load_head
 
 TINY = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
-BRIEF = Effort(warming=1, between=1, timed=2, row=2)
+BRIEF = FrameCounts(warmup=1, between=1, timed=2, sequence=2)
 
 
 @pytest.fixture(scope="module")
@@ -56,16 +61,18 @@ def renderer(device: Device) -> Renderer:
 
 
 @pytest.fixture(scope="module")
-def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFactory) -> Row:
+def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFactory) -> BenchmarkRow:
     head, folder = load_head(head_file, subdivide=0), tmp_path_factory.mktemp("profile")
-    return measure(renderer, TINY, head, folder, 1e9, BRIEF)
+    return measure_case(renderer, TINY, head, folder, 1e9, BRIEF)
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_cases_vary_in_one_thing(preset: object) -> None:
     usual, *others = preset.cases()  # type: ignore[attr-defined]
     assert usual.varies == ""
-    assert {GPU_GEMS_3, FRAGMENTS} == {case.technique for case in others if case.varies == "technique"}
+    assert {GPU_GEMS_3, FRAGMENT_TECHNIQUE} == {
+        case.technique for case in others if case.varies == "technique"
+    }
     for case in others:
         told = asdict(replace(case, varies=""))
         assert [name for name, value in asdict(usual).items() if told[name] != value] == [case.varies]
@@ -74,7 +81,7 @@ def test_cases_vary_in_one_thing(preset: object) -> None:
 @pytest.mark.parametrize("count", [1, 2, 5, 6, 8])
 def test_profiles_of_any_length_keep_the_albedo(count: int) -> None:
     published = load_profile("gpu-gems-3")
-    profile = with_terms(published, count)
+    profile = with_gaussian_count(published, count)
     assert len(profile.variance_mm2) == count
     assert np.allclose(profile.albedo, published.albedo)
     assert np.isclose(profile.variance_mm2[-1], published.variance_mm2[-1])
@@ -82,7 +89,7 @@ def test_profiles_of_any_length_keep_the_albedo(count: int) -> None:
 
 def test_cameras_and_lights_move(head_file: str, tmp_path: Path) -> None:
     case = replace(TINY, lights=5)
-    scenes = scenes_of(case, load_head(head_file, subdivide=0), tmp_path, 3)
+    scenes = case_scenes(case, load_head(head_file, subdivide=0), tmp_path, 3)
     assert len({scene.camera for scene in scenes}) == 3
     assert all(len({light.position for light in scene.lights}) == 5 for scene in scenes)  # type: ignore[union-attr]
     assert len({scene.lights[4] for scene in scenes}) == 3
@@ -90,25 +97,26 @@ def test_cameras_and_lights_move(head_file: str, tmp_path: Path) -> None:
 
 def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -> None:
     head = load_head(head_file, subdivide=0)
-    (scene,), settings = scenes_of(TINY, head, tmp_path, 1), settings_of(TINY)
+    (scene,), settings = case_scenes(TINY, head, tmp_path, 1), case_settings(TINY)
     image = renderer.draw(scene, settings).srgb8()
-    moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
-    assert 0.1 < moved.seen / (48 * 32) < 0.9 and moved.seen >= np.count_nonzero(image.any(axis=2))
-    assert 0 < moved.texels < 64 * 64
-    found = stage_bytes(moved)
+    traffic = frame_traffic(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
+    assert 0.1 < traffic.head_pixels / (48 * 32) < 0.9
+    assert traffic.head_pixels >= np.count_nonzero(image.any(axis=2))
+    assert 0 < traffic.texels < 64 * 64
+    found = stage_bytes(traffic)
     geometry = 16 * len(head.mesh.triangles) + 16 * len(head.mesh.positions)
-    depth = download(renderer.device, moved.inputs.resources.shadow_maps.texture)
+    depth = download(renderer.device, traffic.inputs.resources.shadow_maps.texture)
     drawn = int((depth > 0).sum())
     assert 0.1 < drawn / settings.shadow_size**2 < 0.9
     assert found["shadows"] == drawn * 4 + geometry
-    assert found["visibility"] == moved.seen * 2 * 4 + geometry
+    assert found["visibility"] == traffic.head_pixels * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
-    light = texel_bytes(moved.inputs.resources.diffusion.levels.stacks[0])
-    gutter = moved.inputs.layouts[0].atlas.gutter.size // 16
+    light = texel_bytes(traffic.inputs.resources.diffusion.levels.stacks[0])
+    gutter = traffic.inputs.layouts[0].atlas.gutter.size // 16
     assert gutter > 0
-    assert found["irradiance"] == moved.texels * (32 + 4 + light)
-    assert found["diffuse"] == moved.texels * (2 * light + 8 + 8) + gutter * (16 + 2 * light)
+    assert found["irradiance"] == traffic.texels * (32 + 4 + light)
+    assert found["diffuse"] == traffic.texels * (2 * light + 8 + 8) + gutter * (16 + 2 * light)
     assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
 
 
@@ -120,23 +128,23 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     flat = [[*w[:3], str(0.03 * float(w[3]))] if w[:1] == ["v"] else w for w in vertices]
     (tmp_path / "leaf.obj").write_text("\n".join(map(" ".join, flat)))
     head, case = load_head(tmp_path / "leaf.obj", subdivide=0), replace(TINY, gaussians=4)
-    (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
+    (scene,), settings = case_scenes(case, head, tmp_path, 1), case_settings(case)
     renderer.draw(scene, settings)
-    moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
-    thin, levels = moved.inputs.layouts[0].translucency, moved.inputs.resources.diffusion.levels
+    traffic = frame_traffic(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
+    thin, levels = traffic.inputs.layouts[0].translucency, traffic.inputs.resources.diffusion.levels
     assert thin is not None
     receivers, sources = thin.pairs.receivers[1], thin.pairs.sources[1]
     assert thin.pairs.count > receivers > 10
     words = np.frombuffer(renderer.device.handle.queue.read_buffer(thin.weights), np.uint32)
     assert len(words) == 2 * thin.pairs.count and (words[::2] & 0xFFFFFF).max() == sources - 1
     lists = 8 * thin.pairs.count + (4 + SURFACE_BYTES) * sources + 12 * receivers
-    light = min(4 * sources, (levels.size >> moved.inputs.blurs[0].halvings[1 + thin.layer]) ** 2)
+    light = min(4 * sources, (levels.size >> traffic.inputs.blurs[0].halvings[1 + thin.source_level]) ** 2)
     assert (
-        stage_bytes(moved)["translucency"] == lists + light * texel_bytes(levels.stacks[0]) + 16 * receivers
+        stage_bytes(traffic)["translucency"] == lists + light * texel_bytes(levels.stacks[0]) + 16 * receivers
     )
 
 
-def test_a_row_is_complete(row: Row) -> None:
+def test_a_row_is_complete(row: BenchmarkRow) -> None:
     assert row.frame_ms > 0 and row.python_ms > 0 and row.image_ms > 0 and row.memory_mb > 0.1
     stages = {name: ms for name, ms in row.gpu_ms.items() if name != "total"}
     assert {"irradiance", "diffuse", "shade"} <= set(stages) and min(stages.values()) > 0
@@ -145,9 +153,11 @@ def test_a_row_is_complete(row: Row) -> None:
     assert row.floor_ratio == row.gpu_ms["total"] / row.floor_ms["total"]
 
 
-def test_more_work_moves_more_bytes(renderer: Renderer, row: Row, head_file: str, tmp_path: Path) -> None:
+def test_more_work_moves_more_bytes(
+    renderer: Renderer, row: BenchmarkRow, head_file: str, tmp_path: Path
+) -> None:
     larger = replace(TINY, image=(96, 64), atlas=128, lights=2, gaussians=4)
-    more = measure(renderer, larger, load_head(head_file, subdivide=0), tmp_path, 1e9, BRIEF)
+    more = measure_case(renderer, larger, load_head(head_file, subdivide=0), tmp_path, 1e9, BRIEF)
     for stage in ("shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"):
         assert more.floor_ms[stage] > 1.25 * row.floor_ms[stage], stage
 
@@ -157,21 +167,23 @@ def test_copies_take_time(device: Device) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(row: Row) -> Benchmark:
+def made(row: BenchmarkRow) -> Benchmark:
     """A benchmark of which one row was measured."""
     others = [
         replace(row, case=replace(TINY, atlas=128, varies="atlas")),
         replace(row, case=replace(TINY, technique=GPU_GEMS_3, varies="technique"), gpu_ms={"total": 1e3}),
-        replace(row, case=replace(TINY, technique=FRAGMENTS, varies="technique"), gpu_ms={"total": 5e3}),
+        replace(
+            row, case=replace(TINY, technique=FRAGMENT_TECHNIQUE, varies="technique"), gpu_ms={"total": 5e3}
+        ),
     ]
-    left_out = LeftOut(replace(TINY, image=(9999, 32), varies="image"), "size: <too large>")
+    skipped = SkippedCase(replace(TINY, image=(9999, 32), varies="image"), "size: <too large>")
     where = "head", "an <adapter>", "a driver", {"dermis": "1"}, "now", 2e9, 1.0
-    return Benchmark(*where, (row, *others), (left_out,))
+    return Benchmark(*where, (row, *others), (skipped,))
 
 
-def test_the_published_passes_are_compared(made: Benchmark, row: Row) -> None:
+def test_the_published_passes_are_compared(made: Benchmark, row: BenchmarkRow) -> None:
     assert made.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
-    assert made.ratio(FRAGMENTS) == 5e3 / row.gpu_ms["total"]
+    assert made.ratio(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
     assert replace(made, rows=(row,)).ratio(GPU_GEMS_3) is None
     assert replace(made, rows=made.rows[1:]).ratio(GPU_GEMS_3) is None
 
@@ -186,10 +198,10 @@ def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
     assert "total" in told["rows"][0]["gpu_ms"]
     assert (told["published_ratio"], told["published_fragments_ratio"]) == (
         made.ratio(GPU_GEMS_3),
-        made.ratio(FRAGMENTS),
+        made.ratio(FRAGMENT_TECHNIQUE),
     )
-    (left_out,) = told["left_out"]
-    assert (left_out["image"], left_out["reason"]) == ([9999, 32], "size: <too large>")
+    (skipped,) = told["left_out"]
+    assert (skipped["image"], skipped["reason"]) == ([9999, 32], "size: <too large>")
 
 
 def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
@@ -206,43 +218,45 @@ def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
 
 def test_a_report_without_the_usual_frame(made: Benchmark, tmp_path: Path) -> None:
     others = replace(made, rows=made.rows[1:])
-    assert others.usual is None and stage_table(others) == []
+    assert others.base_row is None and stage_table(others) == []
     write_report(tmp_path / "report.html", others)
     assert "9999x32" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_slow_frames_are_drawn_less_often() -> None:
-    effort = Effort()
+    effort = FrameCounts()
     assert effort.within(30.0, frame_ms=1.0) == effort
     half = effort.within(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
-    assert half == Effort(warming=50, between=2, timed=4, row=50)
-    assert ON_CPU.within(1.0, frame_ms=1e6) == Effort(warming=0, between=0, timed=1, row=1)
+    assert half == FrameCounts(warmup=50, between=2, timed=4, sequence=50)
+    assert CPU_FRAME_COUNTS.within(1.0, frame_ms=1e6) == FrameCounts(warmup=0, between=0, timed=1, sequence=1)
 
 
 def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "ON_CPU", BRIEF)
-    monkeypatch.setattr(running, "Effort", lambda: BRIEF)
+    monkeypatch.setattr(running, "CPU_FRAME_COUNTS", BRIEF)
+    monkeypatch.setattr(running, "FrameCounts", lambda: BRIEF)
     steps: list[tuple[int, int]] = []
     cases = [
         TINY,
         replace(TINY, technique=GPU_GEMS_3, varies="technique"),
-        replace(TINY, technique=FRAGMENTS, varies="technique"),
+        replace(TINY, technique=FRAGMENT_TECHNIQUE, varies="technique"),
         replace(TINY, atlas=device.max_texture_size + 1, varies="atlas"),
         replace(TINY, subdivide=1, varies="subdivide"),
     ]
-    benchmark = run(cases, head_file, device.adapter.name, lambda done, of: steps.append((done, of)))
+    benchmark = run_benchmark(
+        cases, head_file, device.adapter.name, lambda done, of: steps.append((done, of))
+    )
     assert steps == [(done, 5) for done in range(5)]
     assert [row.case for row in benchmark.rows] == [*cases[:3], cases[4]]
     assert benchmark.rows[3].triangles == 4 * benchmark.rows[0].triangles
     assert benchmark.adapter == device.adapter.name and benchmark.versions["wgpu"]
-    for technique in (GPU_GEMS_3, FRAGMENTS):
+    for technique in (GPU_GEMS_3, FRAGMENT_TECHNIQUE):
         assert (benchmark.ratio(technique) or 0.0) > 0.0
-    (left_out,) = benchmark.left_out
-    assert left_out.case == cases[3] and "atlas" in left_out.reason
-    assert str(device.max_texture_size) in left_out_lines(benchmark)[0]
+    (skipped,) = benchmark.skipped
+    assert skipped.case == cases[3] and "atlas" in skipped.reason
+    assert str(device.max_texture_size) in skipped_lines(benchmark)[0]
 
 
 def test_nothing_measured_is_an_error(device: Device, head_file: str) -> None:
     too_large = replace(TINY, atlas=device.max_texture_size + 1)
     with pytest.raises(DermisError, match=str(device.max_texture_size)):
-        run([too_large], head_file, device.adapter.name)
+        run_benchmark([too_large], head_file, device.adapter.name)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from dermis.apps.validation.comparisons.compare import Comparison, compare
+from dermis.apps.validation.comparisons.references import REFERENCES
 from dermis.apps.validation.comparisons.report import write_report
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, comparison_scene
-from dermis.apps.validation.comparisons.truths import TRUTHS
 from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -50,7 +50,7 @@ def test_scattering_is_nearer_the_truth_than_none(lasered: Comparison) -> None:
 def test_truth_is_seen_where_the_image_is(lasered: Comparison) -> None:
     """The brightest columns of both are the same: rays, lights and places agree."""
     ours = lasered.images["texture-space"]
-    peaks = [picture.sum(axis=(0, 2)).argmax() for picture in (ours, lasered.truth.image)]
+    peaks = [picture.sum(axis=(0, 2)).argmax() for picture in (ours, lasered.reference.image)]
     assert abs(int(peaks[0]) - int(peaks[1])) <= 1
 
 
@@ -65,7 +65,7 @@ def test_heat_agrees_along_a_gentle_surface(lasered: Comparison) -> None:
         adapter=ADAPTER,
     )
     none, ours = heat.rows
-    assert 0 < heat.truth.mask.sum() < lasered.truth.mask.sum()
+    assert 0 < heat.reference.mask.sum() < lasered.reference.mask.sum()
     assert ours.relrmse < 0.2 * none.relrmse
 
 
@@ -109,7 +109,9 @@ def test_unknown_names_are_refused(words: dict[str, Any], says: str) -> None:
 
 def test_a_picture_without_the_head_is_refused_before_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its one pixel looks between two balls."""
-    monkeypatch.setitem(TRUTHS, "surface-integral", lambda subject, samples: pytest.fail("it was computed"))
+    monkeypatch.setitem(
+        REFERENCES, "surface-integral", lambda subject, samples: pytest.fail("it was computed")
+    )
     ball = uv_sphere(30.0, 16, 8)
     places = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
     uv = np.vstack([ball.uv * (0.5, 1) + (x, 0) for x in (0, 0.5)])

@@ -17,13 +17,13 @@ def test_the_page_has_the_figures() -> None:
     figures = json.loads(FIGURES.read_text("utf-8"))
     assert figures["libraries"]["valid"] and figures["libraries"]["errors"] == []
     page = PAGE.read_text("utf-8")
-    assert all(line in page for line in script.table(figures["skins"]))
+    assert all(line in page for line in script.error_table(figures["skins"]))
 
 
 def test_figures_are_those_of_today(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "SKINS", ("skin1",))
     known = json.loads(FIGURES.read_text("utf-8"))["skins"]["skin1"]
-    found = script.figures()["skin1"]
+    found = script.skin_errors()["skin1"]
     for target, reading in (("openpbr", "error"), ("openpbr", "as_a_profile"), ("pbrt", "error")):
         edges = found[target][reading]["edge"]
         assert edges == pytest.approx(known[target][reading]["edge"], abs=CHANGED)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from figures_in_text import differences
 
-from dermis.apps.validation.engines.page import PAGE, blender_tables, filled
+from dermis.apps.validation.engines.page import PAGE, blender_tables, fill_tables
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")
 def test_the_table_is_what_the_command_writes() -> None:
-    assert differences(filled(PAGE.read_text("utf-8")), PAGE.read_text("utf-8")) == []
+    assert differences(fill_tables(PAGE.read_text("utf-8")), PAGE.read_text("utf-8")) == []
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from setups import front_camera, head_of, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.mesh import build_mesh
@@ -73,7 +73,7 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
     stack = [
         download(device, levels.stacks[0], layer=k) for k in range(1 + len(inputs.blurs[0].variance_mm2))
     ]
-    results = layout.scattered, layout.translucency.light, inputs.resources.post.picture.radiance
+    results = layout.scattered, layout.translucency.pairs.transmitted, inputs.resources.post.picture.radiance
     return Drawn(
         [level.astype(float) for level in stack],
         [download(device, one).astype(float) for one in results],
@@ -84,8 +84,8 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
 @pytest.fixture(scope="module", params=["clear-colour", "alpha"])
 def both(renderer: Renderer, leaf: Scene, request: pytest.FixtureRequest) -> tuple[Drawn, Drawn]:
     compute = drawn(renderer, leaf, GPU_GEMS_3, request.param)
-    with TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
-        fragments = drawn(renderer, leaf, FRAGMENTS, request.param)
+    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+        fragments = drawn(renderer, leaf, FRAGMENT_TECHNIQUE, request.param)
     return compute, fragments
 
 
@@ -112,8 +112,8 @@ def test_so_are_their_sum_what_comes_through_and_the_image(both: tuple[Drawn, Dr
 
 
 def test_afterwards_all_is_compute_again(renderer: Renderer, leaf: Scene) -> None:
-    with pytest.raises(KeyError), TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
-        assert drawn(renderer, leaf, FRAGMENTS, "alpha").filled > 0
+    with pytest.raises(KeyError), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+        assert drawn(renderer, leaf, FRAGMENT_TECHNIQUE, "alpha").filled > 0
         raise KeyError
-    assert FRAGMENTS not in TECHNIQUES
+    assert FRAGMENT_TECHNIQUE not in TECHNIQUES
     assert drawn(renderer, leaf, GPU_GEMS_3, "alpha").filled == 0

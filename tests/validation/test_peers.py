@@ -13,8 +13,8 @@ import pytest
 import dermis
 from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.path_traced import PathTraced
-from dermis.apps.validation.benchmarks.cases import FRAGMENTS, GPU_GEMS_3
-from dermis.apps.validation.pages import template_of
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
+from dermis.apps.validation.pages import template_path
 from dermis.apps.validation.peers import rendering, report
 from dermis.base.errors import DermisError, refuse
 from dermis.mesh.head import Head
@@ -60,8 +60,8 @@ class FakeRenderer:
         self.device = SimpleNamespace(adapter=SimpleNamespace(name=adapter))
         self.techniques: list[str] = []
 
-    def draw(self, scene: Any, settings: Any, anew: bool) -> Any:
-        assert anew and settings.size == (SIDE, SIDE)
+    def draw(self, scene: Any, settings: Any, force: bool) -> Any:
+        assert force and settings.size == (SIDE, SIDE)
         self.techniques.append(settings.technique)
         return SimpleNamespace(linear=lambda: picture(1.0 + OURS))
 
@@ -74,7 +74,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(report, "load_mitsuba", lambda: None)
     monkeypatch.setattr(report, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(report, "version", lambda name: "1.0")
-    monkeypatch.setattr(report, "QUICK", rendering.Plan(SIDE, (4, 64), 16, 3))
+    monkeypatch.setattr(report, "QUICK", rendering.PeerPlan(SIDE, (4, 64), 16, 3))
     monkeypatch.setattr(dermis, "load_head", lambda name, subdivide: BALL)
     monkeypatch.setattr(dermis, "Renderer", FakeRenderer)
     return report
@@ -150,9 +150,9 @@ def test_without_mitsuba_there_is_no_truth(
 def test_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
-    rendering.measure(BALL, "front", peers.QUICK, renderer, done.append)  # type: ignore[arg-type]
+    rendering.render_peers(BALL, "front", peers.QUICK, renderer, done.append)  # type: ignore[arg-type]
     assert sum(done) == peers.QUICK.work
-    assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENTS)
+    assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENT_TECHNIQUE)
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 
 
@@ -175,7 +175,7 @@ def test_unknown_lights_are_named(peers: Any) -> None:
 
 def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, capsys: Any) -> None:
     class Nearer(FakeRenderer):
-        def draw(self, scene: Any, settings: Any, anew: bool) -> Any:
+        def draw(self, scene: Any, settings: Any, force: bool) -> Any:
             return SimpleNamespace(linear=lambda: picture(1.0 + 0.5 * BIAS))
 
     dermis.Renderer = Nearer  # type: ignore[misc]  # put back by the fixture's patch
@@ -186,12 +186,12 @@ def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, caps
 def test_page_is_written_with_all_its_places_filled(
     peers: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    template = template_of(peers.PAGE).read_text(encoding="utf-8")
+    template = template_path(peers.PAGE).read_text(encoding="utf-8")
     (tmp_path / "templates").mkdir()
     (tmp_path / "templates" / "peers.md").write_text(template, encoding="utf-8")
     monkeypatch.setattr(report, "PAGE", tmp_path / "peers.md")
     monkeypatch.setattr(report, "FIGURES", tmp_path / "results" / "peers.json")
-    monkeypatch.setattr(report, "Plan", lambda: peers.QUICK)
+    monkeypatch.setattr(report, "PeerPlan", lambda: peers.QUICK)
     peers.peers()
     page = (tmp_path / "peers.md").read_text(encoding="utf-8")
     assert page.count("| dermis | texture space, atlas 1024 |") == 2 and "{" not in page

@@ -12,17 +12,17 @@ from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.person import (
-    EYE_MM,
+    EYE_FRAME_MM,
     VIEWS,
-    Pair,
+    PersonComparison,
+    as_softbox,
     compare_person,
-    drawn,
-    iris_of,
-    pair_of,
-    scene_of,
-    softbox,
+    comparison_of,
+    iris_errors,
+    render_frame,
+    view_scene,
 )
-from dermis.apps.validation.comparisons.person_paint import paint_of
+from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
@@ -47,7 +47,7 @@ def renderer() -> Renderer:
 
 @pytest.fixture(scope="module")
 def paint(renderer: Renderer) -> SkinTextures:
-    return paint_of(renderer, scene_of(head(), VIEWS["portrait"]), SIDE)
+    return person_textures(renderer, view_scene(head(), VIEWS["portrait"]), SIDE)
 
 
 def test_the_iris_is_painted_around_its_pupil(paint: SkinTextures) -> None:
@@ -76,23 +76,23 @@ def test_skin_is_painted_as_the_frame_paints_it(paint: SkinTextures) -> None:
 
 @pytest.mark.parametrize("name", [name for name, view in VIEWS.items() if view.light in ("studio", "window")])
 def test_lights_of_all_views_have_a_size(name: str) -> None:
-    scene = scene_of(head(), VIEWS[name])
+    scene = view_scene(head(), VIEWS[name])
     assert scene.lights
     assert all(isinstance(light, RectangleLight) for light in scene.lights)
 
 
 def test_only_points_become_softboxes() -> None:
     ball, point = SphereLight(position=(0, 0, 900)), PointLight(position=(0, 500, 900), irradiance=(1, 2, 3))
-    assert softbox(ball) is ball
-    found = softbox(point)
+    assert as_softbox(ball) is ball
+    found = as_softbox(point)
     assert isinstance(found, RectangleLight)
     assert (found.position, found.irradiance) == (point.position, point.irradiance)
 
 
 def test_a_picture_is_the_mean_of_one_twice_as_large(renderer: Renderer) -> None:
-    scene, small = scene_of(head(), VIEWS["portrait"]), Settings(size=(24, 24), atlas=128, shadow_size=256)
+    scene, small = view_scene(head(), VIEWS["portrait"]), Settings(size=(24, 24), atlas=128, shadow_size=256)
     large = renderer.render(scene, size=(48, 48), atlas=128, shadow_size=256)
-    found = drawn(renderer, scene, small)
+    found = render_frame(renderer, scene, small)
     np.testing.assert_allclose(found[5, 7], large[10:12, 14:16].mean(axis=(0, 1)), rtol=1e-5, atol=1e-7)
 
 
@@ -104,9 +104,9 @@ def test_an_eye_is_much_like_its_likeness(
     pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, use_cache=False)
     assert pair.samples == 16  # eyes take twice as many
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
-    assert pair.shown(pair.ours).shape == (32, 32, 3)
-    pupil = pair.truth[15:17, 15:17].mean()
-    assert pupil < 0.3 * pair.truth[pair.mask].mean() and pair.ours[15:17, 15:17].mean() < 0.1
+    assert pair.tone_mapped(pair.ours).shape == (32, 32, 3)
+    pupil = pair.reference[15:17, 15:17].mean()
+    assert pupil < 0.3 * pair.reference[pair.mask].mean() and pair.ours[15:17, 15:17].mean() < 0.1
 
 
 def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> None:
@@ -114,10 +114,10 @@ def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> N
         compare_person(renderer, head(), paint, "aura")
 
 
-def made(shift: int, gain: float) -> Pair:
+def made(shift: int, gain: float) -> PersonComparison:
     """A dark pupil in an uneven iris, ours and a truth that lies further to the right and is brighter."""
     side = 128
-    along = (np.arange(side) + 0.5 - 0.5 * side) * EYE_MM / side
+    along = (np.arange(side) + 0.5 - 0.5 * side) * EYE_FRAME_MM / side
     x, y = np.meshgrid(along, along)
     off = np.hypot(x, y)
     ours = np.repeat((0.1 + 0.02 * np.sin(5 * np.arctan2(y, x)))[..., None], 3, axis=2)
@@ -126,13 +126,13 @@ def made(shift: int, gain: float) -> Pair:
     truth = gain * np.roll(ours, shift, axis=1) + rng.normal(0.0, 0.002, ours.shape)
     variance = np.full(ours.shape, 0.002**2, np.float32)
     path = PathTraced(truth.astype(np.float32), variance, np.ones((side, side), np.float32), 8, 1.0, ())
-    return pair_of("eye", ours, path, np.ones((side, side), bool))
+    return comparison_of("eye", ours, path, np.ones((side, side), bool))
 
 
 def test_an_iris_is_found_where_it_is() -> None:
-    found = iris_of(made(1, 0.5), EYE_MM)
+    found = iris_errors(made(1, 0.5), EYE_FRAME_MM)
     assert found.right.value == pytest.approx(1.0, abs=0.15) and abs(found.down.value) < 0.1
     assert found.brightness.value == pytest.approx(2.0, abs=0.05)
-    assert found.left.value == pytest.approx(2.0, abs=0.1)
-    assert found.beside.value == pytest.approx(2.0, abs=0.1)
+    assert found.left_half.value == pytest.approx(2.0, abs=0.1)
+    assert found.right_half.value == pytest.approx(2.0, abs=0.1)
     assert 0.0 < found.brightness.standard_error < 0.05

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
-from dermis.apps.validation.comparisons.compare import load_subject
-from dermis.apps.validation.comparisons.truths import (
-    Subject,
-    heat_around,
+from dermis.apps.validation.comparisons.compare import comparison_subject
+from dermis.apps.validation.comparisons.references import (
+    ComparisonSubject,
     irradiance_samples,
+    surface_heat_around,
     surface_integral,
 )
 from dermis.mesh.head import Head
@@ -28,20 +28,20 @@ ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 
 
 @pytest.fixture(scope="module")
-def lasered() -> Iterator[Subject]:
+def lasered() -> Iterator[ComparisonSubject]:
     """A narrow stripe of light, seen close by."""
     settings = Settings(size=(64, 64), atlas=64, shadow_size=256)
-    with load_subject(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
+    with comparison_subject(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
         yield subject
 
 
-def spread_by(subject: Subject, *variance_mm2: float) -> Subject:
+def spread_by(subject: ComparisonSubject, *variance_mm2: float) -> ComparisonSubject:
     """The subject with a profile of equal Gaussians that keeps all light."""
     weight = np.full((len(variance_mm2), 3), 1 / len(variance_mm2))
     return replace(subject, profile=GaussianSum("test", np.array(variance_mm2), weight))
 
 
-def test_without_scattering_the_integral_is_the_light_that_enters(lasered: Subject) -> None:
+def test_without_scattering_the_integral_is_the_light_that_enters(lasered: ComparisonSubject) -> None:
     """A coarser net of samples, which the stripe falls through, errs by a fifteenth."""
     truth = surface_integral(spread_by(lasered, 0.03**2), 0)
     plain = Settings(**(lasered.settings.model_dump() | {"technique": "none", "samples": 1}))
@@ -50,13 +50,13 @@ def test_without_scattering_the_integral_is_the_light_that_enters(lasered: Subje
     assert energy_ratio(entered, truth.image, truth.mask).value == pytest.approx(1.0, abs=0.003)
 
 
-def test_heat_and_the_integral_agree_where_the_surface_is_gentle(lasered: Subject) -> None:
+def test_heat_and_the_integral_agree_where_the_surface_is_gentle(lasered: ComparisonSubject) -> None:
     """Also for a Gaussian so narrow that heat leaves it to straight lines: it is spread all the same."""
     subject = spread_by(lasered, 0.2, 0.5)
     stripe = subject.scene.lights[0]
     lit_place = np.array(stripe.position) - 17.2 * np.array(stripe.direction)
     straight = surface_integral(subject, 0)
-    heat = heat_around(subject, tuple(lit_place), 12.0, irradiance_samples(subject))
+    heat = surface_heat_around(subject, tuple(lit_place), 12.0, irradiance_samples(subject))
     assert 100 < heat.mask.sum() < straight.mask.sum()
     assert relative_rmse(heat.image, straight.image, heat.mask).value < 0.01
     assert energy_ratio(heat.image, straight.image, heat.mask).value == pytest.approx(1.0, abs=0.002)

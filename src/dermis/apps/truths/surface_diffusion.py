@@ -165,13 +165,11 @@ def _check_resolution(
     allowed = resolved_levels(variances, longest)
     if not allowed.all():
         fine = ", ".join(f"{variance:g}" for variance in np.asarray(variances)[allowed]) or "none of them"
-        actual = f"got one of {longest:.3g} mm, which allows of the variances {fine}"
+        actual = f"got {longest:.3g} mm, which resolves only the variances {fine}"
         expected = (
-            f"edges of at most {max_edge_mm(variances):.3g} mm, half of the least sigma that a level adds"
+            f"edges of at most {max_edge_mm(variances):.3g} mm, half the smallest sigma that a level adds"
         )
-        refuse(
-            "surface diffusion", expected, actual, "Refine the surface (refine_patch) or ask for wider levels"
-        )
+        refuse("surface diffusion", expected, actual, "Refine the surface (refine_patch) or use wider levels")
 
 
 _SLACK = 1e-5

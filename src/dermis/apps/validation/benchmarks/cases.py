@@ -126,16 +126,16 @@ def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]
     head = with_test_rig(head, case.targets) if case.targets else head
     scenes = []
     for k in range(count):
-        sway = _SHIFT_MM * math.sin(1.0 + k)
-        moved = [light.model_copy(update={"position": _shifted(light.position, sway)}) for light in lights]
-        eye = camera.model_copy(update={"position": _shifted(camera.position, sway)})
+        shift = _SHIFT_MM * math.sin(1.0 + k)
+        moved = [light.model_copy(update={"position": _shifted(light.position, shift)}) for light in lights]
+        moved_camera = camera.model_copy(update={"position": _shifted(camera.position, shift)})
         pose = pose_at_moment(head, k) if case.targets else None
-        scenes.append(Scene(head, tuple(moved), eye, skin, around, pose))
+        scenes.append(Scene(head, tuple(moved), moved_camera, skin, around, pose))
     return scenes
 
 
-def _shifted(place: tuple[float, float, float], sway: float) -> tuple[float, float, float]:
-    return place[0] + sway, place[1], place[2]
+def _shifted(place: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
+    return place[0] + shift, place[1], place[2]
 
 
 def _lights(count: int) -> list[PointLight]:
@@ -164,11 +164,11 @@ def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
     if count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
-    wanted = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
-    channels = [np.interp(wanted, known, channel) + _MIN_WEIGHT for channel in profile.weight.T]
+    log_variance = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
+    channels = [np.interp(log_variance, known, channel) + _MIN_WEIGHT for channel in profile.weight.T]
     weight = np.stack(channels, axis=1)
     weight *= profile.albedo / weight.sum(axis=0)
-    return GaussianSum(f"{count} Gaussians", np.exp(wanted), weight)
+    return GaussianSum(f"{count} Gaussians", np.exp(log_variance), weight)
 
 
 BONE_COUNT = 4
@@ -196,13 +196,13 @@ def pose_at_moment(head: Head, moment: int) -> Pose:
 
 def _targets(points: Doubles, count: int) -> MorphTargets:
     """Return smooth displacements, each of a sixth of the points around one of them."""
-    middles = points[np.linspace(0, len(points) - 1, count).astype(int)]
+    centres = points[np.linspace(0, len(points) - 1, count).astype(int)]
     nearest = max(1, int(_TARGET_FRACTION * len(points)))
     moved, deltas = [], []
-    for middle in middles:
-        away = np.linalg.norm(points - middle, axis=1)
-        around = np.sort(np.argpartition(away, nearest - 1)[:nearest])
-        share = 1.0 - (away[around] / max(float(away[around].max()), 1e-9)) ** 2
+    for middle in centres:
+        distance = np.linalg.norm(points - middle, axis=1)
+        around = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
+        share = 1.0 - (distance[around] / max(float(distance[around].max()), 1e-9)) ** 2
         moved.append(around)
         deltas.append(share[:, None] * np.array([0.0, 0.0, _LIFT_MM / count]))
     first = nearest * np.arange(count + 1)

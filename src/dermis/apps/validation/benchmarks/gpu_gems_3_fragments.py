@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dermis.frame.features.atlas import passes as stretch
-from dermis.frame.features.atlas.lit import LitAtlas
+from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.diffusion.combine import no_light
 from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.features.surface import texels as surface_texels

@@ -184,7 +184,7 @@ def _sentences(scene: JsonObject) -> list[str]:
 
 
 def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
-    clean_cost = f"to 5 % noise {_time_text(times['clean_cost'])}"
+    clean_cost = f"to 5 % noise {_time_text(times['clean'])}"
     if "same_error" not in times:
         return (
             f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean_cost}."
