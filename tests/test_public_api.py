@@ -64,9 +64,9 @@ def test_the_version_is_that_of_the_project(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("module", [dermis, dermis.scene])
 def test_a_name_of_the_last_release_warns_and_works(module: ModuleType) -> None:
-    with pytest.warns(DeprecationWarning, match=r"profile is now dermis\.(scene\.)?side; .*") as told:
+    with pytest.warns(DeprecationWarning, match=r"profile is now dermis\.(scene\.)?side; .*") as warned:
         assert module.profile is dermis.side
-    assert [one.filename for one in told] == [__file__]
+    assert [one.filename for one in warned] == [__file__]
     assert "profile" not in dir(module) and "profile" not in module.__all__
 
 
@@ -75,19 +75,19 @@ import sys, warnings
 from importlib import import_module
 from dermis.base.renamed import MODULES
 for old, new in MODULES.items():
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         module = import_module(f"dermis.{old}")
     assert module is import_module(f"dermis.{new}") is sys.modules[f"dermis.{old}"], old
     assert module.__name__ == module.__spec__.name == f"dermis.{new}", old
-    (one,) = told
-    assert str(one.message).startswith(f"dermis.{old} is now dermis.{new}; the old name goes"), one
-with warnings.catch_warnings(record=True) as told:
+    (warning,) = warned
+    assert str(warning.message).startswith(f"dermis.{old} is now dermis.{new}; the old name"), warning
+with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
     from dermis.unmixing.unmix import Change
-assert [one.filename for one in told] == [__file__], told
+assert [one.filename for one in warned] == [__file__] * 2, warned
 from dermis.apps.inverse.unmixing import unmix
-assert Change is unmix.Change
+assert Change is unmix.PigmentChange
 """
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
 from dermis.apps.inverse.fitting import light_basis
 from dermis.apps.inverse.fitting.fit import fit
-from dermis.apps.inverse.fitting.inputs import read_photograph, subject_of
-from dermis.apps.inverse.fitting.light_basis import strengths_of
-from dermis.apps.inverse.fitting.placement import place_by_landmarks, read_landmarks
+from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
+from dermis.apps.inverse.fitting.light_basis import solve_strengths
+from dermis.apps.inverse.fitting.placement import align_to_landmarks, read_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
@@ -87,17 +87,17 @@ def test_files_are_a_scene_that_loads(found: FitResult, tmp_path: Path) -> None:
 
 
 def test_a_head_without_a_name_is_no_file(person: Human) -> None:
-    assert subject_of(person).person is person
-    plain = subject_of(person.head(subdivide=0))
+    assert fit_subject(person).person is person
+    plain = fit_subject(person.head(subdivide=0))
     assert plain.person is None and not plain.table
-    assert subject_of(Human().head(subdivide=0)).person is not None
+    assert fit_subject(Human().head(subdivide=0)).person is not None
 
 
 def test_light_is_nowhere_negative_and_what_it_was() -> None:
     random = np.random.default_rng(3)
-    A, light = random.uniform(size=(60, 10)), np.append(light_basis.mixtures()[0][:, 5], 0.7)
-    assert strengths_of(A, A @ light) == pytest.approx(light, abs=1e-4)
-    dark = strengths_of(A, -(A @ light))
+    A, light = random.uniform(size=(60, 10)), np.append(light_basis.lobe_mixtures()[0][:, 5], 0.7)
+    assert solve_strengths(A, A @ light) == pytest.approx(light, abs=1e-4)
+    dark = solve_strengths(A, -(A @ light))
     assert np.abs(dark).max() < 1e-9
 
 
@@ -105,7 +105,7 @@ def test_lobes_make_up_all_of_the_second_order() -> None:
     places = fibonacci_sphere(200)
     x, y, z = places.T
     wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
-    lobes = light_basis.lobe(light_basis.middles(), places)
+    lobes = light_basis.lobe_radiance(light_basis.lobe_directions(), places)
     made = lobes @ np.linalg.lstsq(lobes, wanted, rcond=None)[0]
     assert np.abs(made - wanted).max() < 1e-9
 
@@ -114,26 +114,28 @@ def test_clipped_pixels_are_not_trusted() -> None:
     image = np.full((32, 32, 3), 100, np.uint8)
     image[:16, :16, 0] = 255
     small = read_photograph(image).within(16)
-    assert small.size == (16, 16) and small.trusted[:8, :8].max() == 0.0 and small.trusted[8:].min() == 1.0
+    assert (
+        small.size == (16, 16) and small.unclipped[:8, :8].max() == 0.0 and small.unclipped[8:].min() == 1.0
+    )
 
 
 def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
     head, size = person.head(subdivide=0), (300, 400)
     points = landmark_points(head, "ibug-68")
-    places = np.einsum("nk,nkc->nc", points.share, head.positions_mm[points.corner]) - head.centre_mm
+    places = np.einsum("nk,nkc->nc", points.weight, head.positions_mm[points.point]) - head.centre_mm
     camera = CAMERA.to_opencv(size)
     seen = (places @ camera.R.T + camera.t) @ camera.K.T
     pixels = seen[:, :2] / seen[:, 2:]
     rows = [f"{name},{x},{y}" for name, (x, y) in zip(points.names, pixels.tolist(), strict=True)]
     (tmp_path / "face.csv").write_text("\n".join(["name,x,y", *rows]))
-    made = place_by_landmarks(subject_of(Human()), tmp_path / "face.csv", size)
+    made = align_to_landmarks(fit_subject(Human()), tmp_path / "face.csv", size)
     assert made.person is not None
     other = made.scene.camera
     way, true = (np.subtract(one.position, one.target) for one in (other, CAMERA))
     cosine = way @ true / np.linalg.norm(way) / np.linalg.norm(true)
     assert cosine > np.cos(np.radians(3.0))
     again = made.person.head(subdivide=0)
-    there = np.einsum("nk,nkc->nc", points.share, again.positions_mm[points.corner]) - again.centre_mm
+    there = np.einsum("nk,nkc->nc", points.weight, again.positions_mm[points.point]) - again.centre_mm
     found = other.to_opencv(size)
     back = (there @ found.R.T + found.t) @ found.K.T
     off = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels, axis=1)

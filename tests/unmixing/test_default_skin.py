@@ -9,7 +9,7 @@ import pytest
 from tolerances import UNMIXED
 
 import dermis
-from dermis.apps.inverse.fitting.inputs import subject_of
+from dermis.apps.inverse.fitting.inputs import fit_subject
 from dermis.human.skin.look import SkinLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.tissue import load_tissue
@@ -34,7 +34,7 @@ def test_tissue_people_and_fits_start_from_the_same_skin() -> None:
     }
     own = skin_of(dermis.Human()).pigments
     assert own is not None and own.epidermis_mm == DEFAULT_SKIN.epidermis_mm
-    held = subject_of(dermis.Scene(dermis.Human().head())).scene.skin.pigments
+    held = fit_subject(dermis.Scene(dermis.Human().head())).scene.skin.pigments
     assert held is not None and held.epidermis_mm == DEFAULT_SKIN.epidermis_mm
 
 

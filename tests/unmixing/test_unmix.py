@@ -9,8 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
-from dermis.apps.inverse.unmixing.skin_model import Third, skin_model, solve, weights_of
-from dermis.apps.inverse.unmixing.unmix import Change, Share, parse_share, unmix
+from dermis.apps.inverse.unmixing.skin_model import (
+    ThirdUnknown,
+    inverse_variances,
+    skin_model,
+    solve_pigments,
+)
+from dermis.apps.inverse.unmixing.unmix import FractionChange, PigmentChange, parse_fraction_change, unmix
 from dermis.base.errors import DermisError
 from dermis.gpu import failures
 from dermis.gpu.device import Device
@@ -46,7 +51,9 @@ def colours() -> Pixels:
 
 def test_known_skins_are_found_without_noise() -> None:
     m, b = shares(24)
-    found = solve(skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3)
+    found = solve_pigments(
+        skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3
+    )
     np.testing.assert_allclose(found.melanin, m, rtol=0.01)
     np.testing.assert_allclose(found.blood, b, rtol=0.02)
     np.testing.assert_allclose(found.residual, 1.0, atol=5e-3)
@@ -57,7 +64,7 @@ def test_with_noise_they_are_as_far_off_as_is_said() -> None:
     plain = skin_model().colours(m, b)
     random = np.random.default_rng(0)
     noisy = plain * (1.0 + 0.01 * random.standard_normal((60, *plain.shape)))
-    found = solve(skin_model(), noisy.reshape(-1, 3), noise=0.01)
+    found = solve_pigments(skin_model(), noisy.reshape(-1, 3), noise=0.01)
     for known, one, sd in ((m, found.melanin, found.melanin_sd), (b, found.blood, found.blood_sd)):
         off = np.sqrt(((one.reshape(60, -1) - known) ** 2).mean(axis=0))
         ratio = np.median(off / np.median(sd.reshape(60, -1), axis=0))
@@ -68,32 +75,32 @@ def test_slopes_are_those_of_the_colours() -> None:
     for third in ("none", "oxygen", "shade"):
         model = skin_model(third=third)
         x = np.random.default_rng(1).uniform(0.11, 0.89, (30, 3))
-        logs, slopes = model.read(x)
+        log_colours, slopes = model.evaluate(x)
         for k in range(3):
             step = np.where(np.arange(3) == k, 1e-7, 0.0)
-            off = (model.read(x + step)[0] - logs) / 1e-7 - slopes[:, :, k]
+            off = (model.evaluate(x + step)[0] - log_colours) / 1e-7 - slopes[:, :, k]
             assert np.abs(off).max() < 1e-4 or (third == "none" and k == 2)
 
 
 @pytest.mark.parametrize("third", ["none", "oxygen"])
-def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, third: Third) -> None:
+def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, third: ThirdUnknown) -> None:
     noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
     noisy = noisy.astype(np.float32)
     model = skin_model(third=third)
     made, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
-    twin = solve(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
+    twin = solve_pigments(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
     pairs = [(made[..., 0], twin.melanin), (made[..., 1], twin.blood), (made[..., 2], twin.third)]
     pairs += [(sd[..., 0], twin.melanin_sd), (sd[..., 1], twin.blood_sd)]
     for got, wanted in pairs:
         assert np.percentile(np.abs(got.ravel() - wanted) / (np.abs(wanted) + 1e-4), 99.0) < 2e-3
-    cost = (weights_of(noisy.reshape(-1, 3), 0.01) * np.log(residual.reshape(-1, 3)) ** 2).sum(axis=1)
-    least = (weights_of(noisy.reshape(-1, 3), 0.01) * np.log(twin.residual) ** 2).sum(axis=1)
+    cost = (inverse_variances(noisy.reshape(-1, 3), 0.01) * np.log(residual.reshape(-1, 3)) ** 2).sum(axis=1)
+    least = (inverse_variances(noisy.reshape(-1, 3), 0.01) * np.log(twin.residual) ** 2).sum(axis=1)
     assert np.mean(cost > least + 0.1) < 2e-3
 
 
 def test_blood_that_melanin_hides_is_what_is_usual() -> None:
     thick = replace(DEFAULT_SKIN, epidermis_mm=0.25)
-    found = solve(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
+    found = solve_pigments(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
     assert 0.005 < found.blood[0] < 0.03 and found.blood_sd[0] > found.blood[0]
     assert found.melanin[0] == pytest.approx(0.4, rel=0.02)
 
@@ -101,7 +108,7 @@ def test_blood_that_melanin_hides_is_what_is_usual() -> None:
 def test_oxygen_is_found_where_it_shows() -> None:
     pale = replace(DEFAULT_SKIN, oxygen=0.4)
     colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
-    held, free = (solve(skin_model(third=one), colour) for one in ("none", "oxygen"))
+    held, free = (solve_pigments(skin_model(third=one), colour) for one in ("none", "oxygen"))
     assert 0.35 < free.third[0] < 0.6
     assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(held.residual)).max()
 
@@ -110,39 +117,39 @@ def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
     colours: Pixels,
 ) -> None:
     found = unmix(colours, adapter="cpu")
-    np.testing.assert_allclose(found.recoloured(Change(), "cpu"), colours, atol=1e-5)
-    darker = unmix(found.recoloured(Change(melanin=Share(2.0)), "cpu"), adapter="cpu")
+    np.testing.assert_allclose(found.recoloured(PigmentChange(), "cpu"), colours, atol=1e-5)
+    darker = unmix(found.recoloured(PigmentChange(melanin=FractionChange(2.0)), "cpu"), adapter="cpu")
     ratio = darker.melanin / found.melanin
     assert np.median(ratio) == pytest.approx(2.0, rel=0.01)
     assert np.median(darker.blood / found.blood) == pytest.approx(1.0, rel=0.02)
-    cold = found.recoloured(Change(oxygen=0.2), "cpu")
+    cold = found.recoloured(PigmentChange(oxygen=0.2), "cpu")
     assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen takes more of the red
 
 
 def test_recolouring_opens_no_further_device(colours: Pixels, monkeypatch: pytest.MonkeyPatch) -> None:
     found = unmix(colours[:4, :4], adapter="cpu")
     monkeypatch.setattr(failures, "open_device", None)
-    assert found.recoloured(Change(), "cpu").shape == (4, 4, 3)
+    assert found.recoloured(PigmentChange(), "cpu").shape == (4, 4, 3)
 
 
 def test_a_larger_median_adds_and_a_smaller_one_multiplies() -> None:
-    change = Change(melanin=Share(median=0.2), blood=Share(median=0.005))
-    factors, added = change.over(0.05, 0.01)
+    change = PigmentChange(melanin=FractionChange(median=0.2), blood=FractionChange(median=0.005))
+    factors, added = change.scales_and_offsets(0.05, 0.01)
     np.testing.assert_allclose(factors, [1.0, 0.5, 1.0])
     np.testing.assert_allclose(added, [0.15, 0.0, 0.0])
-    assert parse_share("--melanin", "x2") == Share(factor=2.0) and parse_share("--blood", "0.1") == Share(
-        median=0.1
-    )
+    assert parse_fraction_change("--melanin", "x2") == FractionChange(factor=2.0) and parse_fraction_change(
+        "--blood", "0.1"
+    ) == FractionChange(median=0.1)
     for wrong in ("", "x", "2", "-0.1", "nan", "xnan", "x1e9"):
         with pytest.raises(DermisError, match="--melanin: expected"):
-            parse_share("--melanin", wrong)
+            parse_fraction_change("--melanin", wrong)
 
 
 def test_paint_stays(colours: Pixels) -> None:
     painted = colours.copy()
     painted[10:20, 10:20] = (0.05, 0.4, 0.1)
     found = unmix(painted, adapter="cpu")
-    again = found.recoloured(Change(blood=Share(0.5)), "cpu")
+    again = found.recoloured(PigmentChange(blood=FractionChange(0.5)), "cpu")
     assert (again[12:18, 12:18, 1] > 3.0 * again[12:18, 12:18, 0]).all()
     assert found.summary()["skin"] < 1.0 - 90.0 / SIDE**2
 

@@ -7,28 +7,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.inverse.unmixing.profile_widths import CORNERS, save_widths, widths_of
+from dermis.apps.inverse.unmixing.profile_widths import PROFILE_CORNERS, profile_mixture, save_mixture
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.base.errors import DermisError
-from dermis.frame.features.diffusion.mixture import load_shares
+from dermis.frame.features.diffusion.mixture import load_blend_weights
 from dermis.optics.profiles import load_profile
 
 
 def test_profiles_follow_melanin_and_blood(tmp_path: Path) -> None:
     m, b = (one.ravel() for one in np.meshgrid(np.geomspace(0.01, 0.1, 24), np.geomspace(0.003, 0.04, 24)))
     found = unmix(skin_model().colours(m, b).reshape(24, 24, 3), adapter="cpu")
-    made = widths_of(found)
-    assert (made.error < 0.5 * made.alone).all() and made.error.max() < 0.12
+    made = profile_mixture(found)
+    assert (made.error < 0.5 * made.single_error).all() and made.error.max() < 0.12
     for corner, share in (((0, 0), (0, 0)), ((-1, 0), (1, 0)), ((-1, -1), (0, 1))):
         np.testing.assert_allclose(made.shares[corner], share, atol=0.02)
-    written = save_widths(tmp_path, made)
-    np.testing.assert_allclose(load_shares(str(written[-1])), made.shares, atol=1e-6)
-    read = [load_profile(tmp_path / f"{name}.toml") for name in CORNERS]
-    spread = [(one.variance_mm2 @ (one.weight / one.albedo))[0] for one in read]
-    assert spread[0] > spread[1] > spread[2]  # blood shortens the way of red light, and so does melanin
+    written = save_mixture(tmp_path, made)
+    np.testing.assert_allclose(load_blend_weights(str(written[-1])), made.shares, atol=1e-6)
+    evaluate = [load_profile(tmp_path / f"{name}.toml") for name in PROFILE_CORNERS]
+    prior_sd = [(one.variance_mm2 @ (one.weight / one.albedo))[0] for one in evaluate]
+    assert prior_sd[0] > prior_sd[1] > prior_sd[2]  # blood shortens the way of red light, and so does melanin
 
 
 def test_what_is_no_skin_has_no_widths() -> None:
     with pytest.raises(DermisError, match="no texel is like skin"):
-        widths_of(unmix(np.zeros((4, 4, 3)), adapter="cpu"))
+        profile_mixture(unmix(np.zeros((4, 4, 3)), adapter="cpu"))

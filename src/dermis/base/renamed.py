@@ -14,7 +14,12 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
-NAMES: Mapping[str, str] = {"profile": "side", "scene.profile": "scene.side"}
+NAMES: Mapping[str, str] = {
+    "profile": "side",
+    "scene.profile": "scene.side",
+    "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
+    "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
+}
 """Old to new names of objects, both without the package's name."""
 
 MODULES: Mapping[str, str] = {
@@ -69,6 +74,17 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
         return with_new_names
 
     return decorate
+
+
+def renamed_attribute(old: str, new: str) -> property:
+    """Return a property that warns and returns the attribute of the new name."""
+
+    def get(instance: Any) -> Any:
+        text = f"{type(instance).__name__}.{old} is now {new}"
+        warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel=2)
+        return getattr(instance, new)
+
+    return property(get)
 
 
 def find_renamed_modules() -> None:

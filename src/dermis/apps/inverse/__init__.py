@@ -1,1 +1,1 @@
-"""From pictures to skin and light: unmixing of colour maps and fits of photographs."""
+"""Skin and light from pictures: unmixing of colour maps and fits to photographs."""

@@ -1,1 +1,1 @@
-"""From a photograph of a face to its light and skin."""
+"""Light and skin of a photograph by least squares."""

@@ -1,4 +1,4 @@
-"""Initial guess of a fit: the best of a coarse grid of sun directions and pigments."""
+"""Fit of light and skin to a photograph, from a coarse search over suns and pigments."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.inputs import Photograph, read_photograph, fit_subject
-from dermis.apps.inverse.fitting.light_basis import BASIS, squared_residual, solve_normal_equations
+from dermis.apps.inverse.fitting.inputs import Photograph, fit_subject, read_photograph
+from dermis.apps.inverse.fitting.light_basis import BASIS, solve_normal_equations, squared_residual
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
-from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, solve_fit, light_tint
-from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, FitPoint, tangents, prior_point
+from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, light_tint, solve_fit
+from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, FitPoint, prior_point, tangents
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
@@ -29,10 +29,11 @@ from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 
 _SUN_COUNT = 28
-_MIN_SUN_COSINE = -0.35  # along z: suns farther behind leave the face dark
+_MIN_SUN_COSINE = -0.35  # least cosine to the camera of a sun that lights the face
 _MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _STRENGTH_GRID = 0.5, 0.75, 1.0
-_RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6  # degrees, and directions on each; those tried first are 35 degrees apart
+_RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6
+"""Rings around a sun of the coarse search, whose suns are 35 degrees apart, and directions on each ring."""
 DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
 _MIN_PIXELS = 200
@@ -44,62 +45,64 @@ def candidate_suns(towards_camera: Floats) -> Floats:
 
     towards_camera : (3,) unit vector
     """
-    every = fibonacci_sphere(_SUN_COUNT)
-    return every[every @ towards_camera > _MIN_SUN_COSINE]
+    grid = fibonacci_sphere(_SUN_COUNT)
+    return grid[grid @ towards_camera > _MIN_SUN_COSINE]
 
 
 def neighbouring_suns(towards: Floats) -> Floats:
-    """Return directions (k, 3) and others around them, at half the distance of those tried first."""
-    turn = np.linspace(0.0, 2.0 * np.pi, _RING_DIRECTIONS, endpoint=False)
-    ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RING_DEGREES)])
-    found = towards[:, None] + np.einsum("nt,ktc->knc", off, tangents(towards))
-    return np.asarray((found / np.linalg.norm(found, axis=2, keepdims=True)).reshape(-1, 3))
+    """Return directions (k, 3) and others on two rings around each, for a finer search."""
+    azimuth = np.linspace(0.0, 2.0 * np.pi, _RING_DIRECTIONS, endpoint=False)
+    ring = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
+    rings = (np.tan(np.radians(angle)) * ring for angle in _RING_DEGREES)
+    offsets = np.concatenate([[[0.0, 0.0]], *rings])
+    suns = towards[:, None] + np.einsum("nt,ktc->knc", offsets, tangents(towards))
+    return np.asarray((suns / np.linalg.norm(suns, axis=2, keepdims=True)).reshape(-1, 3))
 
 
 class InitialGuess:
-    """Normal equations of the radiance under each light alone, below the surface and off it.
+    """Coarse search, from normal equations of the diffuse and the specular radiance under each light.
 
-    frames, point : the face, its `suns` being those to try
-    target : (p, 3) the photograph's radiance
-    weight : (p, 3)
+    frames, point : the face, with the candidate suns in `point.suns`
+    target : (p, 3) radiance of the photograph
+    weight : (p, 3) inverse standard deviations
     """
 
     def __init__(self, frames: FaceRenderer, point: FitPoint, target: Floats, weight: Floats) -> None:
         self.point = point
-        below, off = frames.parts(point)
-        both = np.concatenate([below, off]) * weight
-        wanted = target * weight
-        self._grams = np.einsum("apc,bpc->cab", both, both, optimize=True)
-        self._rights = np.einsum("apc,pc->ca", both, wanted)
-        self._total = float((wanted**2).sum())
-        self._lights = len(below)
+        diffuse, specular = frames.diffuse_and_specular(point)
+        weighted = np.concatenate([diffuse, specular]) * weight
+        weighted_target = target * weight
+        self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)
+        self._rights = np.einsum("apc,pc->ca", weighted, weighted_target)
+        self._total = float((weighted_target**2).sum())
+        self._lights = len(diffuse)
         pigments = frames.scene.skin.pigments
         assert pigments is not None
-        held = pigments.overrides()
-        self._table = skin_colour_table(held["eumelanin"], held["oxygen"], held["epidermis_mm"])
+        fixed = pigments.overrides()
+        self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
     def best(self, count: int) -> FitPoint:
         """Return the best point with `count` suns."""
-        every = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
-        at, suns = self.point.logs, self._nearest(self.point.logs, count)
+        grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
+        log_skin, suns = self.point.logs, self._nearest(self.point.logs, count)
         for _ in range(2):
-            trials = [np.array([m, b, at[2], s]) for m, b, s in every]
-            at = trials[int(np.argmin([self._fault(one, suns) for one in trials]))]
-            suns = self._nearest(at, count)
-        return replace(self.point, logs=at, suns=self.point.suns[suns])
+            trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
+            log_skin = trials[int(np.argmin([self._cost(one, suns) for one in trials]))]
+            suns = self._nearest(log_skin, count)
+        return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
     def _nearest(self, logs: Floats, count: int) -> list[int]:
         """Return the suns with the smallest residual, chosen greedily."""
-        found: list[int] = []
+        suns_found: list[int] = []
         for _ in range(count):
-            left = [k for k in range(len(self.point.suns)) if k not in found]
-            found.append(min(left, key=lambda k: self._fault(logs, [*found, k])))
-        return found
+            remaining = [k for k in range(len(self.point.suns)) if k not in suns_found]
+            suns_found.append(min(remaining, key=lambda k: self._cost(logs, [*suns_found, k])))
+        return suns_found
 
-    def _fault(self, logs: Floats, suns: list[int]) -> float:
-        """Return the squared residual, with radiance below the surface scaled by the colour of the skin, and
-        radiance off it by its strength.
+    def _cost(self, logs: Floats, suns: list[int]) -> float:
+        """Return the squared residual for other skin values.
+
+        Diffuse radiance is scaled by the skin's colour, specular radiance by its strength.
         """
         chosen = np.array([*range(BASIS), *(BASIS + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
@@ -107,9 +110,9 @@ class InitialGuess:
         gram, right = np.zeros((len(chosen),) * 2), np.zeros(len(chosen))
         for c in range(3):
             G, r, s = self._grams[c], self._rights[c], ratio[c]
-            below, off = np.ix_(chosen, chosen), np.ix_(n + chosen, n + chosen)
+            diffuse, specular = np.ix_(chosen, chosen), np.ix_(n + chosen, n + chosen)
             across = G[np.ix_(chosen, n + chosen)]
-            gram += s**2 * G[below] + s * strength * (across + across.T) + strength**2 * G[off]
+            gram += s**2 * G[diffuse] + s * strength * (across + across.T) + strength**2 * G[specular]
             right += s * r[chosen] + strength * r[n + chosen]
         return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
@@ -132,85 +135,126 @@ def fit(
     side: int = DEFAULT_SIDE,
     atlas: int = DEFAULT_ATLAS,
     adapter: str = "auto",
-    told: Callable[[int, int], None] = lambda done, of: None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> FitResult:
-    """Fit light and skin to a photograph of a head whose shape and camera are known.
+    """Fit light and skin to a photograph of a head of known shape.
 
-    photo : a file (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear
-    head : a scene or its file (.toml), a head or what `load_head` takes, a `Human`
-    camera : a camera, a preset's name or a file; the scene's own when left out
-    landmarks : file of landmarks in the photograph, by which camera and the human's shape are found
-    suns : lights from one direction beside the light from all around, 0 to 2
-    exposure : factor from radiance to the photograph
-    white : colour of the light in the photograph, or "specular" to find it from what the surface mirrors
-    noise : relative standard deviation of a pixel
-    robust : standard deviations from which a pixel that cannot be explained counts less
-    side : pixels along the longer side at which it is fitted
-    atlas : side of the renderer's atlas [texel]
-    told : steps done of how many
+    All light has one colour. Its strength and the exposure are one unknown, which a photograph cannot
+    separate.
 
-    All light has one colour. Its strength is found, and exposure is one number with it: a photograph cannot
-    tell the two apart.
+    Parameters
+    ----------
+    photo : str, Path or array_like
+        File (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear.
+    head : Scene, Head, Human, str or Path
+        A scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`.
+    camera : Camera, str, Path or None
+        A camera, the name of a preset or a file; None for the scene's own.
+    landmarks : str, Path or None
+        File of landmarks in the photograph, from which the camera and the shape of a `Human` are found.
+    suns : int
+        Number of directional lights besides the ambient light, 0 to 2.
+    exposure : float
+        Factor from radiance to the photograph [-].
+    white : (3,) array_like or "specular"
+        Colour of the light in the photograph, or "specular" to estimate it from specular reflection.
+    noise : float
+        Relative standard deviation of a pixel [-].
+    robust : float
+        Number of standard deviations from which a residual counts less [Huber1964].
+    side : int
+        Longer side of the picture that is fitted [pixel].
+    atlas : int
+        Side of the renderer's atlas [texel].
+    adapter : str
+        "auto", "cpu" or part of the name of an adapter.
+    progress : callable
+        Called with the number of finished steps and the number of all steps.
 
-    Raises DermisError for what is no picture, numbers that cannot be, pictures without skin, and as
-    `dermis.Renderer`.
+    Returns
+    -------
+    FitResult
+        Light, skin, their uncertainties and the fitted picture.
+
+    Raises
+    ------
+    DermisError
+        For files and arrays that are not pictures, numbers out of range, pictures without skin, and as
+        `dermis.Renderer`.
+
+    References
+    ----------
+    [GolubPereyra1973] and [Kaufman1975] for the least squares, [RamamoorthiHanrahan2001] for the ambient
+    light.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> result = dermis.fit("portrait.jpg", "human", landmarks="landmarks.csv")  # doctest: +SKIP
+    >>> sorted(result.values)  # doctest: +SKIP
+    ['blood', 'melanin', 'rho_s', 'roughness']
     """
-    began = time.perf_counter()
+    started = time.perf_counter()
     checked_integer("suns", suns, 0, 2)
     exposure = checked_number("exposure", exposure, 1e-6, 1e6, "20 stops either way")
     noise, robust = checked_number("noise", noise, 1e-4, 1.0), checked_number("robust", robust, 0.5, 1e12)
-    given = _checked_white(white)
-    scale = given * exposure
-    whole = read_photograph(photo)
-    small = whole.within(checked_integer("side", side, 32, 1024, "pixels"))
+    white_point = _checked_white(white)
+    scale = white_point * exposure
+    photograph = read_photograph(photo)
+    small = photograph.within(checked_integer("side", side, 32, 1024, "pixels"))
     subject = fit_subject(head, camera)
     if landmarks is not None:
-        subject = align_to_landmarks(subject, landmarks, whole.size)
+        subject = align_to_landmarks(subject, landmarks, photograph.size)
     settings = Settings(
-        size=small.size, atlas=atlas, shadow_size=SHADOW_SIZE, samples=4, strands=False, technique="texture-space"
+        size=small.size,
+        atlas=atlas,
+        shadow_size=SHADOW_SIZE,
+        samples=4,
+        strands=False,
+        technique="texture-space",
     )
     with TemporaryDirectory() as folder:
         frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
-        tried = _find_skin(frames, small)
+        candidate = _find_skin(frames, small)
         problem = FitProblem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
-        state, slopes = solve_fit(problem, _initial_point(problem, tried, suns), told)
-        scene = frames.lit(state.point, state.strengths)
+        state, derivatives = solve_fit(problem, _initial_point(problem, candidate, suns), progress)
+        scene = frames.lit_scene(state.point, state.strengths)
         picture = frames.picture(scene) * scale * light_tint(state.point)
-    off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
+    relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
     return FitResult(
         subject,
         state.point,
         state.strengths,
-        given * light_tint(state.point),
+        white_point * light_tint(state.point),
         exposure,
-        whole.size,
-        fit_uncertainty(problem, state, slopes),
+        photograph.size,
+        fit_uncertainty(problem, state, derivatives),
         small.linear,
         picture,
         frames.mask,
-        float(np.median(off)),
-        frames.drawn,
-        time.perf_counter() - began,
+        float(np.median(relative_residual)),
+        frames.frame_count,
+        time.perf_counter() - started,
     )
 
 
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
-    """Find the pixels of lit skin, and return the usual point with the suns to try."""
+    """Find the pixels of lit skin, and return the prior's point with the candidate suns."""
     camera = frames.scene.camera
-    way = np.subtract(camera.position, camera.target)
-    tried = prior_point(candidate_suns(way / np.linalg.norm(way)))
-    frames.find_mask(tried, photo.trusted)
+    view_direction = np.subtract(camera.position, camera.target)
+    candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
+    frames.find_mask(candidate, photo.unclipped)
     frames.mask &= photo.linear.max(axis=2) > 0.0
     if frames.mask.sum() < _MIN_PIXELS:
         actual = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
         refuse("photo", "skin where the head is", actual, "Check camera and exposure, or take a larger side")
-    return tried
+    return candidate
 
 
-def _initial_point(problem: FitProblem, tried: FitPoint, suns: int) -> FitPoint:
-    """Return the point at which the fit starts: a coarse search, then a finer one around its suns."""
-    frames, target, weight = problem.frames, problem.target, problem.even_weights()
-    start = InitialGuess(frames, tried, target, weight).best(suns)
+def _initial_point(problem: FitProblem, candidate: FitPoint, suns: int) -> FitPoint:
+    """Return the start of the fit: the result of a coarse search, then of a finer one around its suns."""
+    frames, target, weight = problem.frames, problem.target, problem.initial_weights()
+    start = InitialGuess(frames, candidate, target, weight).best(suns)
     if suns:
         nearer = replace(start, suns=neighbouring_suns(start.suns))
         start = InitialGuess(frames, nearer, target, weight).best(suns)
@@ -218,11 +262,11 @@ def _initial_point(problem: FitProblem, tried: FitPoint, suns: int) -> FitPoint:
 
 
 def _checked_white(white: WhitePoint) -> Floats:
-    """Return the given white (3,), green 1."""
+    """Return the given colour of the light (3,), with green 1."""
     if isinstance(white, str):
         if white != "specular":
             actual = f"got {format_value(white)}"
             refuse("white", '"specular" or red, green and blue', actual, "Write white=(1, 1, 1)")
         return np.ones(3)
-    found = checked_array("white", white, (3,), 0.01, 100.0)
-    return np.asarray(found / found[1], np.float64)
+    suns_found = checked_array("white", white, (3,), 0.01, 100.0)
+    return np.asarray(suns_found / suns_found[1], np.float64)

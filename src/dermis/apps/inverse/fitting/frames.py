@@ -1,4 +1,4 @@
-"""Frames of a face under each light alone: a photograph is a linear combination of them."""
+"""Frames of a face under each light alone; a photograph is a linear combination of them."""
 
 from __future__ import annotations
 
@@ -21,20 +21,19 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Mask = NDArray[np.bool_]
-_SKIN_LABELS = 1, 2  # classes of labels: face and scalp, nose
+_SKIN_LABELS = 1, 2  # labels of face and scalp, and of the nose
 _MIN_VIEW_COSINE = 0.3
-"""Cosine between normal and view below which pixels do not count: what skin and its surface do there is where
-the frame is least right."""
+"""Least cosine between normal and view; at grazing angles the frame is least accurate."""
 _FULL_COVERAGE = 0.999
 
 
 @dataclass(eq=False)
 class FaceRenderer:
-    """Renders a scene's head in any light with any skin, and keeps the pixels that count.
+    """Renderer of a scene's head under any light with any skin, limited to the pixels of a mask.
 
-    scene : head, camera and pose; its lights and environment are none
+    scene : head, camera and pose, without lights and environment
     folder : for panoramas
-    drawn : how many frames there were
+    frame_count : number of frames drawn
     """
 
     renderer: Renderer
@@ -42,68 +41,71 @@ class FaceRenderer:
     settings: Settings
     folder: Path
     mask: Mask = field(init=False)
-    drawn: int = 0
+    frame_count: int = 0
 
-    def find_mask(self, point: FitPoint, trusted: Floats) -> None:
-        """Find the pixels of skin at which the photograph can be trusted (h, w)."""
+    def find_mask(self, point: FitPoint, unclipped: Floats) -> None:
+        """Set the mask (h, w) of skin pixels at which the photograph is usable.
+
+        unclipped : (h, w) fraction of the pixel without clipped channels
+        """
         scene = with_skin(self._lit(()), point)
         scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
-        shown = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
-        label, alpha = shown.output("label"), shown.output("alpha")
-        towards = np.abs(shown.output("normal_camera")[..., 2])
-        skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (towards > _MIN_VIEW_COSINE)
-        self.mask = _eroded(skin) & (trusted > _FULL_COVERAGE)
+        rendered = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
+        label, alpha = rendered.output("label"), rendered.output("alpha")
+        view_cosine = np.abs(rendered.output("normal_camera")[..., 2])
+        skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (view_cosine > _MIN_VIEW_COSINE)
+        self.mask = _eroded(skin) & (unclipped > _FULL_COVERAGE)
 
     def basis(self, point: FitPoint) -> Floats:
-        """Return the radiance (9 + k, p, 3) in each lobe of radiance 1 and each sun of irradiance 1."""
-        return np.stack([self._image(scene, view) for scene, view in self._apart(point)])
+        """Return the radiance (9 + k, p, 3) under each lobe of radiance 1 and each sun of irradiance 1."""
+        return np.stack([self._image(scene, view) for scene, view in self._single_light_scenes(point)])
 
-    def parts(self, point: FitPoint) -> tuple[Floats, Floats]:
-        """Return the same separately: from below the skin, and off its surface."""
-        found = []
-        for scene, view in self._apart(point):
-            shown = self._draw(scene, view, ("diffuse", "specular"))
-            found.append([shown.output(name)[self.mask] for name in ("diffuse", "specular")])
-        both = np.asarray(found, np.float64)
+    def diffuse_and_specular(self, point: FitPoint) -> tuple[Floats, Floats]:
+        """Return the radiance of `basis` as diffuse and specular parts."""
+        scenes = []
+        for scene, view in self._single_light_scenes(point):
+            rendered = self._draw(scene, view, ("diffuse", "specular"))
+            scenes.append([rendered.output(name)[self.mask] for name in ("diffuse", "specular")])
+        both = np.asarray(scenes, np.float64)
         return both[:, 0], both[:, 1]
 
-    def together(self, point: FitPoint, strengths: Floats, name: str) -> Floats:
-        """Return the radiance (p, 3) in all lights at once.
+    def combined(self, point: FitPoint, strengths: Floats, name: str) -> Floats:
+        """Return the radiance (p, 3) under all lights at once.
 
-        strengths : (9 + k,)
+        strengths : (9 + k,) of lobes and suns
         name : of the panorama
         """
-        return self._image(self.lit(point, strengths, name), "together")
+        return self._image(self.lit_scene(point, strengths, name), "together")
 
-    def lit(self, point: FitPoint, strengths: Floats, name: str = "light") -> Scene:
-        """Return the scene with the skin of a point in lights, whose panorama is in the folder."""
+    def lit_scene(self, point: FitPoint, strengths: Floats, name: str = "light") -> Scene:
+        """Return the scene with the skin of a point and all lights, whose panorama is in the folder."""
         suns = sun_lights(point.suns, strengths[BASIS:], np.ones(3))
         radiance = panorama(strengths[:BASIS])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
-        around = self._environment(name, radiance) if radiance.max() > 0.0 else None
-        return with_skin(replace(self._lit(lights), environment=around), point)
+        ambient = self._environment(name, radiance) if radiance.max() > 0.0 else None
+        return with_skin(replace(self._lit(lights), environment=ambient), point)
 
     def picture(self, scene: Scene) -> Floats:
         """Return the radiance (h, w, 3) of a frame."""
         return np.asarray(self._draw(scene, "together").linear(), np.float64)
 
-    def _apart(self, point: FitPoint) -> list[tuple[Scene, str]]:
+    def _single_light_scenes(self, point: FitPoint) -> list[tuple[Scene, str]]:
         """Return a scene for each light, with the name of its view."""
         base = with_skin(self._lit(()), point)
-        found = []
+        scenes = []
         for k in range(BASIS):
             path = self.folder / f"lobe_{k}.exr"
-            known = Environment(name=str(path)) if path.exists() else None
-            around = known or self._environment(path.stem, panorama(np.eye(BASIS)[k]))
-            found.append((replace(base, environment=around), f"lobe {k}"))
+            existing = Environment(name=str(path)) if path.exists() else None
+            ambient = existing or self._environment(path.stem, panorama(np.eye(BASIS)[k]))
+            scenes.append((replace(base, environment=ambient), f"lobe {k}"))
         for k, sun in enumerate(sun_lights(point.suns, np.ones(len(point.suns)), np.ones(3))):
-            found.append((replace(base, lights=(sun,)), f"sun {k}"))
-        return found
+            scenes.append((replace(base, lights=(sun,)), f"sun {k}"))
+        return scenes
 
     def _environment(self, name: str, radiance: Floats) -> Environment:
         path = self.folder / f"{name}.exr"
-        with atomic_file(path) as trial:
-            trial.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
+        with atomic_file(path) as file:
+            file.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
         return Environment(name=str(path))
 
     def _lit(self, lights: Sequence[object]) -> Scene:
@@ -113,7 +115,7 @@ class FaceRenderer:
         return np.asarray(self._draw(scene, view).linear()[self.mask], np.float64)
 
     def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
-        self.drawn += 1
+        self.frame_count += 1
         return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
 
 

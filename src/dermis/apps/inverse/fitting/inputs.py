@@ -25,45 +25,46 @@ from dermis.scene.heads import is_person_name, load_person
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-_CLIP_LEVEL = 0.985  # of what bytes can show, in the picture's own encoding
+_CLIP_LEVEL = 0.985  # fraction of the largest level from which a channel counts as clipped
 _MIN_SIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
-    """A photograph, or a smaller one of it.
+    """Photograph in linear light, at full or reduced size.
 
-    linear : (h, w, 3) linear Rec. 709 as the file has it, exposure and white balance in it
-    trusted : (h, w) share of the pixel that no channel's end of scale cuts off
+    linear : (h, w, 3) linear Rec. 709 as in the file, including exposure and white balance
+    unclipped : (h, w) fraction of the pixel without clipped channels
     """
 
     linear: Floats
-    trusted: Floats
+    unclipped: Floats
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height [pixel]."""
+        """Return width and height [pixel]."""
         return self.linear.shape[1], self.linear.shape[0]
 
     def within(self, side: int) -> Photograph:
-        """Return the photograph downsampled to at most `side` pixels along the longer side, by area."""
+        """Return the photograph downsampled by area to a longer side of at most `side` pixels."""
         width, height = self.size
         if max(width, height) <= side:
             return self
         scale = side / max(width, height)
         size = max(1, round(width * scale)), max(1, round(height * scale))
-        return Photograph(_area_average(self.linear, size), _area_average(self.trusted[..., None], size)[..., 0])
+        unclipped = _area_average(self.unclipped[..., None], size)[..., 0]
+        return Photograph(_area_average(self.linear, size), unclipped)
 
 
-def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
+def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
     """Return the photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
 
-    given : a file, (h, w, 3) bytes in sRGB, or floats, linear Rec. 709
+    source : a file, (h, w, 3) bytes in sRGB, or floats in linear Rec. 709
 
-    Raises DermisError for what is no picture in colour.
+    Raises DermisError for anything that is not a colour picture.
     """
-    image = read_image(given) if isinstance(given, str | Path | EmbeddedPicture) else np.asarray(given)
-    name = given if isinstance(given, str | Path | EmbeddedPicture) else "photo"
+    image = read_image(source) if isinstance(source, str | Path | EmbeddedPicture) else np.asarray(source)
+    name = source if isinstance(source, str | Path | EmbeddedPicture) else "photo"
     if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _MIN_SIDE:
         expected = f"a picture (h, w, 3) in colour of {_MIN_SIDE} pixels a side at least"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
@@ -75,21 +76,21 @@ def read_photograph(given: str | Path | EmbeddedPicture | ArrayLike) -> Photogra
             refuse(name, "light, from 0", "some is negative, infinite or no number", "Export it again")
         return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
     levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
-    most = np.iinfo(levels.dtype).max
-    trusted = (levels.max(axis=2) < _CLIP_LEVEL * most).astype(np.float64)
-    return Photograph(decode_srgb_levels(levels).astype(np.float64), trusted)
+    max_level = np.iinfo(levels.dtype).max
+    unclipped = (levels.max(axis=2) < _CLIP_LEVEL * max_level).astype(np.float64)
+    return Photograph(decode_srgb_levels(levels).astype(np.float64), unclipped)
 
 
 def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
-    """Return a picture (h, w, c) downsampled by area; pixels on edges count by their shares."""
+    """Return a picture (h, w, c) downsampled by area, with fractional weights of pixels on edges."""
     for axis, count in ((0, size[1]), (1, size[0])):
         sums = np.cumsum(image, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
         edges = np.linspace(0.0, image.shape[axis], count + 1)
-        whole = np.minimum(edges.astype(int), image.shape[axis] - 1)
-        part = (edges - whole).reshape([-1 if k == axis else 1 for k in range(3)])
-        reached = np.take(sums, whole, axis) + part * np.take(image, whole, axis)
-        image = np.diff(reached, axis=axis) * (count / image.shape[axis])
+        index = np.minimum(edges.astype(int), image.shape[axis] - 1)
+        fraction = (edges - index).reshape([-1 if k == axis else 1 for k in range(3)])
+        cumulative = np.take(sums, index, axis) + fraction * np.take(image, index, axis)
+        image = np.diff(cumulative, axis=axis) * (count / image.shape[axis])
     return image
 
 
@@ -98,10 +99,10 @@ _POSITION_TOLERANCE_MM = 0.01
 
 @dataclass(frozen=True)
 class FitSubject:
-    """Subject of a photograph: a scene without light.
+    """Head of a photograph, as a scene without light.
 
-    person : whose skin is painted, None for other heads
-    table : [head] of a scene's file for those; empty for people who were given as heads without a name
+    person : person whose skin is painted, None for other heads
+    table : [head] table of a scene's file for other heads; empty for people without a name
     """
 
     scene: Scene
@@ -109,59 +110,56 @@ class FitSubject:
     table: Mapping[str, object]
 
 
-def fit_subject(given: object, camera: object = None) -> FitSubject:
-    """Return the subject with the head, camera, pose and surface of what is given.
+def fit_subject(source: object, camera: object = None) -> FitSubject:
+    """Return the subject with the head, camera, pose and surface of a scene, head or person.
 
-    given : a scene or its file (.toml), a head or what `load_head` takes, or a `Human`
-    camera : a camera, a preset's name or a file; the scene's own when left out
+    source : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
+    camera : a camera, the name of a preset or a file; None for the scene's own
 
     Raises DermisError for anything else.
     """
     table: Mapping[str, object] = {}
-    if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() == ".toml":
-        table = head_table(Path(given))
-        scene = load_scene(Path(given))[0]
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".toml":
+        table = head_table(Path(source))
+        scene = load_scene(Path(source))[0]
     else:
-        scene = given if isinstance(given, Scene) else Scene(as_head(given))
+        scene = source if isinstance(source, Scene) else Scene(as_head(source))
     if camera is not None:
         scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = given if isinstance(given, Human) else _painted_person(scene.head)
+    person = source if isinstance(source, Human) else _painted_person(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
     return FitSubject(_without_light(scene), person, table)
 
 
-def _as_camera(given: object, head: Head) -> Camera | Callable[[Head], Camera]:
-    if isinstance(given, str | os.PathLike):
-        return load_camera(str(given), head)
-    if not (isinstance(given, Camera) or callable(given)):
-        actual = f"got {format_value(given)}"
+def _as_camera(source: object, head: Head) -> Camera | Callable[[Head], Camera]:
+    if isinstance(source, str | os.PathLike):
+        return load_camera(str(source), head)
+    if not (isinstance(source, Camera) or callable(source)):
+        actual = f"got {format_value(source)}"
         refuse("camera", "a camera, a preset or a file", actual, 'Write camera="portrait", or camera.toml')
-    return given
+    return source
 
 
 def _painted_person(head: Head) -> Human | None:
     """Return the person of a painted head, with the skin that is painted on it."""
-    if (
-        not isinstance(head.maps, PaintedMaps)
-        or head.maps.colour is not None
-        or not is_person_name(head.name)
-    ):
+    maps = head.maps
+    if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
-    person = replace(load_person(head.name), skin=head.maps.look)
-    own, there = person.positions_mm, head.control.positions_mm
-    same = own.shape == there.shape and np.allclose(own, there, atol=_POSITION_TOLERANCE_MM)
+    person = replace(load_person(head.name), skin=maps.look)
+    a, b = person.positions_mm, head.control.positions_mm
+    same = a.shape == b.shape and np.allclose(a, b, atol=_POSITION_TOLERANCE_MM)
     return person if same else None
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, with the pigments that are held."""
-    own = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
+    """Return the scene without light, with the pigments that are not fitted."""
+    fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look
-        own |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
+        fixed_pigments |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
     if scene.skin.pigments is not None:
-        own |= scene.skin.pigments.overrides()
-    held = {"profile": SPECTRAL, "pigments": Pigments(**own)}
+        fixed_pigments |= scene.skin.pigments.overrides()
+    held = {"profile": SPECTRAL, "pigments": Pigments(**fixed_pigments)}
     return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | held)))

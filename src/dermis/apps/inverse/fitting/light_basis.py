@@ -1,4 +1,4 @@
-"""Basis of ambient light, lobes of second-order spherical harmonics, and least squares for its strengths."""
+"""Basis of ambient light, as lobes of second-order spherical harmonics, and fits of its strengths."""
 
 from __future__ import annotations
 
@@ -11,43 +11,46 @@ from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 
 PANORAMA_ROWS = 32
-"""Of the panoramas."""
+"""Rows of the panoramas."""
 BASIS = 9
-"""Spherical harmonics up to the second order: what matte shading tells of light from all around
+"""Number of spherical harmonics up to the second order, which determine diffuse shading
 [RamamoorthiHanrahan2001]."""
 _LOBES = 48
 _CANDIDATES = 400
 
 
-def lobe_radiance(towards: Floats, places: Floats) -> Floats:
-    """Return a radiance from 1 ahead to 0 behind, the sharpest that second-order harmonics represent.
+def lobe_radiance(towards: Floats, directions: Floats) -> Floats:
+    """Return the radiance (..., k) of lobes, 1 in their direction and 0 opposite.
 
-    towards : (k, 3) unit vectors of the middles
-    places : (..., 3) unit vectors
+    These are the sharpest lobes that second-order harmonics represent.
+
+    towards : (k, 3) unit vectors of the lobes
+    directions : (..., 3) unit vectors
     """
-    return np.asarray((0.5 + 0.5 * (places @ towards.T)) ** 2)
+    return np.asarray((0.5 + 0.5 * (directions @ towards.T)) ** 2)
 
 
 @cache
 def lobe_directions() -> Floats:
-    """Return the middles (9, 3) of a basis of lobes, chosen greedily."""
-    every = fibonacci_sphere(_CANDIDATES)
-    chosen = [int(np.argmax(every[:, 2]))]
-    for _ in range(BASIS - 1):  # the candidate that the lobes chosen so far describe worst
-        before = lobe_radiance(every[chosen], every)
-        left = lobe_radiance(every, every)
-        left = left - before @ np.linalg.lstsq(before, left, rcond=None)[0]
-        chosen.append(int(np.argmax((left**2).sum(axis=0))))
-    return every[chosen]
+    """Return the directions (9, 3) of a basis of lobes, chosen greedily."""
+    candidates = fibonacci_sphere(_CANDIDATES)
+    selected = [int(np.argmax(candidates[:, 2]))]
+    for _ in range(BASIS - 1):  # add the candidate that the selected lobes approximate worst
+        basis = lobe_radiance(candidates[selected], candidates)
+        residual = lobe_radiance(candidates, candidates)
+        residual = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
+        selected.append(int(np.argmax((residual**2).sum(axis=0))))
+    return candidates[selected]
 
 
 @cache
 def lobe_mixtures() -> tuple[Floats, Floats]:
-    """Return shares (9, n) of the nine lobes in n others all around, and the middles of these (n, 3)."""
+    """Return weights (9, n) of the nine lobes in n evenly distributed lobes, and their directions (n, 3)."""
     towards = fibonacci_sphere(_LOBES)
-    places = fibonacci_sphere(_CANDIDATES)
-    shares = np.linalg.lstsq(lobe_radiance(lobe_directions(), places), lobe_radiance(towards, places), rcond=None)[0]
-    return np.asarray(shares, np.float64), towards
+    samples = fibonacci_sphere(_CANDIDATES)
+    basis, mixed = (lobe_radiance(lobes, samples) for lobes in (lobe_directions(), towards))
+    weights = np.linalg.lstsq(basis, mixed, rcond=None)[0]
+    return np.asarray(weights, np.float64), towards
 
 
 def panorama(strengths: Floats) -> Floats:
@@ -55,40 +58,41 @@ def panorama(strengths: Floats) -> Floats:
 
     strengths : (9,)
     """
-    return np.maximum(lobe_radiance(lobe_directions(), directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)) @ strengths, 0.0)
+    texels = directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)
+    return np.maximum(lobe_radiance(lobe_directions(), texels) @ strengths, 0.0)
 
 
 _REGULARISATION = 1e-9
 
 
 def solve_strengths(A: Floats, b: Floats) -> Floats:
-    """Return strengths (9 + k,) of nine lobes and k suns with non-negative light from every direction.
+    """Return strengths (9 + k,) of nine lobes and k suns, with non-negative light from every direction.
 
-    A : (m, 9 + k) weighed pixels in each light alone
-    b : (m,) the weighed photograph
+    A : (m, 9 + k) weighted pixels under each light alone
+    b : (m,) weighted photograph
     """
     return solve_normal_equations(A.T @ A, A.T @ b)
 
 
 def solve_normal_equations(gram: Floats, right: Floats) -> Floats:
-    """Return the same by A' A (9 + k, 9 + k) and A' b (9 + k,)."""
+    """Return the strengths of `solve_strengths` from A' A (9 + k, 9 + k) and A' b (9 + k,)."""
     from scipy.optimize import nnls
 
     R = np.linalg.cholesky(gram + _REGULARISATION * np.trace(gram) * np.eye(len(gram)))
-    mixed = mixing_matrix(len(gram) - BASIS)
-    found = nnls(R.T @ mixed, np.linalg.solve(R, right))[0]
-    return np.asarray(mixed @ found)
+    mixing = mixing_matrix(len(gram) - BASIS)
+    solution = nnls(R.T @ mixing, np.linalg.solve(R, right))[0]
+    return np.asarray(mixing @ solution)
 
 
 def mixing_matrix(suns: int) -> Floats:
-    """Return the lobes and suns (9 + k, n + k) in terms of the n lobes all around and the suns."""
-    shares, _ = lobe_mixtures()
-    made = np.zeros((BASIS + suns, shares.shape[1] + suns))
-    made[:BASIS, : shares.shape[1]] = shares
-    made[BASIS:, shares.shape[1] :] = np.eye(suns)
-    return made
+    """Return the matrix (9 + k, n + k) from n distributed lobes and k suns to the nine lobes and the suns."""
+    weights, _ = lobe_mixtures()
+    matrix = np.zeros((BASIS + suns, weights.shape[1] + suns))
+    matrix[:BASIS, : weights.shape[1]] = weights
+    matrix[BASIS:, weights.shape[1] :] = np.eye(suns)
+    return matrix
 
 
 def squared_residual(gram: Floats, right: Floats, total: float, x: Floats) -> float:
-    """Return the sum of squares of A x - b by A' A, A' b and b' b."""
+    """Return the sum of squares of A x - b from A' A, A' b and b' b."""
     return float(total - 2.0 * right @ x + x @ gram @ x)

@@ -1,4 +1,4 @@
-"""Camera, focal length and identity by least squares of landmarks in a photograph."""
+"""Camera, focal length and identity from landmarks in a photograph, by least squares."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from dermis.base.reading import parse_json, parsing, read_text
 from dermis.base.tables import parse_rows
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
 from dermis.human.landmarks.sets import SETS
-from dermis.human.person import Human
 from dermis.human.makehuman import OLD, YOUNG, human_targets
+from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
 _LANDMARK_NOISE = 0.004
-"""Of landmarks, of the photograph's height: how well they are placed."""
+"""Standard deviation of landmarks, relative to the height of the photograph."""
 _FOCAL_SD = 0.3
-"""Of the logarithm of the focal length, around that of a portrait."""
+"""Prior standard deviation of the logarithm of the focal length, around that of a portrait."""
 _MACRO_NAMES = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
 _MACRO_SD = 0.3
 _TARGET_SD = 0.15
@@ -38,86 +38,93 @@ _FRAME_MM = 300.0
 
 
 def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[int, int]) -> FitSubject:
-    """Return the subject with the camera, and the identity, that project its landmarks into the photograph.
+    """Return the subject with the camera and identity that project its landmarks into the photograph.
 
-    A human gets ancestry, sex, age, weight, muscle and details of the face with priors at the given person.
-    Other heads keep their shape and need a table of their own landmarks.
+    For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors at the
+    given person. Other heads keep their shape and need a table of their own landmarks.
 
-    Raises DermisError for files without landmarks, and for heads without those.
+    Raises DermisError for files without landmarks, and for heads without landmarks.
     """
-    name, seen = read_landmarks(landmarks, size)
+    name, pixels_by_name = read_landmarks(landmarks, size)
     person, head = subject.person, subject.scene.head
-    shape = _LandmarkModel.of(person, head, name, seen)
-    pixels = np.array([seen[one] for one in shape.names])
-    found = np.concatenate([np.zeros(6), [np.log(size[1] * _DISTANCE_MM / _FRAME_MM)], np.zeros(shape.count)])
-    found[:3], found[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
+    shape = _LandmarkModel.for_head(person, head, name, pixels_by_name)
+    pixels = np.array([pixels_by_name[one] for one in shape.names])
+    log_focal = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
+    solution = np.concatenate([np.zeros(6), [log_focal], np.zeros(shape.count)])
+    solution[:3], solution[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
     for _ in range(_ITERATIONS if person else 1):
-        found = _solve(shape, pixels, size, found)
+        solution = _solve(shape, pixels, size, solution)
         if person is not None:
-            person = shape.person(found[7:])
-            shape = _LandmarkModel.of(person, head, name, seen)
-            found[7:] = 0.0
+            person = shape.person(solution[7:])
+            shape = _LandmarkModel.for_head(person, head, name, pixels_by_name)
+            solution[7:] = 0.0
     if person is not None:
         subject = fit_subject(person)
-        found = _solve(replace(shape, slopes=shape.slopes[:0]), pixels, size, found[:7])
-    return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(found, size)))
+        solution = _solve(replace(shape, derivatives=shape.derivatives[:0]), pixels, size, solution[:7])
+    return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(solution, size)))
 
 
 @dataclass(frozen=True, eq=False)
 class _LandmarkModel:
-    """Places of landmarks on a head, and their derivatives by its identity.
+    """Positions of landmarks on a head, and their derivatives by its identity.
 
-    places : (n, 3) from the head's centre [mm]
-    slopes : (u, n, 3) by the unknowns of the identity in units of the priors
+    positions : (n, 3) relative to the head's centre [mm]
+    derivatives : (u, n, 3) by the unknowns of the identity in units of the priors
+    prior : person at the mean of the priors
     """
 
     names: tuple[str, ...]
-    places: Floats
-    slopes: Floats
-    given: Human | None
+    positions: Floats
+    derivatives: Floats
+    prior: Human | None
     details: tuple[str, ...]
 
     @classmethod
-    def of(cls, person: Human | None, head: Head, name: str, seen: dict[str, Floats]) -> _LandmarkModel:
-        """Return the shape of a person, or of a head without unknowns."""
+    def for_head(
+        cls, person: Human | None, head: Head, name: str, pixels_by_name: dict[str, Floats]
+    ) -> _LandmarkModel:
+        """Return the model of a person, or of a head without unknowns."""
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
         points = landmark_points(plain, name)
-        chosen = np.array([k for k, one in enumerate(points.names) if one in seen])
-        names = tuple(points.names[k] for k in chosen)
+        indices = np.array([k for k, one in enumerate(points.names) if one in pixels_by_name])
+        names = tuple(points.names[k] for k in indices)
         if person is None:
-            places = _interpolate(points, chosen, plain.positions_mm.astype(np.float64)) - plain.centre_mm
-            return cls(names, places, np.zeros((0, *places.shape)), None, ())
+            positions = _interpolate(points, indices, plain.positions_mm.astype(np.float64)) - plain.centre_mm
+            return cls(names, positions, np.zeros((0, *positions.shape)), None, ())
         centre = np.array(person.head(subdivide=0).centre_mm)
-        details = tuple(one for one in human_targets() if one.startswith(_TARGET_FOLDERS) and one.endswith(_TARGET_SUFFIXES))
-        own = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
+        targets = (one for one in human_targets() if one.startswith(_TARGET_FOLDERS))
+        details = tuple(one for one in targets if one.endswith(_TARGET_SUFFIXES))
+        partial = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
 
         def places_of(other: Human) -> Floats:
-            return np.asarray(_interpolate(points, chosen, other.positions_mm.astype(np.float64)) - centre)
+            return np.asarray(_interpolate(points, indices, other.positions_mm.astype(np.float64)) - centre)
 
         base, count = places_of(person), len(_MACRO_NAMES) + len(details)
-        slopes = np.stack([_derivative(own, places_of, base, k, count) for k in range(count)])
-        return replace(own, places=base, slopes=slopes)
+        derivatives = np.stack([_derivative(partial, places_of, base, k, count) for k in range(count)])
+        return replace(partial, positions=base, derivatives=derivatives)
 
     @property
     def count(self) -> int:
-        """Number of unknowns of the identity."""
-        return len(self.slopes)
+        """Return the number of unknowns of the identity."""
+        return len(self.derivatives)
 
     def person(self, identity: Floats) -> Human:
         """Return the given person changed by the identity, in units of the priors."""
-        assert self.given is not None
+        assert self.prior is not None
         macro: dict[str, Any] = {
-            name: float(np.clip(getattr(self.given, name) + _prior_sd(name) * step, *_limits(name)))
+            name: float(np.clip(getattr(self.prior, name) + _prior_sd(name) * step, *_limits(name)))
             for name, step in zip(_MACRO_NAMES, identity, strict=False)
         }
-        targets = dict(self.given.targets)
+        targets = dict(self.prior.targets)
         for name, step in zip(self.details, identity[len(_MACRO_NAMES) :], strict=True):
             targets[name] = float(np.clip(targets.get(name, 0.0) + _TARGET_SD * step, -1.0, 1.0))
-        return replace(self.given, **macro, targets=targets, skin=self.given.look)
+        return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
 
 
-def _derivative(shape: _LandmarkModel, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int) -> Floats:
-    """Return the derivative (n, 3) by one number of the identity, away from its limit."""
+def _derivative(
+    shape: _LandmarkModel, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int
+) -> Floats:
+    """Return the derivative (n, 3) by one unknown of the identity, in the direction away from its limit."""
     step = np.zeros(count)
     step[k] = 0.2
     change = places_of(shape.person(step)) - base
@@ -135,31 +142,31 @@ def _limits(name: str) -> tuple[float, float]:
     return {"age": (YOUNG, OLD), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
 
 
-def _interpolate(points: LandmarkPoints, chosen: NDArray[np.int64], places: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nkc->nc", points.weight[chosen], places[points.point[chosen]]))
+def _interpolate(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
+    return np.asarray(np.einsum("nk,nkc->nc", points.weight[indices], positions[points.point[indices]]))
 
 
 def _solve(shape: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
     """Return rotation, translation, logarithm of the focal length and identity by least squares."""
     from scipy.optimize import least_squares
 
-    usual = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
+    prior_median = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
 
-    def faults(x: Floats) -> Floats:
-        places = shape.places + np.einsum("u,unc->nc", x[7:], shape.slopes)
-        off = (_project(x, places, size) - pixels) / (_LANDMARK_NOISE * size[1])
-        return np.concatenate([off.ravel(), [(x[6] - usual) / _FOCAL_SD], x[7:]])
+    def residuals(x: Floats) -> Floats:
+        positions = shape.positions + np.einsum("u,unc->nc", x[7:], shape.derivatives)
+        error = (_project(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
+        return np.concatenate([error.ravel(), [(x[6] - prior_median) / _FOCAL_SD], x[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(shape.count)])
-    return np.asarray(least_squares(faults, start, x_scale=scale, loss="soft_l1").x, np.float64)
+    return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
-def _project(x: Floats, places: Floats, size: tuple[int, int]) -> Floats:
-    """Return the pixels of places (n, 2)."""
+def _project(x: Floats, positions: Floats, size: tuple[int, int]) -> Floats:
+    """Return the pixels (n, 2) of positions."""
     from scipy.spatial.transform import Rotation
 
-    there = places @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
-    return np.asarray(np.exp(x[6]) * there[:, :2] / there[:, 2:] + (np.array(size) - 1.0) / 2.0)
+    camera_space = positions @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
+    return np.asarray(np.exp(x[6]) * camera_space[:, :2] / camera_space[:, 2:] + (np.array(size) - 1.0) / 2.0)
 
 
 def _fitted_camera(x: Floats, size: tuple[int, int]) -> Camera:
@@ -177,36 +184,38 @@ _MIN_LANDMARKS = 6
 
 
 def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Return the name of the set, and the pixel (2,) of each landmark: the first pixel's middle is 0.
+    """Return the name of the landmark set, and the pixel (2,) of each landmark.
 
-    size : width and height of the photograph, to which MediaPipe's shares refer [pixel]
+    The centre of the first pixel is 0.
 
-    Raises DermisError for files that hold none, and for sets that nobody knows.
+    size : width and height of the photograph, for MediaPipe's relative coordinates [pixel]
+
+    Raises DermisError for files without landmarks, and for unknown sets.
     """
     text = read_text(path, _EXPECTED)
     if Path(path).suffix.lower() == ".json":
-        name, found = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
+        name, solution = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
     else:
         with parsing(path, _EXPECTED, KeyError, TypeError, csv.Error):
             rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
-        found = {str(one): np.array([x, y]) for one, x, y in rows}
-        name = _BY_COUNT.get(len(found), "")
-    if len(found) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in found.values()):
-        refuse(path, f"{_MIN_LANDMARKS} landmarks at least", f"got {len(found)}", "Correct the file")
+        solution = {str(one): np.array([x, y]) for one, x, y in rows}
+        name = _BY_COUNT.get(len(solution), "")
+    if len(solution) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in solution.values()):
+        refuse(path, f"{_MIN_LANDMARKS} landmarks at least", f"got {len(solution)}", "Correct the file")
     if name not in SETS:
         expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
-        refuse(path, expected, f"got {len(found)}", "Give all of a set")
-    return name, found
+        refuse(path, expected, f"got {len(solution)}", "Give all of a set")
+    return name, solution
 
 
 def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Return the landmarks of `dermis render --landmarks`, or of MediaPipe as shares of width and height."""
+    """Return the landmarks of `dermis render --landmarks`, or MediaPipe's in relative coordinates."""
     with parsing(path, _EXPECTED, KeyError, TypeError, IndexError):
         if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
             name, rows = next(iter(data["landmarks"].items()))
             return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
         while not (isinstance(data, list) and data and isinstance(data[0], Mapping) and "x" in data[0]):
-            nested = isinstance(data, Mapping)  # else a list of faces, of which the first one counts
+            nested = isinstance(data, Mapping)  # else a list of faces, of which the first one is used
             data = data[next(key for key in _MEDIAPIPE if key in data) if nested else 0]
         pixels = np.array([[one["x"], one["y"]] for one in data], np.float64) * size - 0.5
     return _BY_COUNT.get(len(pixels), ""), {str(k): pixel for k, pixel in enumerate(pixels)}

@@ -13,22 +13,22 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-SUN_DIAMETER_DEGREES = 0.53
-"""Angle that the sun spans, for shadows."""
+SUN_DEGREES = 0.53
+"""Angular diameter of the sun, for shadows."""
 
 
 @dataclass(frozen=True)
 class SkinUnknown:
-    """Number of the skin, fitted as its logarithm.
+    """Unknown of the skin, fitted as its logarithm.
 
-    usual, spread : prior: median, and standard deviation of the logarithm
+    prior_median, prior_sd : median of the prior, and standard deviation of its logarithm
     low, high : limits
     step : of finite differences, in the logarithm
     """
 
     name: str
-    usual: float
-    spread: float
+    prior_median: float
+    prior_sd: float
     low: float
     high: float
     step: float
@@ -40,23 +40,23 @@ SKIN_UNKNOWNS = (
     SkinUnknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
     SkinUnknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
 )
-"""Artist's beliefs, wide ones: the spread of melanin is that of all peoples, roughness that of the face's
-regions; strength is between a dry skin's and a smooth boundary's. `rho_s` is what oil changes."""
+"""Unknowns with wide priors: melanin varies as over all populations, roughness as over the regions of a face,
+and `rho_s`, which depends on oil, between dry skin and a smooth boundary."""
 _PROFILE_STEP = 0.25
-"""Steps of the logarithms of pigments between which widths do not change: profiles take long."""
+"""Step to which logarithms of pigments are rounded for the profile, whose computation is slow."""
 SUN_STEP = 0.02
-"""Of finite differences of a sun's direction [rad]."""
+"""Step of finite differences of a sun's direction [rad]."""
 SUN_SD = 1.0
 WHITE_SD = 0.2
-"""Of the logarithm of red and of blue over green, where the light's colour is looked for."""
+"""Prior standard deviation of the logarithms of red and blue over green of the light."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitPoint:
     """Values of all unknowns except the strengths of lights.
 
-    logs : (4,) logarithms of `SKIN`
-    suns : (k, 3) unit vectors towards them
+    logs : (4,) logarithms of `SKIN_UNKNOWNS`
+    suns : (k, 3) unit vectors towards the suns
     white : (2,) logarithms of red and blue over green of the light
     """
 
@@ -65,28 +65,28 @@ class FitPoint:
     white: Floats
 
     def values(self) -> dict[str, float]:
-        """Return the numbers of the skin by name."""
+        """Return the values of the skin by name."""
         return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
-    def moved(self, step: Floats) -> FitPoint:
-        """Return another point within the limits.
+    def stepped(self, step: Floats) -> FitPoint:
+        """Return the point after a step, within the limits.
 
         step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
         """
         skin, count = len(SKIN_UNKNOWNS), len(self.suns)
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
-        turns = step[skin : skin + 2 * count].reshape(count, 2)
-        moved = self.suns + np.einsum("kt,ktc->kc", turns, tangents(self.suns))
+        sun_steps = step[skin : skin + 2 * count].reshape(count, 2)
+        stepped = self.suns + np.einsum("kt,ktc->kc", sun_steps, tangents(self.suns))
         return FitPoint(
             np.clip(self.logs + step[:skin], low, high),
-            moved / np.linalg.norm(moved, axis=1, keepdims=True),
+            stepped / np.linalg.norm(stepped, axis=1, keepdims=True),
             self.white + step[skin + 2 * count :],
         )
 
 
 def prior_point(suns: Floats) -> FitPoint:
-    """Return the means of the priors."""
-    return FitPoint(np.log([one.usual for one in SKIN_UNKNOWNS]), suns, np.zeros(2))
+    """Return the point at the medians of the priors."""
+    return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), suns, np.zeros(2))
 
 
 def tangents(towards: Floats) -> Floats:
@@ -100,28 +100,29 @@ def tangents(towards: Floats) -> Floats:
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
     """Return the scene with the skin of a point.
 
-    Painted people are painted with these pigments, and light spreads below as far as pigments near them let
-    it; other heads take the colour of the pigments' profile all over, for what pigments a colour map was made
-    of is not known.
+    Painted people are painted with these pigments, and their profile is that of pigments rounded to a coarse
+    grid. Other heads get the uniform colour of the pigments' profile, since the pigments of their colour map
+    are unknown.
     """
-    found = point.values()
-    changed: dict[str, object] = {name: found[name] for name in ("roughness", "rho_s")}
-    changed |= {"oiliness": 0.0, "profile": "spectral"}
+    numbers = point.values()
+    skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}
+    skin_values |= {"oiliness": 0.0, "profile": "spectral"}
     if isinstance(maps := scene.head.maps, PaintedMaps):
-        look = replace(maps.look, melanin=found["melanin"], blood=found["blood"])
+        look = replace(maps.look, melanin=numbers["melanin"], blood=numbers["blood"])
         head = replace(scene.head, maps=replace(maps, look=look))
         melanin, blood = np.exp(_PROFILE_STEP * np.rint(point.logs[:2] / _PROFILE_STEP))
     else:
-        head, melanin, blood = scene.head, found["melanin"], found["blood"]
-        changed["albedo"] = "profile"
+        head, melanin, blood = scene.head, numbers["melanin"], numbers["blood"]
+        skin_values["albedo"] = "profile"
     held = (scene.skin.pigments or Pigments()).model_dump()
-    own = Pigments(**(held | {"melanin": float(melanin), "blood": float(blood)}))
-    return replace(scene, head=head, skin=Skin(**(scene.skin.model_dump() | changed | {"pigments": own})))
+    pigments = Pigments(**(held | {"melanin": float(melanin), "blood": float(blood)}))
+    skin = Skin(**(scene.skin.model_dump() | skin_values | {"pigments": pigments}))
+    return replace(scene, head=head, skin=skin)
 
 
 def sun_lights(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
-    """Return suns of a colour (3,) and strengths (k,), irradiance at normal incidence."""
+    """Return directional lights of a colour (3,) and strengths (k,), their irradiance at normal incidence."""
     return [
-        DirectionalLight(direction=tuple(-way), irradiance=tuple(float(s) * white), angle_degrees=SUN_DIAMETER_DEGREES)
-        for way, s in zip(towards, strengths, strict=True)
+        DirectionalLight(direction=tuple(-sun), irradiance=tuple(float(s) * white), angle_degrees=SUN_DEGREES)
+        for sun, s in zip(towards, strengths, strict=True)
     ]

@@ -1,1 +1,1 @@
-"""From the colours of skin back to what it is made of."""
+"""Pigments from skin colours: melanin and blood of colour maps, and recolouring."""

@@ -1,4 +1,4 @@
-"""Unmixing and recolouring of pictures on a device, in strips; separation of slow shading."""
+"""Unmixing and recolouring of pictures on a device in strips, and estimation of slow shading."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dermis.gpu import (
     ComputeProgram,
     Device,
     MutableBindings,
-    UniformRecord,
     Texture,
+    UniformRecord,
     cached_program,
     download,
     make_texture,
 )
-from dermis.gpu.program import declared
+from dermis.gpu.program import used_constants
 from dermis.gpu.textures import texture_from_array, upload
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import SkinParameters
@@ -30,91 +30,97 @@ from dermis.optics.pigments.parameters import SkinParameters
 Pixels = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
 _FOLDER = Path(__file__).parent
-_GUESS_SIDE = 96  # of the grid of first guesses
+_GUESS_SIDE = 96  # of the grid of initial guesses
 _MAX_STEPS = 8
-_STRIP_TEXELS = 1 << 22  # texels, of 16 bytes each in five textures
+_STRIP_TEXELS = 1 << 22  # of 16 bytes each in five textures
 _FORMAT = "rgba32float"
 
 
 class Unmixer:
-    """Inverse of a skin model on a device: colours to melanin and blood.
+    """Inverse of a skin model on a device, from colours to melanin and blood.
 
-    noise : standard deviation of a channel, relative [-]
+    noise : relative standard deviation of a channel [-]
     """
 
     def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
         self.device, self.model, self.noise = device, model, noise
         self._table = _table_texture(device, model)
-        self._found: tuple[Texture, Texture] | None = None
-        self._starts = device.storage_buffer(8 * _GUESS_SIDE**2, "first guesses")
+        self._outputs: tuple[Texture, Texture] | None = None
+        self._guesses = device.storage_buffer(8 * _GUESS_SIDE**2, "initial guesses")
         shader = _program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
         frame.compute("start", shader, self._bound(shader, 0), (_GUESS_SIDE, _GUESS_SIDE))
         frame.submit()
 
-    def unmix(self, colours: Pixels, told: ProgressCallback = lambda done, of: None) -> tuple[Pixels, Pixels, Pixels]:
-        """Return melanin, blood and the third number (h, w, 3) of colours (h, w, 3), the standard deviations
-        of the first two (h, w, 2), and the residual (h, w, 3).
+    def unmix(
+        self, colours: Pixels, progress: ProgressCallback = lambda done, of: None
+    ) -> tuple[Pixels, Pixels, Pixels]:
+        """Return pigments (h, w, 3), standard deviations (h, w, 2) and residual (h, w, 3) of colours.
+
+        The pigments are melanin, blood and the third unknown; the standard deviations are those of the first
+        two.
         """
         height, width = colours.shape[:2]
-        made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
+        estimate, sd, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in row_strips(height, width):
             frame = CommandList(self.device, timed=False)
             strip = texture_from_array(self.device, _rgba(colours[rows]), _FORMAT, "colours")
             textures = self.record(frame, strip)
             frame.submit()
-            shares, left = (download(self.device, texture) for texture in textures)
-            made[rows, :, :2], unsure[rows] = shares[..., :2], shares[..., 2:]
-            made[rows, :, 2], residual[rows] = left[..., 3], left[..., :3]
-            told(rows.stop, height)
-        return made, unsure, residual
+            fractions, residual_and_third = (download(self.device, texture) for texture in textures)
+            estimate[rows, :, :2], sd[rows] = fractions[..., :2], fractions[..., 2:]
+            estimate[rows, :, 2], residual[rows] = residual_and_third[..., 3], residual_and_third[..., :3]
+            progress(rows.stop, height)
+        return estimate, sd, residual
 
     def record(self, frame: CommandList, colours: Texture) -> tuple[Texture, Texture]:
-        """Record the pass from a texture of colours to melanin, blood and their standard deviations, and to
-        the residual with the third number; the textures are reused for the next of the same size.
+        """Record the pass from a texture of colours to two textures of results.
+
+        The first one has melanin, blood and their standard deviations, the second one the residual and the
+        third unknown. They are reused by the next call with the same size.
         """
         size = colours.size[:2]
         shader = _program(self.device, "unmix", self.model)
-        if self._found is None or self._found[0].size[:2] != size:
-            self._found = make_texture(self.device, size, _FORMAT), make_texture(self.device, size, _FORMAT)
-        shares, residual = self._found
-        bound = {"colours": colours, "shares": shares, "residual": residual}
+        if self._outputs is None or self._outputs[0].size[:2] != size:
+            self._outputs = make_texture(self.device, size, _FORMAT), make_texture(self.device, size, _FORMAT)
+        fractions, residual = self._outputs
+        bound = {"colours": colours, "fractions": fractions, "residual": residual}
         frame.compute("unmix", shader, bound | self._bound(shader, _MAX_STEPS), size)
-        return shares, residual
+        return fractions, residual
 
     def _bound(self, shader: ComputeProgram, steps: int) -> MutableBindings:
         record = _model_record(shader, self.model, self.noise, steps)
-        return {"model": record, "table": self._table, "starts": self._starts}
+        return {"model": record, "table": self._table, "guesses": self._guesses}
 
 
 def recolour(
-    device: Device, model: SkinModel, made: Pixels, residual: Pixels, factors: Floats, added: Floats
+    device: Device, model: SkinModel, estimate: Pixels, residual: Pixels, factors: Floats, added: Floats
 ) -> Pixels:
-    """Return the colours (h, w, 3) of the model's skins with a residual (h, w, 3).
+    """Return the colours (h, w, 3) of the model for changed pigments, times the residual (h, w, 3).
 
-    made : (h, w, 3) melanin, blood and the third number
+    estimate : (h, w, 3) melanin, blood and the third unknown
     factors, added : (3,) applied to each of them, in this order
     """
     table, shader = _table_texture(device, model), _program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added)
-    found = np.empty(residual.shape, np.float32)
-    for rows in row_strips(*made.shape[:2]):
-        first, second = (
-            texture_from_array(device, _rgba(one[rows]), _FORMAT, "maps") for one in (made, residual)
-        )
-        size = first.size[:2]
+    output = np.empty(residual.shape, np.float32)
+    for rows in row_strips(*estimate.shape[:2]):
+        inputs = [
+            texture_from_array(device, _rgba(one[rows]), _FORMAT, "maps") for one in (estimate, residual)
+        ]
+        size = inputs[0].size[:2]
         texture = make_texture(device, size, _FORMAT)
-        bound: MutableBindings = {"model": _model_record(shader, model, 1.0, 0), "table": table, "change": change}
-        bound |= {"made": first, "residual": second, "recoloured": texture}
+        bound: MutableBindings = {"model": _model_record(shader, model, 1.0, 0), "table": table}
+        bound |= {"estimate": inputs[0], "residual": inputs[1], "recoloured": texture, "change": change}
         frame = CommandList(device, timed=False)
         frame.compute("recolour", shader, bound, size)
         frame.submit()
-        found[rows] = download(device, texture)[..., :3]
-    return found
+        output[rows] = download(device, texture)[..., :3]
+    return output
 
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
-    """Return the strips of rows of a picture, few enough for a device's memory."""
+    """Return strips of rows of a picture that fit in a device's memory."""
     rows = max(1, _STRIP_TEXELS // width)
     return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
 
@@ -124,7 +130,7 @@ def _rgba(colours: Pixels) -> Pixels:
 
 
 def _table_texture(device: Device, model: SkinModel) -> Texture:
-    layers = [_rgba(layer.astype(np.float32)) for layer in model.logs]
+    layers = [_rgba(layer.astype(np.float32)) for layer in model.log_colours]
     texture = make_texture(device, layers[0].shape[1::-1], _FORMAT, layers=len(layers), use="map")
     for number, layer in enumerate(layers):
         upload(device, texture, layer, layer=number)
@@ -132,63 +138,65 @@ def _table_texture(device: Device, model: SkinModel) -> Texture:
 
 
 def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
-    thirds, nodes = model.logs.shape[:2]
+    thirds, nodes = model.log_colours.shape[:2]
     numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _GUESS_SIDE}
     path = _FOLDER / f"{name}.wgsl"
-    constants = declared(path, (), tuple(numbers.items()))
+    constants = used_constants(path, (), tuple(numbers.items()))
     make = partial(ComputeProgram, device, path, (), constants)
     return cached_program(device, ("unmixing", name), tuple(constants.items()), make)
 
 
 def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> UniformRecord:
-    numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": skins.COLOUR_FLOOR}
-    believed = {"blood": (skins.BLOOD_ROOT_MEAN, skins.BLOOD_ROOT_SD), "darkest": skins.MIN_REFLECTANCE}
-    return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)
+    priors = {"prior_mean": model.prior_mean, "prior_sd": model.prior_sd}
+    priors |= {"blood_mean": skins.BLOOD_ROOT_MEAN, "blood_sd": skins.BLOOD_ROOT_SD}
+    limits = {"floor": skins.COLOUR_FLOOR, "min_reflectance": skins.MIN_REFLECTANCE}
+    numbers = {"third_range": model.third_range, "noise": noise, "steps": steps}
+    return shader.record("Model", **numbers, **priors, **limits)
 
 
-_SHADING_SIDE = 256  # of the picture that is looked at
-_SHADING_SIGMA = 1.0 / 24.0  # of the longer side: standard deviation of the blur
+_SHADING_SIDE = 256  # of the downsampled picture [texels]
+_SHADING_SIGMA = 1.0 / 24.0  # standard deviation of the blur over the longer side
 
 
 def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
-    """Return the shading of each texel (h, w), 1 on average over the skin [-].
+    """Return the shading of each texel (h, w), with mean 1 over the skin [-].
 
-    Each texel of a smaller picture has the brightness that its melanin and blood do not explain; its low
-    frequencies are kept, weighted by how well the colour fits a skin.
+    It is the brightness of a downsampled picture that melanin and blood do not explain, low-pass filtered
+    with weights by how well each colour matches a skin.
     """
     small = _block_means(colours)
-    made, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
-    off = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / noise**2
-    weight = (1.0 / (1.0 + off)) * (small.min(axis=-1) > 0.0)
-    slow = _weighted_blur(made[..., 2].astype(np.float64), weight.astype(np.float64))
-    mean = float((slow * weight).sum() / max(float(weight.sum()), 1e-12))
-    return _upsampled(np.exp(slow - mean), (colours.shape[0], colours.shape[1]))
+    estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
+    misfit = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / noise**2
+    weight = (1.0 / (1.0 + misfit)) * (small.min(axis=-1) > 0.0)
+    smooth = _weighted_blur(estimate[..., 2].astype(np.float64), weight.astype(np.float64))
+    mean = float((smooth * weight).sum() / max(float(weight.sum()), 1e-12))
+    return _upsampled(np.exp(smooth - mean), (colours.shape[0], colours.shape[1]))
 
 
 def _block_means(colours: Pixels) -> Pixels:
-    """Return means of blocks of texels."""
-    apart = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
-    height, width = (max(1, side // apart) for side in colours.shape[:2])
-    whole = colours[: height * apart, : width * apart] if apart > 1 else colours
-    rows, columns = min(apart, colours.shape[0]), min(apart, colours.shape[1])
-    return np.asarray(whole.reshape(height, rows, width, columns, 3).mean(axis=(1, 3)), np.float32)
+    """Return means over blocks of texels."""
+    block = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
+    height, width = (max(1, side // block) for side in colours.shape[:2])
+    cropped = colours[: height * block, : width * block] if block > 1 else colours
+    rows, columns = min(block, colours.shape[0]), min(block, colours.shape[1])
+    return np.asarray(cropped.reshape(height, rows, width, columns, 3).mean(axis=(1, 3)), np.float32)
 
 
 def _weighted_blur(values: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
     from scipy.ndimage import gaussian_filter
 
     sigma = _SHADING_SIGMA * max(values.shape)
-    both = [gaussian_filter(one, sigma, mode="nearest") for one in (values * weight, weight)]
-    return np.asarray(both[0] / np.maximum(both[1], 1e-6))
+    blurred = [gaussian_filter(one, sigma, mode="nearest") for one in (values * weight, weight)]
+    return np.asarray(blurred[0] / np.maximum(blurred[1], 1e-6))
 
 
 def _upsampled(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
     """Return a picture interpolated bilinearly between the centres of blocks."""
     from scipy.ndimage import map_coordinates
 
-    found = np.empty(shape, np.float32)
+    output = np.empty(shape, np.float32)
     across = (np.arange(shape[1]) + 0.5) * values.shape[1] / shape[1] - 0.5
     for row in range(shape[0]):
         down = np.full(shape[1], (row + 0.5) * values.shape[0] / shape[0] - 0.5)
-        found[row] = map_coordinates(values, [down, across], order=1, mode="nearest")
-    return found
+        output[row] = map_coordinates(values, [down, across], order=1, mode="nearest")
+    return output

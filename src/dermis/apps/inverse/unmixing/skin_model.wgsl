@@ -1,159 +1,160 @@
-// Colours of skins, and their melanin and blood by Gauss and Newton's steps; solve.py is the same in float64.
+// Skin model, and its inverse by damped Gauss-Newton steps; skin_model.py is the same in float64.
 
 override NODES: u32; // along the roots of melanin and of blood
-override THIRDS: u32; // of the third number, when the table has it
-override SHADE: bool; // whether the third number is the logarithm of a factor
+override THIRDS: u32; // nodes of the third unknown, 1 if it is not in the table
+override SHADE: bool; // whether the third unknown is the logarithm of a factor
 
 struct Model {
-    span: vec2f, // of the third number
-    usual: f32,
-    spread: f32,
-    noise: f32, // of a channel, relative
-    floor: f32, // below which no colour is known
-    darkest: f32,
+    third_range: vec2f, // limits of the third unknown
+    prior_mean: f32, // of the third unknown
+    prior_sd: f32,
+    blood_mean: f32, // prior of the root of the blood fraction
+    blood_sd: f32,
+    noise: f32, // relative standard deviation of a channel
+    floor: f32, // absolute standard deviation of a colour
+    min_reflectance: f32,
     steps: u32,
-    blood: vec2f, // what its root is believed to be, and how far from it
 }
 
-// Logarithms of a colour, and their slopes along the three unknowns.
-struct Slopes {
+// Logarithms of a colour, and their derivatives by the three unknowns.
+struct Evaluation {
     logs: vec3f,
     p: vec3f,
     q: vec3f,
     t: vec3f,
 }
 
-// What the differences of the logarithms say: curvature of half the cost, its slope downwards, the cost, and they.
-struct System {
+// Curvature of half the cost, its negative gradient, the cost, and the differences of the logarithms.
+struct NormalEquations {
     pp: f32,
     pq: f32,
     qq: f32,
     pt: f32,
     qt: f32,
     tt: f32,
-    down: vec3f,
+    descent: vec3f,
     cost: f32,
-    off: vec3f,
+    difference: vec3f,
 }
 
-struct Found {
+struct Solution {
     x: vec3f,
-    system: System,
+    system: NormalEquations,
 }
 
-const DONE: f32 = 1e-4; // a step that ends the search: the next one would be a hundredth of it
-const CURVED: f32 = 1e-6; // added to curvatures, for nodes where a number does not show
+const TOLERANCE: f32 = 1e-4; // largest step at which the search ends
+const MIN_CURVATURE: f32 = 1e-6; // added to curvatures, for nodes where an unknown has no effect
 
 @group(0) @binding(0) var<uniform> model: Model;
-@group(0) @binding(1) var table: texture_2d_array<f32>; // logarithms, across blood, down melanin, layers by third
+@group(0) @binding(1) var table: texture_2d_array<f32>; // logarithms by blood (x), melanin (y) and third unknown (layer)
 
-fn plane(third: u32, node: vec2u, share: vec2f) -> Slopes {
+fn evaluate_layer(third: u32, node: vec2u, fraction: vec2f) -> Evaluation {
     let a = textureLoad(table, node.yx, third, 0).rgb;
     let b = textureLoad(table, node.yx + vec2u(1u, 0u), third, 0).rgb;
     let c = textureLoad(table, node.yx + vec2u(0u, 1u), third, 0).rgb;
     let d = textureLoad(table, node.yx + vec2u(1u, 1u), third, 0).rgb;
-    let near = mix(a, b, share.y);
-    let far = mix(c, d, share.y);
+    let near = mix(a, b, fraction.y);
+    let far = mix(c, d, fraction.y);
     let scale = f32(NODES - 1u);
-    return Slopes(mix(near, far, share.x), scale * (far - near), scale * mix(b - a, d - c, share.x), vec3f(0.0));
+    return Evaluation(mix(near, far, fraction.x), scale * (far - near), scale * mix(b - a, d - c, fraction.x), vec3f(0.0));
 }
 
-fn slopes_at(x: vec3f) -> Slopes {
-    let place = clamp(x.xy, vec2f(0.0), vec2f(1.0)) * f32(NODES - 1u);
-    let node = min(vec2u(place), vec2u(NODES - 2u));
-    let share = place - vec2f(node);
+fn evaluate(x: vec3f) -> Evaluation {
+    let position = clamp(x.xy, vec2f(0.0), vec2f(1.0)) * f32(NODES - 1u);
+    let node = min(vec2u(position), vec2u(NODES - 2u));
+    let fraction = position - vec2f(node);
     if (THIRDS == 1u) {
-        var found = plane(0u, node, share);
+        var result = evaluate_layer(0u, node, fraction);
         if (SHADE) {
-            found.logs += x.z;
-            found.t = vec3f(1.0);
+            result.logs += x.z;
+            result.t = vec3f(1.0);
         }
-        return found;
+        return result;
     }
-    let scale = f32(THIRDS - 1u) / (model.span.y - model.span.x);
-    let height = clamp((x.z - model.span.x) * scale, 0.0, f32(THIRDS - 1u));
-    let under = min(u32(height), THIRDS - 2u);
-    let w = height - f32(under);
-    let low = plane(under, node, share);
-    let high = plane(under + 1u, node, share);
+    let scale = f32(THIRDS - 1u) / (model.third_range.y - model.third_range.x);
+    let height = clamp((x.z - model.third_range.x) * scale, 0.0, f32(THIRDS - 1u));
+    let lower = min(u32(height), THIRDS - 2u);
+    let w = height - f32(lower);
+    let low = evaluate_layer(lower, node, fraction);
+    let high = evaluate_layer(lower + 1u, node, fraction);
     let t = scale * (high.logs - low.logs);
-    return Slopes(mix(low.logs, high.logs, w), mix(low.p, high.p, w), mix(low.q, high.q, w), t);
+    return Evaluation(mix(low.logs, high.logs, w), mix(low.p, high.p, w), mix(low.q, high.q, w), t);
 }
 
-// One over the variances of a colour's logarithms.
-fn weights_of(colour: vec3f) -> vec3f {
-    let unsure = model.floor / max(colour, vec3f(model.darkest));
-    return 1.0 / (model.noise * model.noise + unsure * unsure);
+// Return the inverse variances of a colour's logarithms.
+fn inverse_variances(colour: vec3f) -> vec3f {
+    let absolute = model.floor / max(colour, vec3f(model.min_reflectance));
+    return 1.0 / (model.noise * model.noise + absolute * absolute);
 }
 
-fn system_at(x: vec3f, logs: vec3f, weights: vec3f) -> System {
-    let there = slopes_at(x);
-    let off = logs - there.logs;
-    let bled = (x.y - model.blood.x) / model.blood.y;
+fn normal_equations(x: vec3f, logs: vec3f, weights: vec3f) -> NormalEquations {
+    let current = evaluate(x);
+    let difference = logs - current.logs;
+    let blood_offset = (x.y - model.blood_mean) / model.blood_sd;
     let w = weights;
-    var found = System(
-        dot(w, there.p * there.p) + CURVED,
-        dot(w, there.p * there.q),
-        dot(w, there.q * there.q) + 1.0 / (model.blood.y * model.blood.y),
+    var result = NormalEquations(
+        dot(w, current.p * current.p) + MIN_CURVATURE,
+        dot(w, current.p * current.q),
+        dot(w, current.q * current.q) + 1.0 / (model.blood_sd * model.blood_sd),
         0.0,
         0.0,
         1.0,
-        vec3f(dot(w, there.p * off), dot(w, there.q * off) - bled / model.blood.y, 0.0),
-        dot(w, off * off) + bled * bled,
-        off,
+        vec3f(dot(w, current.p * difference), dot(w, current.q * difference) - blood_offset / model.blood_sd, 0.0),
+        dot(w, difference * difference) + blood_offset * blood_offset,
+        difference,
     );
     if (SHADE || THIRDS > 1u) {
-        let belief = 1.0 / (model.spread * model.spread);
-        let away = x.z - model.usual;
-        found.pt = dot(w, there.p * there.t);
-        found.qt = dot(w, there.q * there.t);
-        found.tt = dot(w, there.t * there.t) + belief;
-        found.down.z = dot(w, there.t * off) - belief * away;
-        found.cost += belief * away * away;
+        let prior_weight = 1.0 / (model.prior_sd * model.prior_sd);
+        let offset = x.z - model.prior_mean;
+        result.pt = dot(w, current.p * current.t);
+        result.qt = dot(w, current.q * current.t);
+        result.tt = dot(w, current.t * current.t) + prior_weight;
+        result.descent.z = dot(w, current.t * difference) - prior_weight * offset;
+        result.cost += prior_weight * offset * offset;
     }
-    return found;
+    return result;
 }
 
-// The third number follows from the others at each step, which leaves a system of two.
-fn reduced(s: System) -> array<f32, 5> {
+// Eliminate the third unknown, which leaves a system of two.
+fn eliminate_third(s: NormalEquations) -> array<f32, 5> {
     let a = s.pt / s.tt;
     let b = s.qt / s.tt;
-    return array<f32, 5>(s.pp - a * s.pt, s.pq - a * s.qt, s.qq - b * s.qt, s.down.x - a * s.down.z, s.down.y - b * s.down.z);
+    return array<f32, 5>(s.pp - a * s.pt, s.pq - a * s.qt, s.qq - b * s.qt, s.descent.x - a * s.descent.z, s.descent.y - b * s.descent.z);
 }
 
-// A step of Gauss and Newton, damped by Levenberg's rule.
-fn step_of(s: System, x: vec3f, damping: f32) -> vec3f {
-    let r = reduced(s);
+// Return a Gauss-Newton step with Levenberg damping.
+fn damped_step(s: NormalEquations, x: vec3f, damping: f32) -> vec3f {
+    let r = eliminate_third(s);
     let pp = r[0] * (1.0 + damping);
     let qq = r[2] * (1.0 + damping);
     var step = vec2f(qq * r[3] - r[1] * r[4], pp * r[4] - r[1] * r[3]) / max(pp * qq - r[1] * r[1], 1e-9 * pp * qq);
-    // A number at its limit is held there, and the other goes on without it.
-    let out = (x.xy + step < vec2f(0.0) & x.xy <= vec2f(0.0)) | (x.xy + step > vec2f(1.0) & x.xy >= vec2f(1.0));
-    step = select(step, vec2f(0.0, r[4] / qq), out.x);
-    step = select(step, vec2f(r[3] / pp, 0.0), out.y & !out.x);
-    return vec3f(step, (s.down.z - s.pt * step.x - s.qt * step.y) / s.tt);
+    // An unknown at its limit is fixed, and the other one is solved for without it.
+    let at_limit = (x.xy + step < vec2f(0.0) & x.xy <= vec2f(0.0)) | (x.xy + step > vec2f(1.0) & x.xy >= vec2f(1.0));
+    step = select(step, vec2f(0.0, r[4] / qq), at_limit.x);
+    step = select(step, vec2f(r[3] / pp, 0.0), at_limit.y & !at_limit.x);
+    return vec3f(step, (s.descent.z - s.pt * step.x - s.qt * step.y) / s.tt);
 }
 
-// The unknowns of a colour from a first guess.
-fn solved(start: vec3f, logs: vec3f, weights: vec3f) -> Found {
-    let low = vec3f(0.0, 0.0, model.span.x);
-    let high = vec3f(1.0, 1.0, model.span.y);
+// Solve for the unknowns of a colour from an initial guess.
+fn solve(start: vec3f, logs: vec3f, weights: vec3f) -> Solution {
+    let low = vec3f(0.0, 0.0, model.third_range.x);
+    let high = vec3f(1.0, 1.0, model.third_range.y);
     var best = start;
-    var there = system_at(start, logs, weights);
+    var current = normal_equations(start, logs, weights);
     var damping = 1e-3;
     for (var i = 0u; i < model.steps; i++) {
-        let x = clamp(best + step_of(there, best, damping), low, high);
-        let s = system_at(x, logs, weights);
-        let better = s.cost <= there.cost;
-        let done = all(abs(x - best) < vec3f(DONE));
+        let x = clamp(best + damped_step(current, best, damping), low, high);
+        let s = normal_equations(x, logs, weights);
+        let better = s.cost <= current.cost;
+        let converged = all(abs(x - best) < vec3f(TOLERANCE));
         damping *= select(16.0, 0.1, better);
         if (better) {
             best = x;
-            there = s;
+            current = s;
         }
-        if (done) {
+        if (converged) {
             break;
         }
     }
-    return Found(best, there);
+    return Solution(best, current);
 }

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, recolour, estimate_shading
+from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, estimate_shading, recolour
 from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
+from dermis.base.renamed import successor
 from dermis.formats.maps import colour_map
 from dermis.gpu import Device
 from dermis.gpu.failures import LazyDevice
@@ -28,27 +29,27 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 Pixels = NDArray[np.float32]
 DEFAULT_NOISE = 0.01
 MAX_SKIN_DELTA_E = 5.0
-"""CIEDE2000 from the model's nearest colour up to which a texel counts as skin."""
+"""Largest CIEDE2000 difference from the model's nearest colour at which a texel counts as skin."""
 _DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
-_SUMMARY_SIDE = 512  # texels along the longer side, for the table
+_SUMMARY_SIDE = 512  # texels along the longer side, for the summary
 _NOISE_RANGE = 1e-4, 0.5
-_BLACK_LEVEL = 1e-3  # as between the charts of a map
-_MAX_LOG_RESIDUAL = 0.15  # largest logarithm of a residual that counts for medians
+_BLACK_LEVEL = 1e-3  # for texels between the charts of a map
+_MAX_LOG_RESIDUAL = 0.15  # of texels that count for medians
 _FACTOR_RANGE = 0.0, 100.0
 
 
 @dataclass(frozen=True)
 class FractionChange:
-    """Change of a map of shares: a factor, or another median.
+    """Change of a map of volume fractions: a factor, or another median.
 
-    A larger median adds a constant, because a factor would multiply the noise of pale skin; a smaller one
+    A larger median adds a constant, because a factor would amplify the noise of pale skin; a smaller one
     multiplies.
     """
 
     factor: float = 1.0
     median: float | None = None
 
-    def over(self, median: float) -> tuple[float, float]:
+    def scale_and_offset(self, median: float) -> tuple[float, float]:
         """Return the factor for a map of this median, and the constant that is then added."""
         if self.median is None:
             return self.factor, 0.0
@@ -59,9 +60,9 @@ class FractionChange:
 
 @dataclass(frozen=True)
 class PigmentChange:
-    """Change of the pigments of a skin; None keeps one.
+    """Change of the pigments of a skin; None leaves a value unchanged.
 
-    oxygen, eumelanin : shares, as of `SkinParameters` [-]
+    oxygen, eumelanin : fractions, as in `SkinParameters` [-]
     """
 
     melanin: FractionChange = FractionChange()
@@ -69,42 +70,47 @@ class PigmentChange:
     oxygen: float | None = None
     eumelanin: float | None = None
 
-    def of(self, skin: SkinParameters) -> SkinParameters:
-        """Return a skin with the given oxygen and eumelanin."""
-        given = {name: getattr(self, name) for name in ("oxygen", "eumelanin")}
-        return replace(skin, **{name: one for name, one in given.items() if one is not None})
+    def applied_to(self, skin: SkinParameters) -> SkinParameters:
+        """Return a skin with the changed oxygen and eumelanin."""
+        changed = {name: getattr(self, name) for name in ("oxygen", "eumelanin")}
+        return replace(skin, **{name: one for name, one in changed.items() if one is not None})
 
-    def over(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Return factors and constants for melanin, blood and the third number of maps of these medians."""
-        factors, added = zip(self.melanin.over(melanin), self.blood.over(blood), (1.0, 0.0), strict=True)
+    def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
+        """Return factors and constants for melanin, blood and the third unknown, by medians of the maps."""
+        factors, added = zip(
+            self.melanin.scale_and_offset(melanin),
+            self.blood.scale_and_offset(blood),
+            (1.0, 0.0),
+            strict=True,
+        )
         return np.array(factors), np.array(added)
 
 
-def parse_fraction_change(option: str, words: str) -> FractionChange:
-    """Parse x2 as a factor, 0.1 as a median.
+def parse_fraction_change(option: str, text: str) -> FractionChange:
+    """Parse x2 as a factor and 0.1 as a median.
 
     Raises DermisError for anything else.
     """
-    factor = words[:1] in "x×*" and bool(words)
+    factor = text[:1] in "x×*" and bool(text)
     try:
-        value = float(words[1:] if factor else words)
+        value = float(text[1:] if factor else text)
     except ValueError:
-        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {words!r}", "Correct it")
+        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {text!r}", "Correct it")
     if factor:
         return FractionChange(factor=checked_number(option, value, *_FACTOR_RANGE, "a factor"))
-    return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a share of the volume"))
+    return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a volume fraction"))
 
 
 @dataclass(frozen=True, eq=False)
 class UnmixResult:
     """Pigments of a picture of skin. All maps are (h, w), row 0 at the top.
 
-    melanin, blood : shares of the volume of epidermis and dermis [-]
-    melanin_sd, blood_sd : standard deviations that noise leaves at least, by the Cramér-Rao bound [-]
-    third : oxygen, the share of haemoglobin that carries it, where it was requested [-]
-    shading : (h, w) shading by which the colours were divided, where it was requested [-]
-    residual : (h, w, 3) colour divided by that of the model: paint, hair, and all else that is no skin [-]
-    devices : that the skin was computed on, by requested adapter; they stay open
+    melanin, blood : volume fractions of melanosomes in the epidermis and of blood in the dermis [-]
+    melanin_sd, blood_sd : lower bounds of their standard deviations due to noise, by the Cramér-Rao bound [-]
+    third : oxygenated fraction of haemoglobin, if it was requested [-]
+    shading : shading that the colours were divided by, if it was requested [-]
+    residual : (h, w, 3) colour over that of the model: paint, hair, and all else that is not skin [-]
+    devices : devices used so far, by requested adapter; they stay open
     """
 
     melanin: Pixels
@@ -122,52 +128,54 @@ class UnmixResult:
         """Return the maps that exist, by the names of their files."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
-        further = {"oxygen": self.third, "shading": self.shading}
-        return named | {name: one for name, one in further.items() if one is not None}
+        optional = {"oxygen": self.third, "shading": self.shading}
+        return named | {name: one for name, one in optional.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
-        """Return medians over the skin, errors of the reconstruction, and the share of skin.
+        """Return medians over the skin, errors of the reconstruction, and the fraction of skin.
 
-        Of every n-th texel, so that 512 are taken along the longer side; black is no skin.
+        They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
+        skin.
         """
-        apart = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
-        maps = {name: one[::apart, ::apart].astype(np.float64) for name, one in self.maps().items()}
-        shares = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
-        back = self.model.colours(shares["melanin"], shares["blood"], shares.get("oxygen"))
-        colours = back * maps["residual"].reshape(-1, 3)
-        off = delta_e_2000(back, colours)
-        skin = (off <= MAX_SKIN_DELTA_E) & (colours.max(axis=-1) > _BLACK_LEVEL)
-        found: dict[str, Any] = {"texels": int(off.size), "skin": float(skin.mean())}
+        step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
+        maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
+        fractions = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
+        model_colours = self.model.colours(fractions["melanin"], fractions["blood"], fractions.get("oxygen"))
+        colours = model_colours * maps["residual"].reshape(-1, 3)
+        delta_e = delta_e_2000(model_colours, colours)
+        skin = (delta_e <= MAX_SKIN_DELTA_E) & (colours.max(axis=-1) > _BLACK_LEVEL)
+        result: dict[str, Any] = {"texels": int(delta_e.size), "skin": float(skin.mean())}
         if skin.any():
-            above = {f"above_{limit:g}": float((off > limit).mean()) for limit in _DELTA_E_LIMITS}
-            found["delta_e"] = _percentiles(off[skin]) | above
-            for name, share in shares.items():
+            above = {f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _DELTA_E_LIMITS}
+            result["delta_e"] = _percentiles(delta_e[skin]) | above
+            for name, share in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
-                found[name] = _percentiles(share[skin]) | sd
-        return found
+                result[name] = _percentiles(share[skin]) | sd
+        return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
         """Return the colours (h, w, 3), linear Rec. 709, of the same skin with other pigments.
 
-        The residual stays, as does shading that was not removed.
+        The residual is kept, and so is shading that was not removed.
 
         Raises DermisError as `dermis.gpu.open_device`.
         """
-        kept = self.devices.setdefault(adapter, LazyDevice(adapter))
-        return kept.run(lambda device: self._recoloured(device, change))
+        lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
+        return lazy_device.run(lambda device: self._recoloured(device, change))
 
     def _recoloured(self, device: Device, change: PigmentChange) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
-        target = skin_model(change.of(self.skin), "none") if fixed else self.model
-        usual = np.broadcast_to(np.float32(target.usual), self.melanin.shape)
-        third = usual if fixed or self.third is None else self.third
+        target = skin_model(change.applied_to(self.skin), "none") if fixed else self.model
+        prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
+        third = prior_mean if fixed or self.third is None else self.third
         made = np.stack([self.melanin, self.blood, third], axis=-1)
-        factors, added = change.over(self._median(self.melanin), self._median(self.blood))
+        factors, added = change.scales_and_offsets(self._median(self.melanin), self._median(self.blood))
         return recolour(device, target, made, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
-        """Return a mask (h, w) of texels whose colour is near one of the model's."""
-        return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK_LEVEL))).max(axis=-1) < _MAX_LOG_RESIDUAL)
+        """Return the mask (h, w) of texels whose colour is near one of the model's."""
+        logs = np.log(np.maximum(self.residual, _BLACK_LEVEL))
+        return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
     def _median(self, share: Pixels) -> float:
         """Return the median over the skin."""
@@ -188,72 +196,111 @@ def unmix(
     noise: float = DEFAULT_NOISE,
     shading: bool = False,
     adapter: str = "auto",
-    told: Callable[[int, int], None] = lambda done, of: None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> UnmixResult:
-    """Return melanin and blood of a picture of skin colour: an albedo map of a scan or by an artist.
+    """Return melanin and blood of a picture of skin colour, such as the albedo map of a scan.
 
-    picture : a file (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance, linear Rec. 709
-    skin : of the model; its melanin and blood are ignored, its thickness, eumelanin and oxygen are held
-    third : "oxygen" finds that too, as far as colour and what is usual tell: 0.1 of standard deviation around
-        the skin's own; "none" holds it
-    noise : standard deviation of a channel, relative [-]
-    shading : whether to estimate low-frequency shading, and divide by it
-    told : how many rows are done of how many
+    Parameters
+    ----------
+    picture : str, Path, EmbeddedPicture or array_like
+        File (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
+    skin : SkinParameters
+        Thickness, eumelanin and oxygen of the model's skins; its melanin and blood are ignored.
+    third : {"none", "oxygen"}
+        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior of standard deviation 0.1
+        around the skin's own value; "none" keeps that value.
+    noise : float
+        Relative standard deviation of a channel [-].
+    shading : bool
+        Whether to estimate low-frequency shading and divide by it.
+    adapter : str
+        "auto", "cpu" or part of the name of an adapter.
+    progress : callable
+        Called with the number of finished rows and the number of all rows.
 
-    Raises DermisError for what is no picture of colours, numbers that cannot be, and as
-    `dermis.gpu.open_device`.
+    Returns
+    -------
+    UnmixResult
+        Maps of the pigments, their uncertainties and the residual.
+
+    Raises
+    ------
+    DermisError
+        For files and arrays that are not colour pictures, numbers out of range, and as
+        `dermis.gpu.open_device`.
+
+    References
+    ----------
+    [DonnerJensen2006] for the pigments; docs/fit.md for the method and its accuracy.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> found = dermis.unmix([[[0.55, 0.33, 0.25]]], adapter="cpu")  # doctest: +SKIP
+    >>> found.melanin.shape  # doctest: +SKIP
+    (1, 1)
     """
     noise = checked_number("noise", noise, *_NOISE_RANGE, "relative to each channel")
     model = skin_model(skin, third)
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
-    colours = colour_map(picture) if isinstance(picture, str | Path | EmbeddedPicture) else _checked_colours(picture)
+    if isinstance(picture, str | Path | EmbeddedPicture):
+        colours = colour_map(picture)
+    else:
+        colours = _checked_colours(picture)
 
-    def job(device: Device) -> UnmixResult:
+    def run_on_device(device: Device) -> UnmixResult:
         light = estimate_shading(device, colours, skin, noise) if shading else None
-        even = colours if light is None else colours / light[..., None]
-        made, sd, residual = Unmixer(device, model, noise).unmix(even, told)
-        found = made[..., 2] if third == "oxygen" else None
+        unshaded = colours if light is None else colours / light[..., None]
+        made, sd, residual = Unmixer(device, model, noise).unmix(unshaded, progress)
+        result = made[..., 2] if third == "oxygen" else None
         maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
-        return UnmixResult(*maps, residual, found, light, skin, model, {adapter: kept})
+        return UnmixResult(*maps, residual, result, light, skin, model, {adapter: lazy_device})
 
-    kept = LazyDevice(adapter)
-    return kept.run(job)
+    lazy_device = LazyDevice(adapter)
+    return lazy_device.run(run_on_device)
 
 
 def _checked_colours(colours: ArrayLike) -> Pixels:
-    found = np.asarray(colours)
-    if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
-        actual = f"got shape {found.shape} and type {found.dtype}"
+    result = np.asarray(colours)
+    if result.ndim != 3 or result.shape[2] != 3 or not result.size or result.dtype.kind != "f":
+        actual = f"got shape {result.shape} and type {result.dtype}"
         advice = "Decode sRGB first, or give the file's name"
         refuse("colours", "floats (h, w, 3), linear Rec. 709", actual, advice)
-    if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
+    if not (np.isfinite(result).all() and result.min() >= 0.0 and result.max() <= 1.0):
         refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
-    return found.astype(np.float32, copy=False)
+    return result.astype(np.float32, copy=False)
 
 
 SUMMARY = "unmixed.json"
 
 
 def save_maps(
-    folder: Path, found: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
+    folder: Path, result: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
 ) -> list[Path]:
-    """Write each map as EXR, the summary, and the recoloured picture if any; each file whole or not at all.
+    """Write each map as EXR, the summary, and the recoloured picture if any, each file atomically.
 
     linear : whether the recoloured picture is written as EXR rather than PNG
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
     written = []
-    for name, values in found.maps().items():
+    for name, values in result.maps().items():
         path = folder / f"{name}.exr"
-        with atomic_file(path) as trial:
-            trial.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
+        with atomic_file(path) as file:
+            file.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
         written.append(path)
     if recoloured is not None:
         path = folder / ("recoloured.exr" if linear else "recoloured.png")
         write_image(path, recoloured)
         written.append(path)
-    with atomic_file(folder / SUMMARY) as trial:
-        trial.write_text(json.dumps(found.summary(), indent=2) + "\n", encoding="utf-8")
+    with atomic_file(folder / SUMMARY) as file:
+        file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
     return [*written, folder / SUMMARY]
+
+
+def __getattr__(name: str) -> Any:
+    """Return an object by its name in the last release."""
+    if new := successor(__name__, name):
+        return globals()[new]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
