@@ -11,7 +11,7 @@ Sources: Schlick1994
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.panels import plot_panel
 from dermis.apps.gallery.script import draw_script
 from dermis.specular.fresnel import dielectric, schlick
 
@@ -22,7 +22,7 @@ def draw(studio):
     scenes = [dermis.Scene(head, camera=dermis.three_quarter(head), skin=skin) for skin in skins]
     curve, exact = (studio.linear(scene) for scene in scenes)
     heads = {"Schlick": curve, "exact": exact, "20 × |difference|": 20 * np.abs(exact - curve)}
-    return {"reflectance by angle": plotted(curves)} | heads
+    return {"reflectance by angle": plot_panel(curves)} | heads
 
 
 def curves(axes):

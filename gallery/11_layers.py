@@ -8,7 +8,7 @@ Sources: Jensen2001, DonnerJensen2005, dEonLuebke2007
 """
 
 import dermis
-from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.panels import plot_panel
 from dermis.apps.gallery.script import draw_script
 
 MODELS = {"one layer (skin1)": ("skin1", "dipole"), "three layers (dj3)": ("dj3", "multipole")}
@@ -21,7 +21,7 @@ def draw(studio):
     near = dermis.portrait(head).model_copy(update={"target": (14.0, -28.0, 90.0), "frame_mm": 110.0})
     skins = {label: dermis.Skin(profile=tissue) for label, (tissue, _) in MODELS.items()}
     heads = {name: studio.render(dermis.Scene(head, [key], near, skin)) for name, skin in skins.items()}
-    return {"profiles, each over its total": plotted(curves)} | heads
+    return {"profiles, each over its total": plot_panel(curves)} | heads
 
 
 def curves(axes):

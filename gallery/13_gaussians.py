@@ -11,7 +11,7 @@ Sources: dEonLuebke2007, DonnerJensen2005
 from functools import partial
 
 import dermis
-from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.panels import plot_panel
 from dermis.apps.gallery.script import draw_script
 from dermis.optics.fits.gaussian import single_gaussian
 
@@ -31,7 +31,7 @@ def draw(studio):
         axes.legend(frameon=False)
 
     inks = enumerate(INKS.items())
-    return {name: plotted(partial(curves, channel, ink)) for channel, (name, ink) in inks}
+    return {name: plot_panel(partial(curves, channel, ink)) for channel, (name, ink) in inks}
 
 
 if __name__ == "__main__":

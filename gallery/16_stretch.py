@@ -13,7 +13,7 @@ Columns: 4
 import dermis
 from dermis.apps.gallery.script import draw_script
 
-WAYS = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
+MODES = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
 
 
 def draw(studio):
@@ -24,7 +24,7 @@ def draw(studio):
     camera = dermis.side(head).model_copy(update={"frame_mm": 130})
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=stripes, camera=camera, skin=skin)
-    panels = {label: studio.render(scene, stretch=way, transmission="none") for label, way in WAYS.items()}
+    panels = {name: studio.render(scene, stretch=mode, transmission="none") for name, mode in MODES.items()}
     return panels | {"stretch": studio.view(scene, "stretch")}
 
 

@@ -19,10 +19,10 @@ def draw(studio):
     against = "path-traced" if find_spec("mitsuba") else "surface-integral"
     settings = studio.settings(0.8, atlas=2048)
     techniques = ("none", "texture-space")
-    made = compare(studio.head(), against, techniques, light="laser", region="ear", settings=settings)
-    shown = {"dry": made.images["none"], "texture space": made.images["texture-space"]}
-    shown |= {f"truth ({against})": made.reference.image}
-    return {label: np.float32(3 * made.exposure * image) for label, image in shown.items()}
+    comparison = compare(studio.head(), against, techniques, light="laser", region="ear", settings=settings)
+    shown = {"dry": comparison.images["none"], "texture space": comparison.images["texture-space"]}
+    shown |= {f"truth ({against})": comparison.reference.image}
+    return {label: np.float32(3 * comparison.exposure * image) for label, image in shown.items()}
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ def draw(studio):
     panels = {}
     for name in dict.fromkeys((studio.name, "human")):
         head = studio.head(name)
-        places = head.mesh.positions - head.centre_mm
-        upper = places[abs(places[:, 1]) < 60]
+        positions = head.mesh.positions - head.centre_mm
+        upper = positions[abs(positions[:, 1]) < 60]
         x, y, z = (float(part) for part in upper[upper[:, 0].argmax()])
         lamp = dermis.PointLight(position=(x + 150, y + 60, z - 600), target=(x, y, z), irradiance=(9, 9, 9))
         fill = dermis.RectangleLight(position=(600, 200, 700), irradiance=(0.35, 0.37, 0.4))

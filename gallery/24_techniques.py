@@ -17,10 +17,10 @@ from dermis.scene.techniques import TECHNIQUES
 
 def draw(studio):
     settings = studio.settings(0.6)
-    made = compare(studio.head(), "surface-integral", TECHNIQUES.names, region="nose", settings=settings)
-    panels = {"the surface integral": (255 * made.tone_mapped(made.reference.image)).round().astype("uint8")}
-    for row in made.rows:
-        image = (255 * made.tone_mapped(made.images[row.technique])).round().astype("uint8")
+    comparison = compare(studio.head(), "surface-integral", TECHNIQUES.names, region="nose", settings=settings)
+    panels = {"the surface integral": (255 * comparison.tone_mapped(comparison.reference.image)).round().astype("uint8")}
+    for row in comparison.rows:
+        image = (255 * comparison.tone_mapped(comparison.images[row.technique])).round().astype("uint8")
         panels[f"{row.technique}: {row.relrmse:.1%}, {row.ms:.0f} ms"] = image
     return panels
 

@@ -9,7 +9,7 @@ Sources: DonnerJensen2006, KrishnaswamyBaranoski2004, Jacques1998
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.panels import plotted
+from dermis.apps.gallery.panels import plot_panel
 from dermis.apps.gallery.script import draw_script
 from dermis.images.colour import encode_srgb8
 
@@ -32,7 +32,7 @@ def patches(axes):
 
 
 def draw(studio):
-    return {"": plotted(patches, 2 * studio.side)}
+    return {"": plot_panel(patches, 2 * studio.side)}
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ def draw(studio):
     film = []
     for frame in range(FRAMES):
         angle = 2 * math.pi * frame / FRAMES
-        place = (1200 * math.sin(angle), 20.0, 1200 * math.cos(angle))
-        camera = dermis.portrait(head).model_copy(update={"position": place})
+        position = (1200 * math.sin(angle), 20.0, 1200 * math.cos(angle))
+        camera = dermis.portrait(head).model_copy(update={"position": position})
         film.append(studio.render(dermis.Scene(head, camera=camera), 0.8, samples=4))
     return {f"{FRAMES} frames": film}
 

@@ -22,11 +22,11 @@ def draw(studio):
     against = "path-traced" if traced else "surface-integral"  # which only sets the exposure
     settings, panels = studio.settings(0.6), {}
     for direction in ("lambertian", "half-space"):
-        made = compare(studio.head(), against, (TECHNIQUE,), settings=settings, direction=direction)
-        label = f"{direction}: {made.rows[0].relrmse:.1%}" if traced else direction
-        panels[label] = made.tone_mapped(made.images[TECHNIQUE])
+        comparison = compare(studio.head(), against, (TECHNIQUE,), settings=settings, direction=direction)
+        label = f"{direction}: {comparison.rows[0].relrmse:.1%}" if traced else direction
+        panels[label] = comparison.tone_mapped(comparison.images[TECHNIQUE])
     if traced:
-        panels["path traced"] = made.tone_mapped(made.reference.image)
+        panels["path traced"] = comparison.tone_mapped(comparison.reference.image)
     return {label: (255 * image).round().astype("uint8") for label, image in panels.items()}
 
 

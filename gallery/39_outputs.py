@@ -8,7 +8,7 @@ Columns: 7
 """
 
 import dermis
-from dermis.apps.gallery.panels import output_picture
+from dermis.apps.gallery.panels import output_image
 from dermis.apps.gallery.script import draw_script
 from dermis.scene.outputs import OUTPUTS
 
@@ -24,7 +24,7 @@ def draw(studio):
     now, settings = before.replace(pose=NOW), studio.settings()
     rendered = studio.renderer.draw(now, settings, outputs=NAMES, previous=before)
     return {"picture": rendered.srgb8()} | {
-        name: output_picture(name, rendered.output(name)) for name in NAMES
+        name: output_image(name, rendered.output(name)) for name in NAMES
     }
 
 

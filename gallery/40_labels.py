@@ -8,7 +8,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.panels import draw_landmarks, output_picture
+from dermis.apps.gallery.panels import draw_landmarks, output_image
 from dermis.apps.gallery.script import draw_script
 
 SET = "face-synthetics-70"
@@ -23,10 +23,10 @@ def draw(studio):
     camera = dermis.Camera(position=(0, 0, 1100), target=(0, -6, 0), frame_mm=250)
     scenes = [dermis.Scene(f"human:{seed}", camera=camera, pose=pose) for seed, pose in PEOPLE.items()]
     settings = studio.settings(exposure=1.5)
-    seen = list(studio.renderer.observe(scenes, settings, outputs=("label",), landmarks=(SET,)))
-    named = {f"human:{seed}": one for seed, one in zip(PEOPLE, seen, strict=True)}
+    observations = list(studio.renderer.observe(scenes, settings, outputs=("label",), landmarks=(SET,)))
+    named = {f"human:{seed}": one for seed, one in zip(PEOPLE, observations, strict=True)}
     panels = {name: draw_landmarks(one.picture, one.landmarks[SET]) for name, one in named.items()}
-    labels = {f"{name}, label": output_picture("label", one.outputs["label"]) for name, one in named.items()}
+    labels = {f"{name}, label": output_image("label", one.outputs["label"]) for name, one in named.items()}
     return panels | labels
 
 

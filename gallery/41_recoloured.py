@@ -12,24 +12,25 @@ from dataclasses import replace
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.apps.inverse.unmixing.unmix import Change, Share
+from dermis.apps.inverse.unmixing.unmix import FractionChange, PigmentChange
 
 SKINS = {
-    "as scanned": Change(),
-    "pale": Change(blood=Share(0.3)),
-    "flushed": Change(blood=Share(2.5)),
-    "cold: little oxygen": Change(oxygen=0.2, blood=Share(1.4)),
-    **{f"{100 * m:g} % melanosomes": Change(melanin=Share(median=m)) for m in (0.05, 0.12, 0.25, 0.4)},
+    "as scanned": PigmentChange(),
+    "pale": PigmentChange(blood=FractionChange(0.3)),
+    "flushed": PigmentChange(blood=FractionChange(2.5)),
+    "cold: little oxygen": PigmentChange(oxygen=0.2, blood=FractionChange(1.4)),
 }
+for median in (0.05, 0.12, 0.25, 0.4):
+    SKINS[f"{100 * median:g} % melanosomes"] = PigmentChange(melanin=FractionChange(median=median))
 
 
 def draw(studio):
     head = studio.coloured_head()
-    found, panels = dermis.unmix(head.maps.colour, adapter=studio.adapter), {}
+    skin, panels = dermis.unmix(head.maps.colour, adapter=studio.adapter), {}
     for name, change in SKINS.items():
-        colour = found.recoloured(change, studio.adapter).clip(0.0, 1.0)
-        own = replace(head, maps=replace(head.maps, colour=colour))
-        panels[name] = studio.render(dermis.Scene(own, camera=dermis.portrait(head)), scale=0.75)
+        colour = skin.recoloured(change, studio.adapter).clip(0.0, 1.0)
+        recoloured = replace(head, maps=replace(head.maps, colour=colour))
+        panels[name] = studio.render(dermis.Scene(recoloured, camera=dermis.portrait(head)), scale=0.75)
     return panels
 
 

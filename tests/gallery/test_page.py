@@ -11,17 +11,17 @@ import pytest
 from chromium_input import CHROMIUM
 
 from dermis.apps.gallery.page import _equation, write_page
-from dermis.apps.gallery.panels import sheet
-from dermis.apps.gallery.script import Panel, Picture, Script, draw_pictures, encode_webp, read_script
+from dermis.apps.gallery.panels import panel_sheet
+from dermis.apps.gallery.script import GalleryPicture, Panel, Script, draw_pictures, encode_webp, read_script
 
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
 
 
-def picture(tmp_path: Path, name: str, facts: str, **panels: Panel) -> Picture:
+def picture(tmp_path: Path, name: str, facts: str, **panels: Panel) -> GalleryPicture:
     path = tmp_path / f"{name}.py"
     path.write_text(f'"""{name} <first>.\n\nSee & believe.\n\n{facts}\n"""\n', encoding="utf-8")
     files = {caption: encode_webp(panel) for caption, panel in panels.items()}
-    return Picture(read_script(path), files, (64, 64), 1.0, 12.5)
+    return GalleryPicture(read_script(path), files, (64, 64), 1.0, 12.5)
 
 
 def plain(*colour: int) -> np.ndarray:
@@ -71,7 +71,7 @@ def test_a_fault_is_told_and_the_others_go_on(tmp_path: Path) -> None:
 
 
 def test_sheet_stands_in_rows_over_captions() -> None:
-    made = sheet({"a": plain(255, 0, 0), "b": plain(0, 255, 0), "film": [plain(0, 0, 255)]}, columns=2)
+    made = panel_sheet({"a": plain(255, 0, 0), "b": plain(0, 255, 0), "film": [plain(0, 0, 255)]}, columns=2)
     assert made.shape == (2 * (64 + 24), 128, 3)
     assert made[10, 10].tolist() == [255, 0, 0] and made[100, 10].tolist() == [0, 0, 255]
 

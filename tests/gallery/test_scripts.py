@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.apps.gallery.panels import as_bytes, still
+from dermis.apps.gallery.panels import first_frame, to_srgb8
 from dermis.apps.gallery.script import Script, find_scripts, read_script
 from dermis.apps.gallery.studio import Studio
 from dermis.base import citations as cite
@@ -48,7 +48,7 @@ def coarse_people(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_script(script: Script, studio: Studio, coarse_people: None) -> None:
     panels = script.draw(studio)
     for caption, panel in panels.items():
-        picture = as_bytes(still(panel))
+        picture = to_srgb8(first_frame(panel))
         assert picture.ndim == 3 and picture.shape[2] == 3
         assert np.ptp(picture) > 20 or "difference" in caption
     assert script.slider is None or set(script.slider) <= set(panels)

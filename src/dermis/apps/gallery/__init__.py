@@ -1,1 +1,1 @@
-"""Pictures that explain the technique: each is a script of a few lines, all together are one page."""
+"""Gallery of pictures that explain the technique: scripts of a few lines each, and one page of all."""

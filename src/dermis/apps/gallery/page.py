@@ -32,9 +32,9 @@ _TEX_SYMBOLS = {
 
 
 def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapter: str) -> None:
-    """Write the page; the file is complete or not there.
+    """Write the page atomically.
 
-    head, adapter : what the pictures show, and what drew them
+    head, adapter : names of the head in the pictures, and of the adapter that drew them
 
     Raises DermisError when it cannot be written.
     """
@@ -67,7 +67,7 @@ def _section(picture: GalleryPicture) -> str:
 
 
 def _equation(text: str) -> str:
-    """HTML of an equation in one line: _ begins a subscript, ^ a superscript."""
+    """Return HTML of an equation in one line, where _ begins a subscript and ^ a superscript."""
     low = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
 
@@ -122,7 +122,7 @@ def _short_number(value: float) -> str:
 
 
 def _deck(pictures: Sequence[GalleryPicture]) -> str:
-    """Rows of the talk with the pictures that show them and the commands that make these."""
+    """Return rows of the talk's table with the pictures that show them and their commands."""
     rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
     return "".join(_deck_row(row, pictures) for row in rows)
 
@@ -147,7 +147,7 @@ def _resource(name: str) -> str:
 
 
 def format_reference(key: str) -> str:
-    """A work in one line: authors, title, year.
+    """Return a reference in one line: authors, title, year.
 
     Raises DermisError for a key that is not in the bibliography.
     """
@@ -159,7 +159,7 @@ def format_reference(key: str) -> str:
 
 
 def _fields(entry: str) -> Iterator[tuple[str, str]]:
-    """Names and values, which may span lines and contain braces."""
+    """Yield names and values of a BibTeX entry; values may span lines and contain braces."""
     at = 0
     while found := _FIELD.search(entry, at):
         at, depth = found.end(), 1
@@ -170,9 +170,11 @@ def _fields(entry: str) -> Iterator[tuple[str, str]]:
 
 
 def _without_tex(value: str) -> str:
-    """A value without TeX markup."""
+    """Return a value without TeX markup."""
     text = value.replace("{", "").replace("}", "")
     for sign, meant in _TEX_SYMBOLS.items():
         text = text.replace(sign, meant)
-    text = _ACCENT.sub(lambda accent: unicodedata.normalize("NFC", accent[2] + _COMBINING_ACCENTS[accent[1]]), text)
+    text = _ACCENT.sub(
+        lambda accent: unicodedata.normalize("NFC", accent[2] + _COMBINING_ACCENTS[accent[1]]), text
+    )
     return " ".join(text.split())

@@ -23,21 +23,21 @@ _BAR, _TEXT, _INK, _PAPER = 24, 14, (200, 200, 206), (22, 22, 26)
 
 
 def to_srgb8(image: Image) -> Bytes:
-    """sRGB bytes of an image; floats are taken for linear light."""
+    """Return sRGB bytes of an image; floats are linear light."""
     if image.dtype == np.uint8:
         return np.asarray(image, np.uint8)
     return encode_srgb8(np.maximum(image, 0.0).astype(np.float32))
 
 
 def first_frame(panel: Panel) -> Image:
-    """A panel, or the first frame of a film."""
+    """Return a panel, or the first frame of a film."""
     return panel[0] if isinstance(panel, list) else panel
 
 
 def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
-    """(h, w, 3) sRGB bytes of all panels in rows with captions below; films show their first frame.
+    """Return (h, w, 3) sRGB bytes of all panels in rows with captions; films show their first frame.
 
-    columns : panels in a row; 0 puts all of them in one
+    columns : panels in a row; 0 for all in one row
     """
     cells = [_cell(to_srgb8(first_frame(panel)), name) for name, panel in panels.items()]
     step = columns or len(cells)
@@ -47,14 +47,17 @@ def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
 
 
 def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
-    """sRGB bytes of a square figure.
+    """Return sRGB bytes of a square figure.
 
-    plot : draws into matplotlib axes
+    plot : function that draws into matplotlib axes
     side : of the picture [pixel]
     """
     canvases = import_extra("matplotlib.backends.backend_agg", "the gallery")
     figure = import_extra("matplotlib.figure", "the gallery").Figure(
-        figsize=(_FIGURE_INCHES, _FIGURE_INCHES), dpi=side / _FIGURE_INCHES, facecolor="#141417", layout="constrained"
+        figsize=(_FIGURE_INCHES, _FIGURE_INCHES),
+        dpi=side / _FIGURE_INCHES,
+        facecolor="#141417",
+        layout="constrained",
     )
     plot(figure.subplots())
     canvas: Any = canvases.FigureCanvasAgg(figure)
@@ -87,7 +90,7 @@ _RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
 
 
 def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
-    """(h, w, 3) the picture with a dot on each landmark: green where it is seen, red where it is hidden."""
+    """Return the picture (h, w, 3) with a dot on each landmark, green if visible and red if hidden."""
     from PIL import Image, ImageDraw
 
     image = Image.fromarray(np.ascontiguousarray(picture[..., :3]))
@@ -100,11 +103,11 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
 
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
 _LABEL_COLOURS = 8192
-_QUANTILES = 0.02, 0.98  # quantiles of what is seen that are black and white
+_QUANTILES = 0.02, 0.98  # of non-zero values, shown as black and white
 
 
 def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
-    """(h, w, 3) bytes: light as it looks, a colour for each whole number, else dark to bright.
+    """Return (h, w, 3) bytes of an output: light as sRGB, labels in random colours, others dark to bright.
 
     values : (h, w) or (h, w, c) of the output
     """

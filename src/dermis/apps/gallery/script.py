@@ -1,4 +1,4 @@
-"""Gallery scripts: described by their docstrings, run one after another, written as WebP files."""
+"""Gallery scripts: their descriptions from docstrings, their pictures, and WebP files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.apps.gallery.panels import Panel, Panels, to_srgb8, panel_sheet, first_frame
+from dermis.apps.gallery.panels import Panel, Panels, first_frame, panel_sheet, to_srgb8
 from dermis.apps.gallery.studio import Studio
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, refuse
@@ -26,13 +26,13 @@ _METADATA = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MU
 
 @dataclass(frozen=True)
 class Script:
-    """What a script's docstring says of its picture.
+    """Gallery script, described by its docstring.
 
-    title, caption : the first line, and what to see
+    title, caption : first line, and explanation
     deck : rows of the talk that it shows, such as "S11"
     equation : the equation behind it, or ""
     sources : author-year keys
-    slider : two panels to be compared with a slider
+    slider : captions of two panels to compare with a slider
     columns : panels in a row; 0 for the page's choice
     """
 
@@ -47,11 +47,11 @@ class Script:
 
     @property
     def name(self) -> str:
-        """The file's name without its suffix."""
+        """Return the file's name without its suffix."""
         return self.path.stem
 
     def draw(self, studio: Studio) -> Panels:
-        """Run the script: panels by their captions.
+        """Run the script and return its panels by caption.
 
         Raises DermisError when the script lacks something that it needs.
         """
@@ -61,7 +61,7 @@ class Script:
 
 
 def read_script(path: Path) -> Script:
-    """The description in a script's docstring; the script is not run."""
+    """Return the description in a script's docstring, without running the script."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     facts: dict[str, str] = dict(_METADATA.findall(text))
     title, _, caption = _METADATA.sub("", text).partition("\n")
@@ -79,7 +79,7 @@ def read_script(path: Path) -> Script:
 
 
 def find_scripts(only: Sequence[str] = ()) -> list[Script]:
-    """The scripts in order; `only` selects some by number, by name or by part of a name.
+    """Return the scripts in order; `only` selects some by number, name or part of a name.
 
     Raises DermisError for a name that matches no script.
     """
@@ -92,14 +92,14 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
 
 
 def _matches(script: Script, wanted: str) -> bool:
-    """Whether a number or part of a name matches the script."""
+    """Return whether a number or part of a name matches the script."""
     if wanted.isdecimal():
         return int(wanted) == int(script.name.partition("_")[0])
     return wanted != "" and wanted in script.name
 
 
 def draw_script(draw: Callable[[Studio], Panels]) -> None:
-    """Draw the running script's picture: python gallery/NN_name.py OUTPUT [HEAD]."""
+    """Write the picture of the running script: python gallery/NN_name.py OUTPUT [HEAD]."""
     from dermis.images.io import write_png
 
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
@@ -109,7 +109,7 @@ def draw_script(draw: Callable[[Studio], Panels]) -> None:
 
 
 def scripts_folder() -> Path:
-    """Where the scripts are: beside the package's sources, or inside the installed package."""
+    """Return the folder of the scripts, in the checkout or in the installed package."""
     installed = Path(__file__).parent / "scripts"
     return installed if installed.is_dir() else Path(__file__).parents[4] / "gallery"
 
@@ -123,13 +123,13 @@ _QUALITY, _FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """The result of a script.
+    """Result of a script.
 
     panels : WebP files by caption
     size : width and height of the first one [pixel]
-    seconds : that the script took
-    frame_ms : median of its frames [ms]; None if it drew none
-    fault : why there is no picture
+    seconds : time of the script
+    frame_ms : median time of its frames [ms]; None if it drew none
+    fault : reason for a missing picture
     """
 
     script: Script
@@ -141,7 +141,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Each script's picture; a script that fails for lack of something gives a picture that says so."""
+    """Yield the picture of each script; a script that cannot run yields a picture with the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:
@@ -156,7 +156,7 @@ def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Gallery
 
 
 def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
-    """A panel as a WebP file, animated if it is a film."""
+    """Return a panel as a WebP file, animated if it is a film."""
     from PIL import Image as Pillow
 
     images = panel if isinstance(panel, list) else [panel]
@@ -168,7 +168,7 @@ def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
 
 
 def write_panels(folder: Path, picture: GalleryPicture) -> None:
-    """Write a picture's panels as separate files.
+    """Write the panels of a picture as separate files.
 
     Raises DermisError when that is not possible.
     """

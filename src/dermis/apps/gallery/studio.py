@@ -21,11 +21,11 @@ _SCAN = "lee_perry_smith"
 
 
 class Studio:
-    """A renderer, and the head that pictures show.
+    """Renderer, and the head that pictures show.
 
     name : head to show; by default the scan if it is downloaded, else the human
     side : of a panel [pixel]
-    settings : fields of `Settings` that override a script's
+    settings : fields of `Settings` that override those of scripts
     """
 
     def __init__(
@@ -39,37 +39,37 @@ class Studio:
 
     @cached_property
     def renderer(self) -> Renderer:
-        """The renderer, opened on first use."""
+        """Return the renderer, opened on first use."""
         return Renderer(self.adapter)
 
     def head(self, name: str | None = None, **options: Any) -> Head:
-        """The head to show, or another one; subdivided once.
+        """Return the head to show, or another one, subdivided once.
 
         options : of `load_head`
         """
         return self._load(name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """The head to show with its colours in a picture, also where the device paints them."""
+        """Return the head to show with its colours as a map, even if the device paints them."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes.
+        """Return (h, w, 3) sRGB bytes of a scene.
 
-        scale : of the panel's side
+        scale : factor of the panel's side
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
 
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
-        """(h, w, 3) linear Rec. 709: `render` before encoding."""
+        """Return (h, w, 3) linear Rec. 709 of a scene: `render` before encoding."""
         return self._draw(scene, scale, settings).linear()
 
     def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes of an intermediate result as the viewer shows it.
+        """Return (h, w, 3) sRGB bytes of an intermediate result as the viewer shows it.
 
-        view : as named by the viewer, such as "blur 3"
+        view : name in the viewer, such as "blur 3"
         """
         from dermis.apps.viewer.state import PARTS
         from dermis.apps.viewer.views import IntermediateViews
@@ -86,7 +86,10 @@ class Studio:
         return self.renderer.reopening_device.run(seen)
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
-        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
+        """Return (n, n, 3) light on the atlas, as irradiance over pi.
+
+        level : 0 for the light that enters, higher ones for blurred levels
+        """
         from dermis.gpu import download
 
         def light() -> NDArray[np.float32]:
@@ -101,7 +104,7 @@ class Studio:
         return self.renderer.reopening_device.run(light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
-        """A panel's settings."""
+        """Return the settings of a panel."""
         side = round(scale * self.side)
         chosen: dict[str, Any] = {"size": (side, side), "atlas": 1024}
         return Settings(**(chosen | settings | self._settings))
