@@ -16,14 +16,14 @@ import dermis
 PREPARES = """
 import sys
 from types import SimpleNamespace
-from dermis.base.progress import preparing
+from dermis.base.progress import logged_step
 from dermis.base import console
 
 now = 0.0
 console.time = SimpleNamespace(monotonic=lambda: now)
-with console.working_on("loading"):
+with console.spinner("loading"):
     for step, seconds in (("fitting the eyes", float(sys.argv[1])), ("reading the mesh", 0.0)):
-        with preparing(step):
+        with logged_step(step):
             now += seconds
             sys.stdin.readline()
 """

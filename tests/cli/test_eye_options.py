@@ -62,7 +62,7 @@ def test_impossible_looks_are_refused(run, tmp_path: Path) -> None:
         outcome = run("render", head, "--unit-mm", 1, "--eye", words, "-o", tmp_path / "a.png")
         assert outcome.code == 2 and told in outcome.stderr
     outcome = run("render", "human", "--eyes", "plain", "-o", tmp_path / "a.png")
-    assert outcome.code == 2 and "eyes: expected a file that it tells of" in outcome.stderr
+    assert outcome.code == 2 and "eyes: expected a mesh file to which it applies" in outcome.stderr
 
 
 def test_scene_files_say_what_eyes_look_like(tmp_path: Path) -> None:

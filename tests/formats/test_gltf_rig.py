@@ -125,12 +125,12 @@ def _lips(apart: float, seam: float = 0.0) -> tuple[GltfFile, int]:
     """Return two squares that touch along a line and are separated by a target; a uv seam splits each."""
     file = GltfFile()
     upper, lower = SQUARE, SQUARE - [0, 1, 0]
-    places = np.vstack([upper, lower, upper - [-1, 0, 0], lower - [-1, 0, 0]])
+    positions = np.vstack([upper, lower, upper - [-1, 0, 0], lower - [-1, 0, 0]])
     triangles = np.vstack([SQUARE_TRIANGLES + 4 * k for k in range(4)])
     delta = np.zeros((16, 3))
     delta[[4 + 2, 4 + 3, 12 + 3], 1] = -apart  # the lower lip from its corner on, not the far end
     delta[12 + 3, 1] += seam
-    mesh = add_mesh(file, places, triangles, {"open": file.numbers(delta)})
+    mesh = add_mesh(file, positions, triangles, {"open": file.numbers(delta)})
     return file, file.add("nodes", mesh=mesh)
 
 
@@ -162,12 +162,12 @@ POLE_TRIANGLES = np.array(
 
 def _arm(file: GltfFile, bind: np.ndarray | None = None, **more: object) -> GltfFile:
     """Return a pole on two joints below a node; the node of its mesh has no effect."""
-    share = np.clip((POLE[:, 1] - 1) / 2, 0, 1)
+    fraction = np.clip((POLE[:, 1] - 1) / 2, 0, 1)
     joints = np.zeros((10, 4))
     joints[:, :2] = 1, 0
     given = {
         "JOINTS_0": file.numbers(joints, "<u1"),
-        "WEIGHTS_0": file.numbers(np.column_stack([share, 1 - share, 0 * share, 0 * share])),
+        "WEIGHTS_0": file.numbers(np.column_stack([fraction, 1 - fraction, 0 * fraction, 0 * fraction])),
     }
     delta = np.zeros((10, 3))
     delta[:, 2] = POLE[:, 1] / 10
@@ -192,8 +192,8 @@ def _formula(rest: np.ndarray, bind: np.ndarray, lean: float) -> np.ndarray:
     """Evaluate the specification: morph, then inverse bind matrices, then joint matrices."""
     points = np.column_stack([POLE, np.ones(10)])
     points[:, 2] += lean * POLE[:, 1] / 10
-    share = np.clip((POLE[:, 1] - 1) / 2, 0, 1)[:, None, None]
-    matrices = (1 - share) * (rest[0] @ bind[0]) + share * (rest[1] @ bind[1])
+    fraction = np.clip((POLE[:, 1] - 1) / 2, 0, 1)[:, None, None]
+    matrices = (1 - fraction) * (rest[0] @ bind[0]) + fraction * (rest[1] @ bind[1])
     return np.einsum("vij,vj->vi", matrices, points)[:, :3]
 
 
@@ -319,7 +319,7 @@ def test_damaged_targets_are_refused_by_name(tmp_path: Path, damage: str, words:
         ({"WEIGHTS_0": np.full((10, 4), np.nan)}, "weights of 0 and more, but those of 'pole'"),
         ({"WEIGHTS_0": np.full((10, 4), -1.0)}, "weights of 0 and more"),
         ({"JOINTS_0": np.full((10, 4), 7)}, "joints of a skin from 0 to 1, but 'pole' names joint 7"),
-        ({"JOINTS_0": None}, "joints and weights of each vertex"),
+        ({"JOINTS_0": None}, "joints and weights of a mesh with a skin"),
     ],
 )
 def test_damaged_skins_are_refused_by_name(tmp_path: Path, change: dict, words: str) -> None:
@@ -333,14 +333,14 @@ def test_damaged_skins_are_refused_by_name(tmp_path: Path, change: dict, words: 
         load_rigged(file.write(tmp_path / "a.gltf", 0))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5])
-def test_a_bone_without_extent_is_refused_where_points_follow_it(tmp_path: Path, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.5])
+def test_a_bone_without_extent_is_refused_where_points_follow_it(tmp_path: Path, fraction: float) -> None:
     file = _arm(GltfFile())
     file.tree["nodes"][2]["scale"] = [0, 0, 0]  # the head, which is each vertex's first joint
     given = file.tree["meshes"][0]["primitives"][0]["attributes"]
-    given["WEIGHTS_0"] = file.numbers(np.tile([share, 1 - share, 0, 0], (10, 1)))
+    given["WEIGHTS_0"] = file.numbers(np.tile([fraction, 1 - fraction, 0, 0], (10, 1)))
     path = file.write(tmp_path / "a.gltf", 0)
-    if share:
+    if fraction:
         with pytest.raises(DermisError, match=r"a\.gltf: .*bones with a scale above 0, but 'head' has"):
             load_rigged(path, unit_mm=100)
     else:

@@ -137,8 +137,8 @@ def test_four_bones_are_those_that_miss_least() -> None:
     points = DeformableMesh(Human().head())
     rig, finer = points.rig, points.refinement
     assert finer is not None and rig.skeleton is not None
-    bone, share = influences(rig, finer)
-    assert share.min() >= 0 and np.abs(share.sum(axis=1) - 1).max() < 1e-12
+    bone, bone_weight = influences(rig, finer)
+    assert bone_weight.min() >= 0 and np.abs(bone_weight.sum(axis=1) - 1).max() < 1e-12
     control = np.zeros((len(rig.positions_mm), len(rig.skeleton.names)))
     np.add.at(control, (np.arange(len(control))[:, None], rig.skeleton.bone), rig.skeleton.weight)
     mean = np.asarray(finer @ control)
@@ -151,7 +151,7 @@ def test_four_bones_are_those_that_miss_least() -> None:
         whole = np.asarray(finer @ rig.positions_mm.astype(np.float64))
         fitted, usual = (
             ((_blended(whole, motion.matrices, *one) - meant) ** 2).sum()
-            for one in ((bone, share), (strongest, plain))
+            for one in ((bone, bone_weight), (strongest, plain))
         )
         assert fitted < 0.7 * usual
 
@@ -205,6 +205,8 @@ def test_the_khronos_validator_finds_nothing(rigged: Head, tmp_path: Path) -> No
     assert (found["numErrors"], found["numWarnings"]) == (0, 0), found["messages"]
 
 
-def _blended(points: np.ndarray, matrices: np.ndarray, bone: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _blended(
+    points: np.ndarray, matrices: np.ndarray, bone: np.ndarray, bone_weight: np.ndarray
+) -> np.ndarray:
     whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-    return np.einsum("qk,qkij,qj->qi", share, matrices.astype(np.float64)[bone], whole)
+    return np.einsum("qk,qkij,qj->qi", bone_weight, matrices.astype(np.float64)[bone], whole)

@@ -19,8 +19,8 @@ def _glb(path: Path, *, material: str | None = "Skin", mirror: bool = False, dro
     skin = trimesh.visual.material.PBRMaterial(name=material or "x", baseColorFactor=[255, 51, 0, 255])
     # trimesh holds uv from the bottom and writes glTF from the top: v = 0.2 in the file
     visual = trimesh.visual.TextureVisuals(uv=[[0.1, 0.8], [0.4, 0.8], [0.1, 0.3]], material=skin)
-    places, normals = [[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], np.tile([0.6, 0, 0.8], (3, 1))
-    mesh = trimesh.Trimesh(places, [[0, 1, 2]], vertex_normals=normals, visual=visual, process=False)
+    positions, normals = [[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], np.tile([0.6, 0, 0.8], (3, 1))
+    mesh = trimesh.Trimesh(positions, [[0, 1, 2]], vertex_normals=normals, visual=visual, process=False)
     move = np.diag([-1.0 if mirror else 1.0, 1, 1, 1])
     move[:3, 3] = 1, 2, 3
     scene = trimesh.Scene()

@@ -43,8 +43,8 @@ def test_colours_come_back_and_are_tagged(tmp_path: Path) -> None:
     with av.open(str(_write(tmp_path / "a.mp4"))) as file:
         stream = file.streams.video[0]
         codec = stream.codec_context
-        told = (codec.color_primaries, codec.color_trc, codec.colorspace, codec.color_range)
-        assert told == (1, 1, 1, 1) and (codec.name, codec.pix_fmt) == ("h264", "yuv420p")
+        tags = (codec.color_primaries, codec.color_trc, codec.colorspace, codec.color_range)
+        assert tags == (1, 1, 1, 1) and (codec.name, codec.pix_fmt) == ("h264", "yuv420p")
         images = [frame.to_ndarray(format="rgb24", src_colorspace=1) for frame in file.decode(stream)]
     for image, colour in zip(images, COLOURS, strict=True):
         assert np.abs(image.astype(int) - colour).max() <= 5  # 8-bit YUV, and the encoder's own error

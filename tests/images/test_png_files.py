@@ -69,7 +69,7 @@ def test_other_forms_are_left_to_others(data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "message"),
     [
         (png(2, 2, 8, 2, bytes(13)), "truncated"),
         (png(2, 2, 8, 2, bytes(15)), "there are too many"),
@@ -79,6 +79,6 @@ def test_other_forms_are_left_to_others(data: bytes) -> None:
         (png(0, 1, 8, 2, b""), "0 x 1"),
     ],
 )
-def test_damaged_ones_are_refused(data: bytes, said: str) -> None:
-    with pytest.raises((ValueError, TooLargeError), match=said):
+def test_damaged_ones_are_refused(data: bytes, message: str) -> None:
+    with pytest.raises((ValueError, TooLargeError), match=message):
         decode_up_filtered_png(data)

@@ -130,7 +130,7 @@ def test_eyes_of_another_name_can_be_named(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf", names=("white_1", "white_2"))
     assert head(path).eyes is None and head(path).note == ""
     assert head(path, eye_groups=("white_1", "White_2")).eyes is not None
-    with pytest.raises(DermisError, match="eye_groups to name groups of the file"):
+    with pytest.raises(DermisError, match="eye_groups with names of groups of the file"):
         head(path, eye_groups=("white",))
 
 

@@ -97,7 +97,9 @@ def test_weights_of_large_meshes_are_kept_by_topology(monkeypatch: pytest.Monkey
     expected = subdivide(mesh, 2)
     monkeypatch.setattr(module, "_CACHED_TRIANGLES", 0)
     made = subdivide(mesh, 2)
-    monkeypatch.setattr(module, "_refined", None)  # another shape of the same topology computes no weights
+    monkeypatch.setattr(
+        module, "_compute_refinement", None
+    )  # another shape of the same topology computes no weights
     wider = subdivide(replace(mesh, positions=2 * mesh.positions), 2)
     for one, scale in ((made, 1), (wider, 2)):
         np.testing.assert_array_equal(one.mesh.positions, scale * expected.mesh.positions)

@@ -12,9 +12,9 @@ from dermis.optics.slabs import solve_doubled_slabs, solve_slabs
 PHOTONS = 40_000
 
 
-def straight_down(cosine: np.ndarray, share: np.ndarray) -> float:
+def straight_down(cosine: np.ndarray, fraction: np.ndarray) -> float:
     """Extrapolate from the nodes to normal incidence."""
-    return float(np.polyval(np.polyfit(cosine[-4:], share[-4:], 3), 1.0))
+    return float(np.polyval(np.polyfit(cosine[-4:], fraction[-4:], 3), 1.0))
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])

@@ -37,10 +37,10 @@ def test_rings_are_those_of_photons_one_by_one(eta: float) -> None:
     assert now.standard_error is not None
     miss = np.linalg.norm(table.ring_energy - now.ring_energy, axis=0)
     assert (miss < COUNTED_RINGS * np.linalg.norm(now.ring_energy, axis=0)).all()
-    told = (now.reflectance > 10.0 * now.standard_error) & (now.reflectance > 0.0)
+    significant = (now.reflectance > 10.0 * now.standard_error) & (now.reflectance > 0.0)
     channels = table.reflectance.T
     tabulated = np.stack([np.interp(now.radius_mm, table.radius_mm, one) for one in channels], axis=1)
-    off = (tabulated - now.reflectance)[told] / now.standard_error[told]
+    off = (tabulated - now.reflectance)[significant] / now.standard_error[significant]
     assert np.sqrt((off**2).mean()) < 1.5  # both have noise
 
 
@@ -64,8 +64,8 @@ def test_homogeneous_media_have_them_by_default_and_no_others() -> None:
 
 
 def test_layered_diffusion_can_still_be_asked_for() -> None:
-    asked, own = load_tissue("skin1").profile("layered"), diffusion_profile(media()["skin1"])
-    assert asked.model == "layered" and (asked.reflectance == own.reflectance).all()
+    layered, own = load_tissue("skin1").profile("layered"), diffusion_profile(media()["skin1"])
+    assert layered.model == "layered" and (layered.reflectance == own.reflectance).all()
 
 
 def test_gaussians_keep_their_light_and_tell_that_they_are_of_photons() -> None:

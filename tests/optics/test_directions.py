@@ -39,8 +39,8 @@ def test_matched_half_space_is_the_closed_form(albedo: float) -> None:
 @pytest.mark.parametrize("albedo", [0.68, 0.96])
 @pytest.mark.parametrize("cosine", [1.0, 0.5, 0.15])
 def test_refracting_half_space_agrees_with_photons(albedo: float, cosine: float) -> None:
-    share, error, _ = returned(cosine, albedo, 1.4, 60_000)
-    assert abs(directional_reflectance(cosine, albedo, 1.4) - share) < 3.5 * error
+    fraction, error, _ = returned(cosine, albedo, 1.4, 60_000)
+    assert abs(directional_reflectance(cosine, albedo, 1.4) - fraction) < 3.5 * error
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])

@@ -35,9 +35,9 @@ def single(reduced: float, g: float = G) -> float:
     return reduced / (reduced + (1.0 - g) * (1.0 - reduced))
 
 
-def from_above(cosine: np.ndarray, share: np.ndarray) -> float:
+def from_above(cosine: np.ndarray, fraction: np.ndarray) -> float:
     """Extrapolate from the nodes to normal incidence."""
-    return float(np.polyval(np.polyfit(cosine[-4:], share[-4:], 3), 1.0))
+    return float(np.polyval(np.polyfit(cosine[-4:], fraction[-4:], 3), 1.0))
 
 
 def law_of(reduced: float, eta: float) -> AngularResponse:
@@ -102,17 +102,17 @@ def test_light_at_a_slant_comes_back_as_photons_do(reduced: float, eta: float) -
     law = law_of(reduced, eta)
     above, _, _ = returned(1.0, single(reduced), eta, 100_000, g=G)
     for cosine in (0.5, 0.15):
-        share, error, _ = returned(cosine, single(reduced), eta, 100_000, g=G)
-        told = np.interp(
+        fraction, error, _ = returned(cosine, single(reduced), eta, 100_000, g=G)
+        interpolated = np.interp(
             np.sqrt(cosine), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0]
         )
-        assert told == pytest.approx(share / above, rel=0.01 + 4.0 * error / share)
+        assert interpolated == pytest.approx(fraction / above, rel=0.01 + 4.0 * error / fraction)
         even = np.interp(
             np.sqrt(cosine),
             np.linspace(0.0, 1.0, DIRECTION_ROWS),
             angular_response(above, eta).relative_reflectance[:, 0],
         )
-        assert even < told
+        assert even < interpolated
 
 
 def test_photons_leave_a_refracting_half_space_as_told() -> None:
@@ -145,13 +145,16 @@ def test_photons_leave_a_refracting_half_space_as_told() -> None:
 @pytest.mark.parametrize("reduced", [0.9585, 0.838, 0.678])
 def test_all_pairs_of_directions(reduced: float, eta: float, most: float) -> None:
     """Radiance below the surface is weighted by uniform light."""
-    a, share, exact = half_space_radiance(reduced, eta, NODES, G)
+    a, fraction, exact = half_space_radiance(reduced, eta, NODES, G)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    slant, weight = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta), np.outer(share, share)
+    slant, weight = (
+        1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta),
+        np.outer(fraction, fraction),
+    )
 
     def error(law: AngularResponse) -> float:
         table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), law.relative_reflectance[:, 0])
-        above = (share @ exact).sum() / table.sum()
+        above = (fraction @ exact).sum() / table.sum()
         off = above * (table + law.single_scattering[0] * slant) - exact
         return float(np.sqrt((weight * off**2).sum() / (weight * exact**2).sum()))
 
@@ -169,8 +172,8 @@ def test_amounts_of_thin_parts_are_those_of_slabs_cut_one_by_one(eta: float) -> 
     for c in range(3):
         albedo, extinction = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c])
         cut, whole = solve_slabs(albedo, extinction * depth, eta, g=G), solve_slabs(albedo, 1e4, eta, g=G)
-        share, all_back = made.transmitted[1:, :, c].sum(axis=1), float(whole.reflected[0] @ whole.flux)
-        assert share * all_back == pytest.approx(cut.transmitted @ cut.flux, abs=FORWARD_AMOUNT)
+        fraction, all_back = made.transmitted[1:, :, c].sum(axis=1), float(whole.reflected[0] @ whole.flux)
+        assert fraction * all_back == pytest.approx(cut.transmitted @ cut.flux, abs=FORWARD_AMOUNT)
     near = np.flatnonzero((depth > 0.4) & (depth < 1.2))
     assert (
         made.transmitted[near + 1, :, 0].sum(axis=1) > 1.4 * even.transmitted[near + 1, :, 0].sum(axis=1)

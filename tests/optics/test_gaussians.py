@@ -96,7 +96,7 @@ def test_one_gaussian_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("variance", "weight", "said"),
+    ("variance", "weight", "message"),
     [
         ([1.0, 0.5], [[1, 1, 1], [1, 1, 1]], "increase"),
         ([1.0, 1.0], [[1, 1, 1], [1, 1, 1]], "increase"),
@@ -111,8 +111,8 @@ def test_one_gaussian_by_hand() -> None:
         ([], [], "k x c"),
     ],
 )
-def test_impossible_sums_are_refused(variance: list[float], weight: list[list[float]], said: str) -> None:
-    with pytest.raises(DermisError, match=said):
+def test_impossible_sums_are_refused(variance: list[float], weight: list[list[float]], message: str) -> None:
+    with pytest.raises(DermisError, match=message):
         gaussians(variance, weight)
 
 

@@ -114,12 +114,12 @@ def test_warnings_name_the_reason() -> None:
     assert any("negative" in text for text in printed.warnings)
 
 
-def test_absorption_is_told_where_the_beam_meets_it() -> None:
+def test_absorption_is_reported_where_the_beam_meets_it() -> None:
     """An absorbing layer is reported below a thin clear layer, but not below the first mean free path."""
     clear, dark = Layer(0.01 * ONE, 2.0 * ONE, 0.05), Layer(2.0 * ONE, 2.0 * ONE)
-    for top, told in ((0.05, True), (2.0, False)):
+    for top, expected in ((0.05, True), (2.0, False)):
         medium = Medium("skin", (Layer(clear.sigma_a, clear.sigma_s_prime, top), dark))
-        assert any("absorbs" in text for text in diffusion_profile(medium).warnings) is told
+        assert any("absorbs" in text for text in diffusion_profile(medium).warnings) is expected
 
 
 def test_light_below_zero_and_finer_than_its_numbers_is_told() -> None:

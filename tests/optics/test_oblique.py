@@ -19,11 +19,11 @@ def left(albedo: float, angle: float) -> tuple[Floats, Floats]:
     rng = np.random.default_rng(1)
     x, z, weight = np.zeros(_PHOTONS), np.zeros(_PHOTONS), np.ones(_PHOTONS)
     along, down = np.full(_PHOTONS, np.sin(angle)), np.full(_PHOTONS, np.cos(angle))
-    places, weights = [], []
+    positions, weights = [], []
     for _ in range(_MOST_STEPS):
         step = rng.exponential(size=len(x))
         out = z + step * down < 0.0
-        places.append(x[out] - z[out] / down[out] * along[out])
+        positions.append(x[out] - z[out] / down[out] * along[out])
         weights.append(weight[out])
         x, z, weight = (one[~out] for one in (x + step * along, z + step * down, albedo * weight))
         lives = rng.random(len(x)) < weight / _LEAST
@@ -32,14 +32,14 @@ def left(albedo: float, angle: float) -> tuple[Floats, Floats]:
             break
         down = rng.uniform(-1.0, 1.0, len(x))
         along = np.sqrt(1.0 - down**2) * np.cos(rng.uniform(0.0, 2.0 * np.pi, len(x)))
-    return np.concatenate(places), np.concatenate(weights)
+    return np.concatenate(positions), np.concatenate(weights)
 
 
-def middle(places: Floats, weights: Floats, beyond: float) -> float:
+def middle(positions: Floats, weights: Floats, beyond: float) -> float:
     """Return the position with equal amounts of light farther than `beyond` on both sides."""
 
     def more_ahead(at: float) -> float:
-        return float(weights[places > at + beyond].sum() - weights[places < at - beyond].sum())
+        return float(weights[positions > at + beyond].sum() - weights[positions < at - beyond].sum())
 
     return float(brentq(more_ahead, -2.0, 4.0))
 

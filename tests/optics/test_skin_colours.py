@@ -34,10 +34,10 @@ def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floa
 
 def test_layers_of_many_shares_are_those_of_each_skin() -> None:
     """Layers are equal bit for bit."""
-    shares = np.array([0.0, 0.01, 0.3, 1.0])
-    mixed = mixed_layers(FACE, shares)
-    for row, share in enumerate(shares):
-        alone = spectral_medium("dj2006", replace(FACE, melanin=share, blood=share)).layers
+    fractions = np.array([0.0, 0.01, 0.3, 1.0])
+    mixed = mixed_layers(FACE, fractions)
+    for row, fraction in enumerate(fractions):
+        alone = spectral_medium("dj2006", replace(FACE, melanin=fraction, blood=fraction)).layers
         for many, one in zip(mixed, alone, strict=True):
             assert (many.thickness_mm, many.name) == (one.thickness_mm, one.name)
             assert np.array_equal(many.sigma_a[row], one.sigma_a)
@@ -66,8 +66,8 @@ def test_nodes_are_the_tissues_own_colours() -> None:
 
 def test_pigments_darken_and_blood_reddens() -> None:
     table = colour_table(FACE)
-    shares = np.linspace(0, 1, 50)
-    for colours in (table.lookup(shares, np.full(50, 0.01)), table.lookup(np.full(50, 0.01), shares)):
+    fractions = np.linspace(0, 1, 50)
+    for colours in (table.lookup(fractions, np.full(50, 0.01)), table.lookup(np.full(50, 0.01), fractions)):
         assert (np.diff(colours.sum(axis=1)) < 0).all()
     pale, flushed = table.lookup(np.array([0.015, 0.015]), np.array([0.005, 0.05]))
     assert flushed[0] / flushed[1] > 1.15 * pale[0] / pale[1]

@@ -40,11 +40,11 @@ def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
     back = np.interp(cosine, whole.cosine, whole.reflected[0])
     slant = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, len(law)), law)
     for thickness in (1.0, 2.0, 4.0, 8.0):
-        share = np.interp(thickness, DEPTH, made.transmitted[..., 0].sum(axis=1))
+        fraction = np.interp(thickness, DEPTH, made.transmitted[..., 0].sum(axis=1))
         deep = np.interp(thickness, DEPTH, made.directionality)
         cut = solve_slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0)
         exact = np.interp(cosine, cut.cosine, cut.transmitted[0])
-        found = share * back * (1.0 + deep * (slant - 1.0))
+        found = fraction * back * (1.0 + deep * (slant - 1.0))
         assert np.abs(found - exact).max() < exact[0] / 6.0, thickness
 
 

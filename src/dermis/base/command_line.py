@@ -25,7 +25,10 @@ from dermis.base.errors import DermisError, DermisWarning, error_text, format_va
 
 _MAX_LENGTH = 400  # characters
 _TYPES = {float: "a number", int: "a whole number", NoneType: ""}
-_NO_MEMORY = "failed to map segment", "allocate memory"  # in the messages of libraries that cannot be loaded
+_OUT_OF_MEMORY_TEXTS = (
+    "failed to map segment",
+    "allocate memory",
+)  # in the messages of libraries that cannot be loaded
 
 
 def make_app(name: str, help_text: str | None) -> App:
@@ -56,7 +59,7 @@ def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
     except CycloptsError as error:
         return print_failure(name, usage_message(error, name))
     except (MemoryError, ImportError) as error:
-        if isinstance(error, ImportError) and not any(text in str(error) for text in _NO_MEMORY):
+        if isinstance(error, ImportError) and not any(text in str(error) for text in _OUT_OF_MEMORY_TEXTS):
             raise
         return print_failure(name, f"memory: expected more, but none is left ({error}). Request less.")
 

@@ -89,7 +89,8 @@ class Report:
 
     def as_json(self) -> object:
         """Return the report as nested dictionaries and lists."""
-        radial, gaussians, transmitted = self.radial, self.fit.profile, self._transmitted_colours()
+        radial, gaussians, error = self.radial, self.fit.profile, self.model_error
+        transmitted = self._transmitted_colours()
         return _to_lists(
             {
                 "name": radial.name,
@@ -110,7 +111,8 @@ class Report:
                     "energy_error": self.fit.energy_error,
                     "shared": self.fit.shared,
                 },
-                "model_error": asdict(self.model_error) if self.model_error else None,
+                "model_error": error
+                and {"least": error.smallest, "most": error.largest, "tissues": error.tissues},
                 **self._other_fit_json(),
                 "transmission": {"thickness_mm": self.through_mm, **transmitted} if transmitted else None,
                 "warnings": radial.warnings,

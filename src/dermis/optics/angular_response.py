@@ -118,16 +118,18 @@ class _HalfSpace:
         internal = internal_reflectance(self._mu, eta)
         flux = 2.0 * weight * self._mu
         self.leaving = flux * (1.0 - internal)
-        self._transport = np.eye(len(self._mu)) - self._reflected(self._mu, self._H) * flux * internal
+        self._transport = (
+            np.eye(len(self._mu)) - self._reflected_radiance(self._mu, self._H) * flux * internal
+        )
 
-    def _reflected(self, mu: Floats, H: Floats) -> Floats:
+    def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
         """Return radiance over pi at the nodes, (nodes, n), for light from n cosines."""
         return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
         """Return the fraction of light from cosines below the surface that leaves the medium."""
         mu = np.atleast_1d(np.asarray(cosine, np.float64))
-        source = self._reflected(mu, h_function(mu, self._albedo))
+        source = self._reflected_radiance(mu, h_function(mu, self._albedo))
         leaving = self.leaving @ np.linalg.solve(self._transport, source)
         return np.asarray(leaving.reshape(np.shape(cosine)))
 

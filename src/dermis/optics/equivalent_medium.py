@@ -55,8 +55,8 @@ def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
     if kind is None:
         half = _half_frequency(partial(_reflectance_transform, _unit_medium(albedo, eta)))
     else:
-        curve = half_space(kind, np.full(3, albedo), np.ones(3))
-        half = _half_frequency(partial(_curve_transform, curve))
+        cumulative = half_space(kind, np.full(3, albedo), np.ones(3))
+        half = _half_frequency(partial(_cumulative_transform, cumulative))
     return np.array([np.sqrt(1.0 - albedo), half])
 
 
@@ -90,13 +90,13 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
     return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
-def _curve_transform(curve: CumulativeProfile, frequency: float) -> float:
+def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> float:
     """Return the Hankel transform of the first channel of a cumulative profile, divided by its total."""
     from scipy.special import j0
 
-    edges = curve.radii_mm
+    edges = cumulative.radii_mm
     ring_radius = np.append(0.5 * edges[1], np.sqrt(edges[1:-1] * edges[2:]))
-    return float(j0(frequency * ring_radius) @ np.diff(curve.fraction[:, 0]))
+    return float(j0(frequency * ring_radius) @ np.diff(cumulative.fraction[:, 0]))
 
 
 def _reflectance_transform(medium: Medium, frequency: float) -> float:

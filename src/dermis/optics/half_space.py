@@ -129,7 +129,7 @@ def has_photon_table(medium: Medium) -> bool:
     return single and kind_for_index(medium.eta) is not None and bool(inside.all())
 
 
-def tabulated_curve(medium: Medium) -> CumulativeProfile | None:
+def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
     """Return the cumulative profile of a medium from tables, or None for media that they do not cover.
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
@@ -145,22 +145,22 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
-    curve, kind, layer = tabulated_curve(medium), kind_for_index(medium.eta), medium.layers[0]
-    if curve is None or kind is None:
+    cumulative, kind, layer = tabulated_cumulative(medium), kind_for_index(medium.eta), medium.layers[0]
+    if cumulative is None or kind is None:
         return None
     mean_free_path, edges, radius = layer.mean_free_path_mm, ring_edges(), radius_grid()
     within = fractions_within(kind, layer.alpha_prime, mean_free_path)
-    rings = np.diff(within(edges), axis=0) * curve.energy
+    rings = np.diff(within(edges), axis=0) * cumulative.energy
     step = np.clip(_STEP * np.sqrt(mean_free_path.min() / radius), _MIN_STEP, _MAX_STEP)
     rate = (within(radius * np.exp(step)) - within(radius * np.exp(-step))) / (2.0 * step)[:, None]
     return RadialProfile(
         name=medium.name,
         model=COUNTED_MODEL,
         radius_mm=radius,
-        reflectance=curve.energy * rate / (2.0 * np.pi * radius[:, None] ** 2),
-        total=curve.energy,
+        reflectance=cumulative.energy * rate / (2.0 * np.pi * radius[:, None] ** 2),
+        total=cumulative.energy,
         edges_mm=edges,
         ring_energy=rings,
-        warnings=tuple(missing_light_warnings(curve.energy, rings)),
+        warnings=tuple(missing_light_warnings(cumulative.energy, rings)),
         sources=(*medium.sources, *SOURCES),
     )

@@ -50,7 +50,8 @@ def load_profile(
 
     Parameters
     ----------
-    name : str or Path Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
+    name : str or Path
+        Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
         ``dermis profile``.
     pigments : Mapping of str to float, optional
         Fields of `SkinParameters` that replace those of a skin made of pigments.

@@ -186,14 +186,13 @@ def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floa
     phase = transport.phase
     if phase.extinction < phase.unscaled_extinction:  # light in the truncated forward peak has scattered
         unscaled = unscattered ** (phase.unscaled_extinction / phase.extinction)
-        (up_on, down_on), (up_off, down_off) = (
-            _leaving_unscattered(part, transport.internal) for part in (unscattered, unscaled)
-        )
-        up, down = up + (up_on - up_off)[:, escapes], down + (down_on - down_off)[:, escapes]
+        scaled_up, scaled_down = _unscattered_exit(unscattered, transport.internal)
+        true_up, true_down = _unscattered_exit(unscaled, transport.internal)
+        up, down = up + (scaled_up - true_up)[:, escapes], down + (scaled_down - true_down)[:, escapes]
     return Slabs(transport.mu[escapes], entering, up, down)
 
 
-def _leaving_unscattered(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
+def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
     """Return unscattered light that leaves on the side of entry and on the far side, (n, m) each."""
     down = (1.0 - internal) * unscattered / (1.0 - (unscattered * internal) ** 2)
     return down * unscattered * internal, down
@@ -281,10 +280,10 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     """Return relative and relative diffuse reflectance and single scattering, (DIRECTION_ROWS + 2,)."""
     a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, NODES, g)
     reflectance = fraction @ radiance
-    normal = float(_extrapolated(a, reflectance, np.ones(1))[0])
+    normal = float(_interpolate(a, reflectance, np.ones(1))[0])
     if normal <= _MIN_REFLECTANCE:
         return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
-    table = _extrapolated(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
+    table = _interpolate(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     kernel = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
     deviation = radiance - reflectance
@@ -293,8 +292,8 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
 
 
-def _extrapolated(known: Floats, values: Floats, cosine: Floats) -> Floats:
-    """Interpolate values at cosines, and extrapolate a little beyond the known ones."""
+def _interpolate(known: Floats, values: Floats, cosine: Floats) -> Floats:
+    """Interpolate values at cosines; beyond the known cosines, extrapolate."""
     order = np.argsort(known)
     x, y = known[order], values[order]
     found = np.interp(cosine, x, y)

@@ -118,7 +118,7 @@ class Tissue:
             return self.profile().rings()
         return diffusion_rings(self.medium, model, rgb=self.rgb)
 
-    def through(self, thickness_mm: ArrayLike) -> Floats:
+    def transmittance(self, thickness_mm: ArrayLike) -> Floats:
         """Return the transmittance of slabs of the tissue by thickness, (n, 3) [-].
 
         It is per power that enters, or per incident power for wavelengths.

@@ -21,8 +21,8 @@ def _scaled(text: str, factor: float) -> str:
     lines = []
     for line in text.splitlines():
         kind, *numbers = line.split()
-        places = [f"{factor * float(one):.6g}" for one in numbers] if kind == "v" else []
-        lines.append(" ".join([kind, *places]) if kind == "v" else line)
+        positions = [f"{factor * float(one):.6g}" for one in numbers] if kind == "v" else []
+        lines.append(" ".join([kind, *positions]) if kind == "v" else line)
     return "\n".join([*lines, ""])
 
 
@@ -60,8 +60,8 @@ def test_a_sequence_moves_the_points(folder: Path) -> None:
     clip = dermis.load_motion(folder, head, fps=10)
     assert (clip.name, clip.duration_s, clip.rate) == ("take", pytest.approx(0.3), 10)
     for index, factor in enumerate(FACTORS):
-        places = clip.pose_at(index / 10).motion(head.control).positions_mm
-        np.testing.assert_allclose(places, factor * head.positions_mm, rtol=1e-5, atol=1e-3)
+        positions = clip.pose_at(index / 10).motion(head.control).positions_mm
+        np.testing.assert_allclose(positions, factor * head.positions_mm, rtol=1e-5, atol=1e-3)
     between = clip.pose_at(0.125).motion(head.control).positions_mm
     np.testing.assert_allclose(between, 1.05 * head.positions_mm, rtol=1e-5, atol=1e-3)
     assert clip.frame_count(10) == 4
@@ -78,8 +78,8 @@ def test_a_posed_frame_is_that_file_as_a_head(folder: Path) -> None:
 def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
     small = _frames(tmp_path / "small", (0.01, 0.011))
     head = dermis.load_head(small / "face_8.obj", unit_mm=100, up="z", subdivide=0)
-    places = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
-    np.testing.assert_allclose(places, 1.1 * head.positions_mm, rtol=1e-4, atol=1e-2)
+    positions = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
+    np.testing.assert_allclose(positions, 1.1 * head.positions_mm, rtol=1e-4, atol=1e-2)
     with pytest.raises(
         DermisError, match=r"face_8\.obj: .*of about the size of the head, but it is 0\.01 times"
     ):
@@ -95,8 +95,8 @@ def test_ply_frames(tmp_path: Path) -> None:
         mesh = trimesh.load(file, process=False)
         (tmp_path / "ply" / f"{file.stem}.ply").write_bytes(mesh.export(file_type="ply", vertex_normal=False))
     head = dermis.load_head(tmp_path / "ply" / "face_8.ply")
-    places = dermis.load_motion(tmp_path / "ply", head).pose_at(1.0).positions_mm
-    np.testing.assert_allclose(places, 1.2 * head.positions_mm, rtol=1e-5, atol=1e-3)
+    positions = dermis.load_motion(tmp_path / "ply", head).pose_at(1.0).positions_mm
+    np.testing.assert_allclose(positions, 1.2 * head.positions_mm, rtol=1e-5, atol=1e-3)
 
 
 def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:

@@ -27,7 +27,7 @@ def _named(*names: str):
 
 
 @pytest.mark.parametrize(
-    ("names", "shares"),
+    ("names", "fractions"),
     [
         (("root", "neck", "head", "jaw"), {"neck": 0.5, "head": 0.5}),
         (
@@ -45,8 +45,8 @@ def _named(*names: str):
         (("a", "b", "c", "d"), {}),
     ],
 )
-def test_heads_and_necks(names: tuple[str, ...], shares: dict[str, float]) -> None:
-    assert find_rotation_bones(_named(*names)).head == shares
+def test_heads_and_necks(names: tuple[str, ...], fractions: dict[str, float]) -> None:
+    assert find_rotation_bones(_named(*names)).head == fractions
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_thin_layers_lose_light_as_printed_and_not_when_clamped() -> None:
     assert printed.total[0] < 0.6 * photons[0]
     assert np.abs(clamped.total / photons - 1.0).max() < 0.035
     assert np.abs(layered.total / photons - 1.0).max() < LAYERED_TOTAL
-    assert any("thinner than a reduced mean free path" in warning for warning in printed.warnings)
+    assert any("thinner than a mean free path" in warning for warning in printed.warnings)
 
 
 @pytest.mark.parametrize("alpha_prime", [0.9, 0.98])

@@ -49,11 +49,11 @@ def test_transform_by_quadrature() -> None:
         assert PROFILE.hankel(1.3)[i] == pytest.approx(wave, rel=1e-5)
 
 
-@pytest.mark.parametrize("share", [1e-6, 0.3, 0.9, 0.997, 1 - 1e-9])
-def test_radius_of_a_share_holds_that_share(share: float) -> None:
-    radius = PROFILE.radius_at_fraction(share)
+@pytest.mark.parametrize("fraction", [1e-6, 0.3, 0.9, 0.997, 1 - 1e-9])
+def test_radius_at_fraction_encloses_that_fraction(fraction: float) -> None:
+    radius = PROFILE.radius_at_fraction(fraction)
     held = PROFILE.energy_within(radius).diagonal() / PROFILE.albedo
-    assert np.allclose(held, share, rtol=CLOSED_FORM)
+    assert np.allclose(held, fraction, rtol=CLOSED_FORM)
 
 
 def test_published_scaling_laws() -> None:

@@ -267,7 +267,7 @@ RADII = np.array([0.1, 1.0, 2.0])
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: PointTarget(RADII, np.ones((2, 1)), np.ones(1)), "n, n x c and c"),
         (lambda: PointTarget(RADII, GOOD, np.ones(2)), "n, n x c and c"),
@@ -282,8 +282,8 @@ RADII = np.array([0.1, 1.0, 2.0])
         (lambda: RingTarget(np.array([0.5, 0.2, 1.0, 2.0]), GOOD, np.ones(1)), "increase from 0"),
     ],
 )
-def test_impossible_targets_are_refused(make: Callable[[], object], said: str) -> None:
-    with pytest.raises(DermisError, match=said):
+def test_impossible_targets_are_refused(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(DermisError, match=message):
         make()
 
 

@@ -94,7 +94,7 @@ def test_a_pure_wavelength_is_outside_the_gamut() -> None:
 
 
 @pytest.mark.parametrize(
-    ("grid", "said"),
+    ("grid", "message"),
     [
         ([], "increases"),
         ([500.0, 500.0], "increases"),
@@ -104,6 +104,6 @@ def test_a_pure_wavelength_is_outside_the_gamut() -> None:
         ([500.0, np.nan], "380 to 780"),
     ],
 )
-def test_bad_grids_are_refused(grid: list[float], said: str) -> None:
-    with pytest.raises(DermisError, match=said):
+def test_bad_grids_are_refused(grid: list[float], message: str) -> None:
+    with pytest.raises(DermisError, match=message):
         rgb_weights(np.array(grid))

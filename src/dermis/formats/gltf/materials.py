@@ -22,9 +22,9 @@ EYE, EYE_NORMAL = "eye", "eye normal"
 """Names of the pictures of an eye."""
 _TEARS = 0.15  # perceptual roughness of the tear film
 _COAT = 0.52  # of glTF's clear coat, which reflects 0.04 at normal incidence; eyes reflect 0.021
-_HAIR_ROUGH = 0.45
-_ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
-_ROUGH_ELSE = 0.8
+_HAIR_ROUGHNESS = 0.45
+_ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
+_DEFAULT_ROUGHNESS = 0.8
 
 
 @dataclass(frozen=True)
@@ -95,9 +95,9 @@ def surface_material(
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
-        words = (value for word, value in _ROUGH.items() if word in material.name.casefold())
-        rough = next(words, _ROUGH_ELSE)
-        return {"name": material.name, "pbrMetallicRoughness": _base_material(material, rough)}
+        matches = (value for word, value in _ROUGHNESS_BY_WORD.items() if word in material.name.casefold())
+        factor = next(matches, _DEFAULT_ROUGHNESS)
+        return {"name": material.name, "pbrMetallicRoughness": _base_material(material, factor)}
     surface = _base_material(material, float(np.sqrt(roughness)))
     if "colour" in pictures:
         del surface["baseColorFactor"]
@@ -134,7 +134,7 @@ def eye_material(material: Material) -> Tree:
 
 def hair_material(name: str) -> Tree:
     """Return the material of hairs, with a picture of the same name."""
-    surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGH}
+    surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGHNESS}
     return {"name": name, "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_ior": {"ior": ETA}}}
 
 

@@ -10,7 +10,7 @@ from dermis.optics.media import Floats
 
 SAMPLE_COUNT = 2048
 _DECADES = 16.0
-_CENTRE_PER_MM = 10.0  # skin scatters over tenths of a millimetre
+_CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
 _STEP = _DECADES * np.log(10.0) / SAMPLE_COUNT
 
 ZERO_FREQUENCY = np.array([1e-8])
@@ -20,7 +20,9 @@ ZERO_FREQUENCY = np.array([1e-8])
 @cache
 def frequencies() -> Floats:
     """Return the frequencies s for `inverse_transform`, (SAMPLE_COUNT,) log-spaced [1/mm]."""
-    return np.asarray(_CENTRE_PER_MM * np.exp(_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0)))
+    return np.asarray(
+        _CENTRE_FREQUENCY_PER_MM * np.exp(_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
+    )
 
 
 @cache

@@ -31,7 +31,7 @@ class _Face(NamedTuple):
     W: Floats
 
 
-class _Descent(NamedTuple):
+class _DownwardTransfer(NamedTuple):
     """Coefficients that give the fluence at the lower face of a sublayer from that at its upper face.
 
     All are 0 for the semi-infinite sublayer at the bottom.
@@ -43,7 +43,7 @@ class _Descent(NamedTuple):
     beta: Floats | float = 0.0
     lower: Floats | float = 0.0
 
-    def down(self, fluence: Floats) -> Floats:
+    def lower_fluence(self, fluence: Floats) -> Floats:
         across = self.E * (1.0 + self.rho) * self.common
         return np.asarray(fluence * across + (self.beta * (1.0 - self.E * across) + self.lower))
 
@@ -80,27 +80,27 @@ def _solve_sublayers(
     frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
 ) -> tuple[Floats, Floats]:
     """Return `solve` of sublayers, topmost first."""
-    fluence, descents = _solve_upwards(frequency, sublayers, channels, A)
+    fluence, transfers = _solve_upwards(frequency, sublayers, channels, A)
     R = fluence / (2.0 * A)
-    for descent in descents:
-        fluence = descent.down(fluence)
+    for transfer in transfers:
+        fluence = transfer.lower_fluence(fluence)
     return R, fluence / (2.0 * A)
 
 
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
-) -> tuple[Floats, list[_Descent]]:
-    """Return the fluence at the surface, and the coefficients for the way down through the sublayers."""
+) -> tuple[Floats, list[_DownwardTransfer]]:
+    """Return the fluence at the surface, and the transfer down through each sublayer, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channels))
-    face, descents = _Face(zero + 1.0 / (2.0 * A), zero), list[_Descent]()
+    face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
     for sublayer in reversed(sublayers):
-        face, descent = _propagate_up(s, sublayer, face)
-        descents.insert(0, descent)
-    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), descents
+        face, transfer = _propagate_up(s, sublayer, face)
+        transfers.insert(0, transfer)
+    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), transfers
 
 
-def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, _Descent]:
+def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, _DownwardTransfer]:
     """Return the boundary condition at a sublayer's upper face from that at its lower face."""
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
@@ -108,7 +108,7 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, 
     source = layer.sigma_s_prime * sublayer.beam / D
     slope = source / (sigma_t + q)  # of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):
-        return _Face(D * q, D * slope), _Descent()
+        return _Face(D * q, D * slope), _DownwardTransfer()
     E = np.exp(-q * d)
     gap = np.abs(sigma_t - q)
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
@@ -120,7 +120,7 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, 
     common = 1.0 / (1.0 + E**2 * rho)
     face = _Face(D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope)
     # phi at the lower face is a E + b + P, with a = (phi0 - beta E) common and b = a E rho + beta.
-    return face, _Descent(E, rho, common, beta, lower)
+    return face, _DownwardTransfer(E, rho, common, beta, lower)
 
 
 def _sublayers(medium: Medium, source: Source) -> list[_Sublayer]:

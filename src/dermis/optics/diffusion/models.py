@@ -38,7 +38,7 @@ SOURCES: dict[Model, tuple[str, ...]] = {
     "layered": ("Kienle1998", "Farrell1992", "Haskell1994"),
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
-_ABSORBING = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
+_MIN_ACCURATE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
 _NOTABLE_NEGATIVE = 0.005  # fraction of the total
 
 
@@ -145,7 +145,7 @@ def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
             effect = lost if clamp == "none" else "its source is moved into it"
             warnings.append(f"layer {number} ({layer.name}) is thinner than a mean free path: {effect}")
     worst = float(_first_event_albedo(medium).min())
-    if worst < _ABSORBING:
+    if worst < _MIN_ACCURATE_ALBEDO:
         warnings.append(
             f"the first mean free path absorbs (reduced albedo down to {worst:.2f}): at 0.5 the total of "
             "layered diffusion has an error of 14 %, that of the dipole 37 %"

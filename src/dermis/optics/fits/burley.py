@@ -11,7 +11,7 @@ from dermis.base.errors import refuse
 from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.media import Floats
 
-_HALF_LIGHT = 1.58  # s r within which half of the light leaves
+_MEDIAN_RADIUS_FACTOR = 1.58  # s r within which half of the light leaves
 _UNITY_FRACTION = 0.997
 UNREAL_FACTOR = 0.6
 _UNREAL_MIN_DISTANCE_CM = 0.1
@@ -108,7 +108,7 @@ def _fit_shape(target: RingTarget) -> float:
         profile = BurleyProfile(target.total, np.exp(np.array([log_shape])))
         return float(ring_error(target, np.diff(profile.energy_within(target.edges_mm), axis=0))[0])
 
-    guess = float(np.log(_HALF_LIGHT / target.mean_radius_at([0.5])[0]))
+    guess = float(np.log(_MEDIAN_RADIUS_FACTOR / target.mean_radius_at([0.5])[0]))
     grid = guess + np.linspace(-3.0, 3.0, 25)
     best = int(np.argmin([error(x) for x in grid]))
     bracket = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
@@ -150,7 +150,7 @@ def unity_parameters(profile: BurleyProfile) -> UnityParameters:
 class UnrealParameters:
     """Subsurface profile settings of Unreal Engine 5 with Burley's kernel, for a scene in centimetres.
 
-    surface_albedo : in each channel, linear Rec. 709 [-]
+    surface_albedo : diffuse albedo, linear Rec. 709 [-]
     mean_free_path_colour : mean free path relative to the distance, linear Rec. 709 [-]
     mean_free_path_distance_cm : its largest channel, or the smallest value that the engine accepts [cm]
     world_unit_scale : 1 is life-size [-]

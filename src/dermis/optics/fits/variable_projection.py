@@ -57,7 +57,7 @@ def minimise(
     damping, previous = 1e-2, None
     for _ in range(_MAX_STEPS):
         step = _step(fit, damping)
-        update = step if previous is None else _extrapolated(fit.log_variance, step, *previous)
+        update = step if previous is None else _anderson_step(fit.log_variance, step, *previous)
         trial = _project(design, samples, np.clip(fit.log_variance + update, *bounds))
         if trial.cost < fit.cost:
             converged = fit.cost - trial.cost < tolerance * fit.cost
@@ -81,11 +81,11 @@ def _step(fit: Fit, damping: float) -> Floats:
     return np.asarray(np.clip(step, -_MAX_STEP, _MAX_STEP))
 
 
-def _extrapolated(position: Floats, step: Floats, last_position: Floats, last_step: Floats) -> Floats:
-    """Return the step to where steps would vanish if they continued to change as since the last position.
+def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_step: Floats) -> Floats:
+    """Return the step of Anderson acceleration, extrapolated from the last two steps [Anderson1965].
 
-    The curvature of the residuals is neglected, so steps converge linearly: extrapolation replaces a dozen of
-    them.
+    Plain steps neglect the curvature of the residuals and converge linearly; one extrapolated step replaces a
+    dozen of them.
     """
     change = step - last_step
     size = float(change @ change)

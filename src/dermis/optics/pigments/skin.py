@@ -28,7 +28,7 @@ LEAKED_MELANIN: Final = 0.175
 _SHEET_MM = 0.001
 _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
-_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}, without reflection between them"
+_UNIFORM_INDEX_NOTE = f"all layers have the index {SKIN_ETA:g}, without reflection between them"
 _THIN_NOTE = "the multipole is inaccurate for so thin a layer: use layered diffusion"
 _Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
@@ -60,7 +60,7 @@ def spectral_medium(
     wavelengths = visible_wavelengths(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
-    return Medium(structure, stack, SKIN_ETA, (note, _ONE_INDEX), sources)
+    return Medium(structure, stack, SKIN_ETA, (note, _UNIFORM_INDEX_NOTE), sources)
 
 
 def _dj2006(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
