@@ -301,3 +301,10 @@ def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest
     shaded = scene(BALL, frontal(shadows=True))
     with pytest.raises(DermisError, match=r"shadow_size: expected a frame within 0 GB.* 1 maps of 8192"):
         renderer.draw(shaded, settings_of(shadow_size=8192))
+
+
+def test_old_names_of_options_warn(renderer: Renderer) -> None:
+    with pytest.warns(DeprecationWarning, match="anew is now force"):
+        renderer.draw(scene(), settings_of(), anew=True)  # type: ignore[call-arg]
+    with pytest.warns(DeprecationWarning, match="depth is now cache_size"):
+        Renderer(renderer.device.adapter.name, depth=2)  # type: ignore[call-arg]

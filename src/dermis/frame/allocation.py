@@ -151,7 +151,7 @@ def _sky(
 
 def _atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
     stretch = request.technique.stretch(request.settings)
-    atlas = memo.get(_cached_atlas, request.topology, request.atlas_plan.side, name, owner=str(index))
+    atlas = memo.get(cached_atlas, request.topology.mesh, request.atlas_plan.side, name, owner=str(index))
     return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, owner=str(index))
 
 
@@ -213,10 +213,6 @@ def _sum(
 ) -> Texture:
     owner = f"{role} {request.view_name}"
     return memo.get(_make_sum, device, technique, side, request.light_key, owner=owner)
-
-
-def _cached_atlas(head: Head, side: int, name: str) -> Atlas:
-    return cached_atlas(head.mesh, side, name)
 
 
 def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> ShadowMaps:

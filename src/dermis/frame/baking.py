@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import cross_2d, rasterise, texel_corners
+from dermis.atlas.raster import rasterise, texel_corners
 from dermis.base.errors import DermisError
 from dermis.frame.features.shading import bake as baking_pass
 from dermis.frame.features.shading.bake import CHANNELS, COUNT
@@ -18,7 +18,7 @@ from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, MutableBindings
-from dermis.mesh.geometry import uv_cross
+from dermis.mesh.geometry import cross_2d, uv_cross
 from dermis.mesh.mesh import Mesh
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

@@ -27,16 +27,7 @@ from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import FLOATS, level_format
 from dermis.frame.technique import ProfileSplit, TechniqueResources, TechniqueTraits, channel_weights
-from dermis.gpu import (
-    ComputeProgram,
-    Device,
-    Graph,
-    Memo,
-    Recorder,
-    Texture,
-    TextureOrView,
-    UniformRecord,
-)
+from dermis.gpu import ComputeProgram, Device, Graph, Memo, Recorder, Texture, TextureOrView, UniformRecord
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings

@@ -8,7 +8,6 @@ from dermis.frame.features.shape.curvature import Curvature, make_curvature
 from dermis.frame.features.shape.shape import Shape, ShapeTables, make_rest_shape, make_shape, shape_tables
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Device, Memo
-from dermis.mesh.head import Head
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +27,11 @@ class Resources:
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the shape of the requested head."""
-    cached = memo.get
+    cached, mesh = memo.get, request.topology.mesh
     tables = cached(shape_tables, device, request.topology, owner="shared" if request.is_shared else "")
     return Resources(
         shape=cached(make_shape, device, tables),
         tables=tables,
         rest_shape=cached(make_rest_shape, device, tables) if request.rest_positions_mm is not None else None,
-        curvature=cached(_curvature, device, request.topology) if request.technique.needs_curvature else None,
+        curvature=cached(make_curvature, device, mesh) if request.technique.needs_curvature else None,
     )
-
-
-def _curvature(device: Device, head: Head) -> Curvature:
-    return make_curvature(device, head.mesh)

@@ -9,16 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.programs import program, workgroup_grid
-from dermis.gpu import (
-    Bindings,
-    Buffer,
-    CommandList,
-    Constants,
-    Device,
-    Recorder,
-    Texture,
-    make_texture,
-)
+from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device, Recorder, Texture, make_texture
 from dermis.mesh.eyeball import LidContact
 from dermis.mesh.geometry import MIN_UV_CROSS, vertex_normals
 from dermis.mesh.head import Head
