@@ -15,7 +15,7 @@ from gltf_rules import check_rules, khronos_issues
 from dermis import DermisError, Human, Pose, load_head
 from dermis.formats.gltf.document import Document
 from dermis.formats.gltf.primitives import FibreTubes
-from dermis.frame.features.surface.painting.painted_head import eye_pictures
+from dermis.frame.features.surface.painting.painted_head import paint_eye
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.person_file import write_person_glb
@@ -29,7 +29,7 @@ SIDE = 256
 
 @pytest.fixture(scope="module")
 def pictures(device: Device) -> EyeTextures:
-    return eye_pictures(device, LOOK, SIDE)
+    return paint_eye(device, LOOK, SIDE)
 
 
 @pytest.fixture(scope="module")

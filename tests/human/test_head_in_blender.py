@@ -13,7 +13,7 @@ import pytest
 
 from dermis import Human, Pose, load_head
 from dermis.apps.truths.cycles import PYTHON_VARIABLE
-from dermis.frame.features.surface.painting.painted_head import painted_head
+from dermis.frame.features.surface.painting.painted_head import paint_head
 from dermis.gpu import open_device
 from dermis.human.person_file import write_person_glb
 from dermis.images.io import read_image
@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder with the file and Blender's results."""
     made = tmp_path_factory.mktemp("blender")
     device = open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
-    painted, eyes = painted_head(device, PERSON.head(), 512)
+    painted, eyes = paint_head(device, PERSON.head(), 512)
     write_person_glb(made / "person.glb", PERSON, painted, roughness=0.3, eyes=eyes)
     command = [os.environ[PYTHON_VARIABLE], str(SCRIPT), str(made / "person.glb"), str(made)]
     apart = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}

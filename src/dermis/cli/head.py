@@ -128,7 +128,7 @@ def head(
         Print one JSON object with the parameters of the person and the size of the file.
     """
     from dermis.base.atomic_write import check_output
-    from dermis.frame.features.surface.painting.painted_head import painted_head
+    from dermis.frame.features.surface.painting.painted_head import paint_head
     from dermis.gpu.failures import run_on_device
     from dermis.human.makehuman import human_targets
     from dermis.human.person_file import person_numbers, write_person_json
@@ -156,7 +156,7 @@ def head(
     with spinner("creating the head"):
         person_head = person.head(layout=layout, **drop_none(subdivide=subdivide))
         person_head = _with_maps(person_head, drop_none(colour=colour, normal=normal, roughness=roughness))
-        person_head, eyes = run_on_device(adapter, lambda device: painted_head(device, person_head, size))
+        person_head, eyes = run_on_device(adapter, lambda device: paint_head(device, person_head, size))
         byte_count = _write(output, person, person_head, rest_weights, eyes)
     seconds, mesh = round(time.perf_counter() - started, 3), person_head.mesh
     report |= {"vertices": len(mesh.positions), "triangles": len(mesh.triangles)}

@@ -188,8 +188,8 @@ def _layout(
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
         posed, rest = ({**one.resources, **textures.resources} for one in (geometry, at_rest()))
         blurred = request.split.blurred_mm2, request.split.weight
-        how = thin_part_tables(memo, request), request.skin.overrides_tissue
-        translucency = make_translucency(memo, device, posed, rest, atlas, *blurred, *how, owner=number)
+        tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
+        translucency = make_translucency(memo, device, posed, rest, atlas, *blurred, *tissue, owner=number)
     interreflection = None
     if request.has_interreflection:
         light = request.split.total, request.has_occlusion, request.light_key

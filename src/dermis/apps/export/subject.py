@@ -96,11 +96,11 @@ class Subject:
 
     def eye_pictures(self) -> EyeTextures | None:
         """Return the painted textures of the eyes, or None if there are no eyes."""
-        from dermis.frame.features.surface.painting.painted_head import eye_pictures
+        from dermis.frame.features.surface.painting.painted_head import paint_eye
         from dermis.gpu.failures import run_on_device
 
         eyes = self.head_or_ball.eyes
-        return None if eyes is None else run_on_device("auto", lambda device: eye_pictures(device, eyes.look))
+        return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, side: int, adapter: str) -> Subject:
         """Return the subject with all maps of its head as arrays; itself if no map has to be painted.

@@ -43,25 +43,26 @@ class MippedTexture(NamedTuple):
 
 def upload_colours(device: Device, image: Floats) -> Texture:
     """Upload an (h, w, 3) picture with its mip levels."""
-    made = empty_map(device, image.shape)
-    upload(device, made.texture, np.dstack([image.astype(np.float16), np.ones(image.shape[:2], np.float16)]))
+    mipped = empty_map(device, image.shape)
+    alpha = np.ones(image.shape[:2], np.float16)
+    upload(device, mipped.texture, np.dstack([image.astype(np.float16), alpha]))
     frame = CommandList(device, timed=False)
-    fill_mips(frame, made)
+    fill_mips(frame, mipped)
     frame.submit()
-    return made.texture
+    return mipped.texture
 
 
 def upload_slopes(device: Device, image: Floats | None) -> Texture:
     """Upload (h, w, 2) slopes with their squares and mip levels; None gives a flat texture."""
     if image is None:
         return _flat(device)
-    made, frame = empty_map(device, image.shape), CommandList(device, timed=False)
-    bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": made.levels[0]}
+    mipped, frame = empty_map(device, image.shape), CommandList(device, timed=False)
+    bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": mipped.levels[0]}
     shader = program(device, "surface/map_moments.wgsl", store=HALVES)
     frame.compute("maps", shader, bound, image.shape[1::-1])
-    fill_mips(frame, made)
+    fill_mips(frame, mipped)
     frame.submit()
-    return made.texture
+    return mipped.texture
 
 
 def upload_detail(device: Device, slopes: Floats) -> Texture:
@@ -100,12 +101,12 @@ def relief_from_buffers(
     shape : (h, w) of the height map
     band : number of rows per buffer
     """
-    made, frame, (rows, columns) = empty_map(device, shape), CommandList(device, timed=False), shape
+    mipped, frame, (rows, columns) = empty_map(device, shape), CommandList(device, timed=False), shape
     for index, heights in enumerate(bands):
-        _draw_slopes(frame, made, heights, index * band, min(band, rows - index * band))
-    fill_mips(frame, made, 1 if rows % 2 or columns % 2 else 2)
+        _draw_slopes(frame, mipped, heights, index * band, min(band, rows - index * band))
+    fill_mips(frame, mipped, 1 if rows % 2 or columns % 2 else 2)
     frame.submit()
-    return made.texture
+    return mipped.texture
 
 
 def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:

@@ -21,22 +21,22 @@ SIDE = 1024
 """Side of the pictures [texels]; a texel of the iris is 0.025 mm wide."""
 
 
-def eye_pictures(device: Device, look: EyeLook, side: int = SIDE) -> EyeTextures:
+def paint_eye(device: Device, look: EyeLook, side: int = SIDE) -> EyeTextures:
     """Return pictures of an eye as seen along its axis through the cornea."""
     shader = program(device, "surface/painting/eye_pictures.wgsl")
     picture = shader.record("EyePicture", rim=UV_RIM, falling=UV_FALLOFF)
     fill_eye(picture["eye"], look)
-    made = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
+    textures = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
     frame = CommandList(device, timed=False)
-    frame.compute("paint", shader, {"picture": picture, **made}, (side, side))
+    frame.compute("paint", shader, {"picture": picture, **textures}, (side, side))
     frame.submit()
-    colours, normals = (download(device, texture)[..., :3] for texture in made.values())
+    colours, normals = (download(device, texture)[..., :3] for texture in textures.values())
     return EyeTextures(np.ascontiguousarray(colours, np.float32), np.ascontiguousarray(normals, np.float32))
 
 
-def painted_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures | None]:
+def paint_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures | None]:
     """Return the result of `with_painted_maps`, and pictures of the eyes if they are modelled."""
-    eyes = None if head.eyes is None else eye_pictures(device, head.eyes.look)
+    eyes = None if head.eyes is None else paint_eye(device, head.eyes.look)
     return with_painted_maps(device, head, side), eyes
 
 
@@ -55,8 +55,8 @@ def with_painted_maps(device: Device, head: Head, side: int) -> Head:
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
         return head
-    found = paint.paint_arrays(device, painted_surface(head.mesh, head.control.stencils), maps.look, side)
-    given = {one.name: getattr(maps, one.name) for one in fields(found)}
-    if given["normal"] is not None:
-        found = replace(found, height=None)
-    return replace(head, maps=replace(found, **{k: v for k, v in given.items() if v is not None}))
+    painted = paint.paint_arrays(device, painted_surface(head.mesh, head.control.stencils), maps.look, side)
+    own = {field.name: getattr(maps, field.name) for field in fields(painted)}
+    if own["normal"] is not None:
+        painted = replace(painted, height=None)
+    return replace(head, maps=replace(painted, **{k: v for k, v in own.items() if v is not None}))
