@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def jobs(*numbers: int) -> Iterator[tuple[int, np.ndarray]]:
 
 def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
     numbers = range(9)
-    with EncoderPool(0, encode) as here, EncoderPool(2, encode) as there:
+    with closing(EncoderPool(0, encode)) as here, closing(EncoderPool(2, encode)) as there:
         expected, found = list(here.encode_all(jobs(*numbers))), list(there.encode_all(jobs(*numbers)))
     assert [(number, one["raw"]) for number, one in found] == [
         (number, one["raw"]) for number, one in expected
@@ -47,7 +48,7 @@ def test_jobs_are_asked_for_only_a_few_ahead() -> None:
             started.append(1)
             yield job
 
-    with EncoderPool(1, encode) as encoders:
+    with closing(EncoderPool(1, encode)) as encoders:
         found = encoders.encode_all(counted_jobs())
         next(found)
         assert len(started) <= 4
@@ -57,7 +58,7 @@ def test_jobs_are_asked_for_only_a_few_ahead() -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
 def test_one_that_dies_is_told_and_others_come_in_its_place() -> None:
-    with EncoderPool(1, encode) as encoders:
+    with closing(EncoderPool(1, encode)) as encoders:
         with pytest.raises(LostProcessError, match="SIGKILL"):
             list(encoders.encode_all(jobs(1, 90, 2)))
         with pytest.raises(DermisError, match="image 80"):

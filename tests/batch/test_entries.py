@@ -39,8 +39,8 @@ def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encod
     assert found.shape == values.shape and found.dtype == output.kind
     description = storage_description(name, encoding)
     if "16-bit PNG" in description:
-        assert output.levels is not None
-        np.testing.assert_allclose(found, values, rtol=1e-6, atol=0.51 * output.levels.step)
+        assert output.quantisation is not None
+        np.testing.assert_allclose(found, values, rtol=1e-6, atol=0.51 * output.quantisation.step)
     elif "16" in description:
         np.testing.assert_allclose(found, values, rtol=2**-11, atol=1e-7)
     else:

@@ -68,7 +68,7 @@ def test_the_command_ends_with_2_where_all_do(
     errors = capsys.readouterr().err
     assert ended.value.code == 2 and REOPENED in errors and "its shard is rendered again" in errors
     assert re.search(
-        rf"shard 3: .* but {ATTEMPTS} failed, .*{LOST_TWICE}.*\. Complete shards are kept", errors
+        rf"shard 3: .* but {ATTEMPTS} failed; .*{LOST_TWICE}.*\. Complete shards are kept", errors
     )
     assert ".." not in errors and ".;" not in errors
     assert len(list(lost.iterdir())) == ATTEMPTS and contents(out) == before
