@@ -12,54 +12,54 @@ from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import (
     BackgroundTable,
     CameraTable,
-    Correlated,
+    CorrelationGroup,
     EnvironmentTable,
     ExpressionTable,
     GazeTable,
+    HeadRotationTable,
     LampTable,
     LightTable,
     PersonTable,
-    TurnTable,
 )
 from dermis.apps.gallery.script import Script, find_scripts
 from dermis.base import citations as cite
-from dermis.cli.head_options import HEAD
+from dermis.cli.head_options import HEAD_OPTION_NAMES
 from dermis.cli.options import is_option, option_name
-from dermis.cli.scene_options import AROUND
+from dermis.cli.scene_options import ENVIRONMENT_OPTION_NAMES
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.files import PoseTable
+from dermis.scene.frozen_model import FrozenModel, accepted_values, field_heading, field_help, format_default
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
-from dermis.scene.plain import Plain, heading_of, help_of, shown, values_of
 from dermis.scene.skin import Pigments, TissueLayer
 from dermis.scene.toml_text import value_text
 
 HERE = Path(__file__).parent
-TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
-    "[head]": (HeadTable, {"name": ""} | HEAD),
+TABLES: dict[str, tuple[type[FrozenModel], dict[str, str] | None]] = {
+    "[head]": (HeadTable, {"name": ""} | HEAD_OPTION_NAMES),
     "[head.eye]": (EyeTable, None),
     "[pose]": (PoseTable, None),
     "[skin]": (Skin, {}),
     "[skin.pigments]": (Pigments, None),
     "[[skin.layers]]": (TissueLayer, None),
     **{f"[[lights]], {name}": (kind, None) for name, kind in LIGHTS.items()},
-    "[environment]": (Environment, AROUND),
+    "[environment]": (Environment, ENVIRONMENT_OPTION_NAMES),
     "[camera]": (Camera, None),
     "[render]": (Settings, {}),
 }
 """The tables of a scene's file: their models, and options by field where these are called otherwise."""
-SPEC_TABLES: dict[str, type[Plain]] = {
+SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "Above all tables": Spec,
     "[person]": PersonTable,
     "[expression]": ExpressionTable,
-    "[head]": TurnTable,
+    "[head]": HeadRotationTable,
     "[gaze]": GazeTable,
     "[camera]": CameraTable,
     "[light]": LightTable,
     "[light.key], [light.fill], [light.rim]": LampTable,
     "[environment]": EnvironmentTable,
     "[background]": BackgroundTable,
-    "[[correlated]]": Correlated,
+    "[[correlated]]": CorrelationGroup,
 }
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
 _PARTS = re.compile(
@@ -105,7 +105,7 @@ def _picture(script: Script) -> str:
 
 
 def _drawn(equation: str) -> str:
-    """A script's equation in TeX: words upright, indices and powers in their places."""
+    """Return the equation of a script in TeX."""
 
     def part(found: re.Match[str]) -> str:
         index, power, name, word = found["index"], found["power"], found["name"], found["word"]
@@ -119,14 +119,14 @@ def _drawn(equation: str) -> str:
 
 
 def settings() -> str:
-    """The tables of a scene's file, key by key."""
+    """Return the tables of a scene's file, key by key."""
     intro = "The tables of a scene's file, and the options of `dermis render` and `dermis view` for each key."
     parts = [f"## {title}\n\n{table_of(model, names)}" for title, (model, names) in TABLES.items()]
     return "\n".join(["# Settings", "", intro, "", *parts])
 
 
 def spec() -> str:
-    """The tables of a data set's spec, key by key."""
+    """Return the tables of a data set's spec, key by key."""
     intro = (
         "The tables of a spec, from which `dermis batch` draws [data sets](../batch.md). `size`, width and"
     )
@@ -137,15 +137,15 @@ def spec() -> str:
     return "\n".join(["# Keys of a spec", "", intro, "", *parts])
 
 
-def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
-    """A model's fields as a table.
+def table_of(model: type[FrozenModel], names: dict[str, str] | None) -> str:
+    """Return a model's fields as a table.
 
     names : options by field where they are called otherwise; None for a model without options
     """
     columns = ["key", *(["option"] if names is not None else []), "values", "default", "meaning"]
     rows = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
-    for field in sorted(model.model_fields, key=lambda field: heading_of(model, field)):
-        info, heading = model.model_fields[field], heading_of(model, field)
+    for field in sorted(model.model_fields, key=lambda field: field_heading(model, field)):
+        info, heading = model.model_fields[field], field_heading(model, field)
         if info.exclude:
             continue
         cells = [f"`{field}`"]
@@ -153,22 +153,22 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
             known = names.get(field) != "" and is_option(model, field)
             cells.append(f"`{option_name(field, names)}`" if known else "")
         default = "needed" if info.is_required() else _default(info.get_default())
-        meaning = f"*{heading}.* {help_of(model, field)}" if heading else help_of(model, field)
-        cells += [values_of(model, field), default, meaning]
+        meaning = f"*{heading}.* {field_help(model, field)}" if heading else field_help(model, field)
+        cells += [accepted_values(model, field), default, meaning]
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join([*rows, ""])
 
 
 def _default(value: Any) -> str:
-    """A default as it is typed, nothing for a table's."""
+    """Return the default as a user would type it, or an empty text for tables."""
     if isinstance(value, Distribution):
         told = value.spec_value()
-        return shown(told) if isinstance(told, str | float) else f"`{value_text(told)}`"
-    return "" if isinstance(value, Plain) else shown(value)
+        return format_default(told) if isinstance(told, str | float) else f"`{value_text(told)}`"
+    return "" if isinstance(value, FrozenModel) else format_default(value)
 
 
 def reference() -> str:
-    """The public names, each with its docstring."""
+    """Return the public names, each with its docstring."""
     entries = []
     for name in dermis.__all__:
         thing = getattr(dermis, name)
@@ -177,7 +177,7 @@ def reference() -> str:
         members = ", ".join(_methods(thing)) if kind == "autoclass" else ""
         listed = f"\n   :members: {members}" if members else ""
         entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: dermis.{name}{listed}\n```\n"
-        told = isinstance(thing, type) and issubclass(thing, Plain)
+        told = isinstance(thing, type) and issubclass(thing, FrozenModel)
         entries.append(f"{entry}\n{table_of(thing, None)}" if told else entry)
     intro = "All of these are names of `dermis`. Lights, cameras, skins, environments and settings do not "
     intro += "change: `replace(...)` of each gives a checked copy with other values."
@@ -185,12 +185,12 @@ def reference() -> str:
 
 
 def _methods(kind: type) -> list[str]:
-    """What a class offers besides its values."""
+    """Return the names of the methods and class attributes of a class."""
     fields = getattr(kind, "model_fields", getattr(kind, "__dataclass_fields__", {}))
     return [
         name
         for name, thing in vars(kind).items()
-        if not name.startswith(("_", "model_")) and name not in fields and name != "meant" and _told(thing)
+        if not name.startswith(("_", "model_")) and name not in fields and name != "synonyms" and _told(thing)
     ]
 
 
@@ -212,7 +212,7 @@ def bibliography() -> str:
 
 def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Lines "name : meaning" of the house's docstrings as Sphinx's fields, and keys as links."""
-    if isinstance(thing, type) and issubclass(thing, Plain) and "Parameters" in lines:
+    if isinstance(thing, type) and issubclass(thing, FrozenModel) and "Parameters" in lines:
         del lines[lines.index("Parameters") :]  # the table that follows has them
     made: list[str] = []
     entry: list[str] = []  # of the fields of a line, with what goes on below it
@@ -229,7 +229,7 @@ def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
 
 
 def _fields_of(entry: list[str]) -> list[str]:
-    """The fields of "position, target : meaning", one for each name."""
+    """Return the fields of "position, target : meaning", one for each name."""
     found = _FIELD.match(entry[0])
     assert found is not None
     made: list[str] = []
@@ -242,5 +242,5 @@ def _fields_of(entry: list[str]) -> list[str]:
 def _signature(
     app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """The signature with dots for a default that is made for each object."""
+    """Return the signature with dots in place of defaults that are created for each object."""
     return signature and signature.replace("<factory>", "..."), returned

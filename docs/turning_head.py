@@ -10,7 +10,7 @@ _STYLE = "width:100%;aspect-ratio:4/3;border:0;background:#000"
 
 
 def turning(text: str, head: str) -> str:
-    """The front page with a frame that shows the head's page in place of its first picture.
+    """Return the front page with the page of the turning head in place of its first picture.
 
     head : "" leaves the picture
     """

@@ -31,7 +31,7 @@ def curves(axes):
     axes.plot(degrees, approximate, label="Schlick, F₀ = 0.028")
     axes.plot(degrees, exact, label="exact, index 1.4")
     axes.plot(degrees, 10 * np.abs(approximate - exact), color="grey", label="10 × difference")
-    axes.set(xlabel="angle of view and half vector [°]", ylabel="share reflected", xlim=(0, 90), ylim=(0, 1))
+    axes.set(xlabel="angle of view and half vector [°]", ylabel="reflectance", xlim=(0, 90), ylim=(0, 1))
     axes.legend(frameon=False)
 
 

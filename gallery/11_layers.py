@@ -21,7 +21,7 @@ def draw(studio):
     near = dermis.portrait(head).model_copy(update={"target": (14.0, -28.0, 90.0), "frame_mm": 110.0})
     skins = {label: dermis.Skin(profile=tissue) for label, (tissue, _) in MODELS.items()}
     heads = {name: studio.render(dermis.Scene(head, [key], near, skin)) for name, skin in skins.items()}
-    return {"profiles, each over its total": plot_panel(curves)} | heads
+    return {"normalised profiles": plot_panel(curves)} | heads
 
 
 def curves(axes):

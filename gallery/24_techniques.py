@@ -17,12 +17,11 @@ from dermis.scene.techniques import TECHNIQUES
 
 def draw(studio):
     settings = studio.settings(0.6)
-    comparison = compare(studio.head(), "surface-integral", TECHNIQUES.names, region="nose", settings=settings)
-    panels = {"the surface integral": (255 * comparison.tone_mapped(comparison.reference.image)).round().astype("uint8")}
-    for row in comparison.rows:
-        image = (255 * comparison.tone_mapped(comparison.images[row.technique])).round().astype("uint8")
-        panels[f"{row.technique}: {row.relrmse:.1%}, {row.ms:.0f} ms"] = image
-    return panels
+    compared = compare(studio.head(), "surface-integral", TECHNIQUES.names, region="nose", settings=settings)
+    images = {"the surface integral": compared.reference.image}
+    for row in compared.rows:
+        images[f"{row.technique}: {row.relrmse:.1%}, {row.ms:.0f} ms"] = compared.images[row.technique]
+    return {name: (255 * compared.tone_mapped(one)).round().astype("uint8") for name, one in images.items()}
 
 
 if __name__ == "__main__":

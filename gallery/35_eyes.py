@@ -28,8 +28,8 @@ def draw(studio):
     head = dermis.Human(caucasian=1, african=0, asian=0).head(subdivide=2)
     eye = np.array([-28.5, -1.0, 12.0]) - head.centre_mm
     panels = {}
-    for name, (look, direction) in EYES.items():
-        camera = dermis.Camera(position=tuple(eye + 500 * np.array(direction)), target=tuple(eye), frame_mm=36)
+    for name, (look, axis) in EYES.items():
+        camera = dermis.Camera(position=tuple(eye + 500 * np.array(axis)), target=tuple(eye), frame_mm=36)
         own = dermis.Scene(replace(head, eyes=head.eyes.with_look(look)), camera=camera)
         panels[name] = studio.render(own)
     return panels

@@ -23,9 +23,7 @@ def draw(studio):
     before = dermis.Scene("human:7", (*dermis.studio(), SUN), camera, pose=BEFORE)
     now, settings = before.replace(pose=NOW), studio.settings()
     rendered = studio.renderer.draw(now, settings, outputs=NAMES, previous=before)
-    return {"picture": rendered.srgb8()} | {
-        name: output_image(name, rendered.output(name)) for name in NAMES
-    }
+    return {"picture": rendered.srgb8()} | {name: output_image(name, rendered.output(name)) for name in NAMES}
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ class Patch(NamedTuple):
     flat: Floats
 
 
-class Lay(NamedTuple):
+class ChartPlacement(NamedTuple):
     """Placement of a chart in uv: centre, scale, rotation, and whether it is mirrored."""
 
     middle: tuple[float, float]
@@ -34,7 +34,7 @@ class Lay(NamedTuple):
     mirrored: bool = False
 
 
-def assemble(patches: Sequence[Patch], lays: Sequence[Lay]) -> Mesh:
+def assemble(patches: Sequence[Patch], lays: Sequence[ChartPlacement]) -> Mesh:
     """Return one mesh of all patches; points at the same position are merged."""
     positions, uv, triangles, first = [], [], [], 0
     for patch, lay in zip(patches, lays, strict=True):
@@ -50,7 +50,7 @@ def assemble(patches: Sequence[Patch], lays: Sequence[Lay]) -> Mesh:
     return build_mesh(places, np.concatenate(uv), corners, np.zeros(len(corners)), SKIN)
 
 
-def _laid(flat: Floats, lay: Lay) -> Floats:
+def _laid(flat: Floats, lay: ChartPlacement) -> Floats:
     angle = np.radians(lay.turn_degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     side = np.array([-1.0 if lay.mirrored else 1.0, 1.0])
@@ -58,16 +58,16 @@ def _laid(flat: Floats, lay: Lay) -> Floats:
 
 
 SPHERE_LAYS = (
-    Lay((0.17, 0.2), 0.10),
-    Lay((0.5, 0.2), 0.09, 90.0),
-    Lay((0.83, 0.2), 0.11, -35.0),
-    Lay((0.17, 0.7), 0.08, 180.0, mirrored=True),
-    Lay((0.5, 0.7), 0.10, 20.0),
-    Lay((0.83, 0.7), 0.095, 0.0, mirrored=True),
+    ChartPlacement((0.17, 0.2), 0.10),
+    ChartPlacement((0.5, 0.2), 0.09, 90.0),
+    ChartPlacement((0.83, 0.2), 0.11, -35.0),
+    ChartPlacement((0.17, 0.7), 0.08, 180.0, mirrored=True),
+    ChartPlacement((0.5, 0.7), 0.10, 20.0),
+    ChartPlacement((0.83, 0.7), 0.095, 0.0, mirrored=True),
 )
 
 
-def cut_sphere(radius_mm: float, cells: int, lays: Sequence[Lay] = SPHERE_LAYS) -> Mesh:
+def cut_sphere(radius_mm: float, cells: int, lays: Sequence[ChartPlacement] = SPHERE_LAYS) -> Mesh:
     """Return a sphere about the origin as six charts of `cells` x `cells`, one per face of a cube."""
     along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     x, y = np.meshgrid(along, along)
@@ -86,13 +86,15 @@ def cut_sphere(radius_mm: float, cells: int, lays: Sequence[Lay] = SPHERE_LAYS) 
 
 
 CYLINDER_LAYS = (
-    Lay((0.2, 0.5), 0.0045),
-    Lay((0.53, 0.5), 0.0035, 90.0),
-    Lay((0.84, 0.5), 0.004, 0.0, mirrored=True),
+    ChartPlacement((0.2, 0.5), 0.0045),
+    ChartPlacement((0.53, 0.5), 0.0035, 90.0),
+    ChartPlacement((0.84, 0.5), 0.004, 0.0, mirrored=True),
 )
 
 
-def cut_cylinder(radius_mm: float, height_mm: float, cells: int, lays: Sequence[Lay] = CYLINDER_LAYS) -> Mesh:
+def cut_cylinder(
+    radius_mm: float, height_mm: float, cells: int, lays: Sequence[ChartPlacement] = CYLINDER_LAYS
+) -> Mesh:
     """Return an open cylinder around the Y axis with one unstretched chart per placement."""
     patches = []
     share = 2 * np.pi / len(lays)
@@ -126,7 +128,7 @@ def cut_cone(radius_mm: float, gap_degrees: float, rings: int = 16, segments: in
     start = angle + np.radians(gap_degrees) / 2
     flat = np.stack((away * np.sin(start), -away * np.cos(start)), axis=-1)
     # rows run around, columns outwards: a triangle at the apex has no area and is left out
-    mesh = assemble([Patch(points[::-1], flat[::-1])], [Lay((0.5, 0.5), 0.45 / radius_mm)])
+    mesh = assemble([Patch(points[::-1], flat[::-1])], [ChartPlacement((0.5, 0.5), 0.45 / radius_mm)])
     p = mesh.positions[mesh.triangles]
     sound = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) > 1e-9
     return build_mesh(mesh.positions, mesh.uv, mesh.triangles[sound], mesh.material[sound], SKIN)
@@ -137,4 +139,4 @@ def folded_sheet(side_mm: float, cells: int) -> Mesh:
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1))
     points = side_mm * np.stack((x, -y, 0 * x), axis=-1)
     flat = np.stack((np.abs(x), y), axis=-1)
-    return assemble([Patch(points, flat)], [Lay((0.2, 0.5), 0.9)])
+    return assemble([Patch(points, flat)], [ChartPlacement((0.2, 0.5), 0.9)])

@@ -24,7 +24,7 @@ _CLIP_S = 2.0
 
 
 def write_rigged_head(path: Path) -> Path:
-    """A .glb with four targets, two bones, and the clip "talk", which opens the jaw and turns the head."""
+    """Write a .glb with four targets, two bones, and the clip "talk", which moves the jaw and the head."""
     ball, file = uv_sphere(0.5, 24, 12), GltfFile()
     moves = {name: _bump(ball.positions, *how) for name, how in TARGETS.items()}
     share = np.clip(ball.positions[:, 1] / 0.4 + 1.0, 0.0, 1.0)

@@ -208,7 +208,7 @@ def test_a_full_disk_leaves_no_part_file(
 def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cached_atlas(plane(10.0), 64)
     one = only(folder).stat().st_size
-    monkeypatch.setattr(disk, "_MOST_BYTES", int(2.5 * one))
+    monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", int(2.5 * one))
     first = only(folder)
     os.utime(first, (1, 1))
     cached_atlas(plane(11.0), 64)
@@ -260,7 +260,7 @@ def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It would evict all others, and itself, each time."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    monkeypatch.setattr(disk, "_MOST_BYTES", 1000)
+    monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", 1000)
     for k in (1, 2):
         assert cached_array(np.zeros(1), "large", lambda k=k: np.full(200, k))[0] == k  # type: ignore[misc]
         assert cached_array(np.zeros(1), "small", lambda k=k: np.full(20, k))[0] == 1  # type: ignore[misc]
@@ -271,7 +271,7 @@ def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
 ) -> None:
     """The maps of one head may exceed the limit; otherwise each start would compute and write all of them."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    monkeypatch.setattr(disk, "_MOST_BYTES", 100_000)
+    monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", 100_000)
     made: list[int] = []
 
     def start(first: int) -> None:
@@ -372,7 +372,7 @@ from dermis.base.private import cache_folder
 for k in range(60):
     for name in "ab":
         expected = np.full(3000, ord(name) + k % 3)
-        found = disk.stored("both", name + str(k % 3), ["array"], lambda: {"array": expected})
+        found = disk.load_or_make("both", name + str(k % 3), ["array"], lambda: {"array": expected})
         assert np.array_equal(found["array"], expected)
         if k % 5 == 0:
             (cache_folder() / "both" / f"{name}{k % 3}.arrays").unlink(missing_ok=True)

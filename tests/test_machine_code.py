@@ -64,7 +64,7 @@ def test_other_types_and_other_texts_have_other_code(folder: Path, monkeypatch: 
     function = _outer()
     assert function(20) == 41 and function(0.5) == 2.0
     assert _outer()(0.5) == 2.0 and len(_files(folder)) == 4
-    monkeypatch.setattr("dermis.base.compiled._code", lambda folder: "a file was changed")
+    monkeypatch.setattr("dermis.base.compiled._source_hash", lambda folder: "a file was changed")
     assert not _was_found(_outer())
 
 

@@ -93,13 +93,13 @@ WHITE_THIN = 0.01
 """Share of the light that a white sheet in even light may give too much or too little."""
 
 OCCLUSION = 0.04
-"""Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""
+"""Visible fraction of the sky by 128 directions against closed forms: one direction is up to 0.03 of it."""
 
 FOLLOWED = 0.03
-"""Open share that follows a shape against one baked anew, root mean square: by 64 directions at vertices."""
+"""RMS difference between occlusion that follows a shape and one baked for it, by 64 directions."""
 
 STILL = 1e-3
-"""What the open share of a head that does not change may change by: its points move within their texels."""
+"""Change of the occlusion of a head that does not move: its points move within their texels."""
 
 SEAM = 0.01
 """Jump of the scattered light across a seam, of the light there."""

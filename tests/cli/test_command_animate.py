@@ -179,7 +179,7 @@ REFUSED = {
     "odd size": ("face.glb --size 31x32", "--size", "got 31x32"),
     "crf": ("face.glb --crf 99", "--crf", "got 99"),
     "crf of pictures": ("face.glb -o f/%d.png --crf 9", "--crf", "f/%d.png"),
-    "anew with a movie": ("face.glb --anew", "--anew", "out.mp4"),
+    "--anew with a movie": ("face.glb --anew", "--anew", "out.mp4"),
     "one picture": ("face.glb -o a.png", "a.png", "one picture"),
     "another film": ("face.glb -o a.avi", "a.avi", "'.avi'"),
     "no folder": ("face.glb -o nowhere/a.mp4", "nowhere/a.mp4", "no folder"),

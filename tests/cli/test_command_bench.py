@@ -73,7 +73,7 @@ def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(cases.PRESETS, "cpu", too_large)
     ended = bench("--preset", "cpu")
     assert ended.code == 0
-    assert f"left out: 32x32, atlas {device.max_texture_size + 1}" in ended.stdout
+    assert f"skipped: 32x32, atlas {device.max_texture_size + 1}" in ended.stdout
     assert str(device.max_texture_size) in ended.stdout
 
 

@@ -54,11 +54,11 @@ def test_rows_are_against_what_it_rendered(compare: Run, folder: Path) -> None:
     ended = compare(f'exec "{sys.executable}" "{folder}/blender.py" "$3"', "--json", "-o", "report.html")
     assert (ended.code, ended.stderr) == (0, "")
     report = json.loads(ended.stdout)
-    assert report["truth"] == {"seconds": 2.0, "notes": ["8 paths a pixel, random walk"]}
+    assert report["truth"] == {"seconds": 2.0, "notes": ["8 paths per pixel, random walk"]}
     (row,) = report["rows"]
     assert (row["technique"], row["against"]) == ("none", "cycles")
     assert row["relrmse"] > 0 and row["energy_ratio"] > 0
-    assert "8 paths a pixel" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "8 paths per pixel" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def person() -> Human:
 
 @pytest.fixture(scope="module")
 def scene(person: Human) -> Scene:
-    """A warm sky of one radiance, and a sun from the upper left."""
+    """Return a warm sky of one radiance, and a sun from the upper left."""
     skin = skin_of(person).model_copy(update={"roughness": 0.25, "rho_s": 0.6})
     sun = DirectionalLight(direction=(-0.5, -0.4, -0.77), irradiance=2.0)
     return Scene(

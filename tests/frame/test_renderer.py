@@ -304,7 +304,7 @@ def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest
 
 
 def test_old_names_of_options_warn(renderer: Renderer) -> None:
-    with pytest.warns(DeprecationWarning, match="anew is now force"):
+    with pytest.warns(DeprecationWarning, match="is now force"):
         renderer.draw(scene(), settings_of(), anew=True)  # type: ignore[call-arg]
     with pytest.warns(DeprecationWarning, match="depth is now cache_size"):
         Renderer(renderer.device.adapter.name, depth=2)  # type: ignore[call-arg]

@@ -215,7 +215,7 @@ def test_tilted_skin_spreads_as_far_on_its_surface(device: Device) -> None:
     ).sum(1)
     flat = (KERNEL.weight[None] * bell[:, None, None]).sum(1)
     assert np.abs(made - exact).max() < 0.01
-    assert np.abs(flat - exact).max() > 0.1  # that is what is told apart
+    assert np.abs(flat - exact).max() > 0.1  # which separates skin from background
 
 
 @pytest.mark.parametrize(("gap_mm", "leak"), [(20.0, 0.0), (8.0, 2e-4), (4.0, 0.02)])

@@ -115,7 +115,7 @@ def test_in_a_browser(page: Path, browser: Any, width: int) -> None:
 
 
 def _colour(view: Any, box: dict[str, float], share: float) -> str:
-    """The colour of the slider's picture at a share of its width."""
+    """Return the colour of the slider's picture at a fraction of its width."""
     import io
 
     from PIL import Image

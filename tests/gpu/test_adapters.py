@@ -67,7 +67,7 @@ def test_auto_takes_the_best(machine: Any, handles: tuple[Any, ...], chosen: str
 def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
     machine(GPU, fake("softpipe", "CPU", features=()), CPU)
     (adapter, *_), reason = select_adapters("cpu")
-    assert (adapter.name, adapter.missing_features) == ("llvmpipe", ())
+    assert (adapter.name, adapter.features) == ("llvmpipe", OPTIONAL_FEATURES)
     assert "software" in reason
 
 
@@ -95,8 +95,8 @@ def test_all_gpus_of_the_best_kind_are_taken_once_each(machine: Any) -> None:
     assert [one.name for one in similar_adapters("cpu")] == ["llvmpipe"]
 
 
-def test_missing_features_are_told() -> None:
-    assert module._describe(fake("x", "CPU", features=("shader-f16",))).missing_features == OPTIONAL_FEATURES
+def test_only_optional_features_are_listed() -> None:
+    assert module._describe(fake("x", "CPU", features=("shader-f16",))).features == ()
 
 
 @pytest.mark.parametrize("wanted", ["auto", "cpu", "GeForce"])

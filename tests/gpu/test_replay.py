@@ -97,7 +97,7 @@ def test_a_recording_keeps_nothing_alive(device: Device, scale: ComputeProgram) 
     gone = weakref.ref(chain.textures[1])
     chain.textures[1] = make_texture(device, SIZE, "r32float")
     assert gone() is None
-    assert chain.drawn(2.0)[0, 0] == 18.0  # void, so it was recorded anew
+    assert chain.drawn(2.0)[0, 0] == 18.0  # void, so it was recorded again
     assert chain.recorded == 2
 
 

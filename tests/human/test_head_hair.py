@@ -70,16 +70,18 @@ def test_roots_are_as_dense_as_is_said() -> None:
     assert count[large] / area[large] == pytest.approx(np.full(large.sum(), 40.0), rel=0.5)
 
 
-@pytest.mark.parametrize("density", [0.3, 1.0])
-def test_fewer_hairs_stand_for_all_there_are(density: float) -> None:
+@pytest.mark.parametrize("relative", [0.3, 1.0])
+def test_fewer_hairs_stand_for_all_there_are(relative: float) -> None:
     """Check that the total width per cm2 of the crown is that of 200 hairs times the density."""
-    head = Human(hair=HairLook(style="cropped", density=density)).head(subdivide=0)
+    head = Human(hair=HairLook(style="cropped", density=relative)).head(subdivide=0)
     strands, place = hair(head), knots(head)[:, 0]
     top = place[:, 1] > 85.0
     quads = np.unique(strands.roots.quad[top])
     inside = np.isin(strands.roots.quad, quads)
     area = density.quad_areas_cm2(head.mesh, quads.astype(np.int64)).sum()
-    assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(0.034 * MAX_PER_CM2 * density, rel=0.05)
+    assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(
+        0.034 * MAX_PER_CM2 * relative, rel=0.05
+    )
 
 
 def test_a_share_of_hairs_covers_as_much_as_all() -> None:
@@ -147,7 +149,7 @@ def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed:
 
     person = Human.drawn(seed, hair={"beard_mm": 12.0, "style": "short", "length_mm": 45.0})
     some = person.head(hairs=0.1)
-    monkeypatch.setattr(groom, "skin_beside", every)
+    monkeypatch.setattr(groom, "skin_vertices_near_hair", every)
     whole = person.head(hairs=0.1)
     for one, other in ((some.strands, whole.strands), (some.hair, whole.hair)):
         assert one is not None and other is not None and np.array_equal(one.knots_mm, other.knots_mm)

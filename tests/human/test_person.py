@@ -152,7 +152,7 @@ def test_it_is_loaded_by_name(head: Head) -> None:
     assert len(loaded.mesh.triangles) == 4 * len(head.mesh.triangles)
     red, green, blue = loaded.maps.mean_colour
     assert red > green > blue
-    with pytest.raises(DermisError, match="unit_mm: expected a file"):
+    with pytest.raises(DermisError, match="unit_mm: expected a mesh file"):
         dermis.load_head("human", unit_mm=10.0)
 
 
@@ -161,7 +161,7 @@ def test_it_is_loaded_by_name(head: Head) -> None:
     [
         ({"age": 20}, "age: expected a number from 25 to 90, but got 20"),
         ({"sex": float("nan")}, "sex: expected a number"),
-        ({"african": 0, "asian": 0, "caucasian": 0}, "ancestry: expected a share"),
+        ({"african": 0, "asian": 0, "caucasian": 0}, "ancestry: expected a weight"),
         ({"targets": {"nose/nose-hump-incr": 9.0}}, "expected a number from -2 to 2"),
     ],
 )

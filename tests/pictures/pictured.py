@@ -1,4 +1,4 @@
-"""The frames of the stored pictures; python tests/pictures/pictured.py draws them anew."""
+"""The frames of the stored pictures; python tests/pictures/pictured.py draws them again."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 def pan(side_mm: float, depth_mm: float, segments: int = 48) -> Head:
-    """A square that faces +Z with a rim bent back by a depth and open behind."""
+    """Return a square that faces +Z with a rim bent back by a depth and open behind."""
     flat = plane(side_mm, segments)
     rim = np.abs(flat.positions[:, :2]).max(axis=1) > 0.499 * side_mm
     places = flat.positions - np.outer(rim * np.float32(depth_mm), [0, 0, 1])
@@ -31,7 +31,7 @@ def pan(side_mm: float, depth_mm: float, segments: int = 48) -> Head:
 def traced(
     head: Head, layers: tuple[Layer, ...], samples: int, *, degrees: float = 0.0, around: bool = False
 ) -> PathTraced:
-    """The middle of a pan under light along -Z with irradiance 1, or from all around with radiance 1.
+    """Path-trace the middle of a pan lit along -Z with irradiance 1, or uniformly with radiance 1.
 
     degrees : of the view from the normal
     """

@@ -30,7 +30,7 @@ MIDDLE = -np.array(BALL.centre_mm)
 
 
 def at(x: float, y: float, z: float) -> Any:
-    """A place given from the ball's middle."""
+    """Return a position relative to the centre of the ball."""
     return tuple(np.add(MIDDLE, (x, y, z)))
 
 

@@ -35,7 +35,7 @@ def ball(**painted: Any) -> Person:
 
 
 def scene(**given: Any) -> Scene:
-    """A ball in light from everywhere, unless told otherwise."""
+    """Return a ball in light from everywhere, unless told otherwise."""
     lit = {"environment": EVERYWHERE} if "lights" not in given else {}
     head = Head("ball", uv_sphere(RADIUS_MM, 64, 32), Maps())
     return Scene(head, camera=CAMERA, **{**lit, **given})

@@ -1,4 +1,4 @@
-"""Cycles as a peer: what it is told, and, where DERMIS_BLENDER_PYTHON names a Blender, what it renders."""
+"""Scenes passed to Cycles, and, where DERMIS_BLENDER_PYTHON names a Blender, its pictures."""
 
 from __future__ import annotations
 

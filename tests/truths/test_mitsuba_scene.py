@@ -31,7 +31,7 @@ def renderer() -> Renderer:
 
 
 def both(renderer: Renderer, scene: Scene, samples: int, **given: Any) -> tuple[NDArray[Any], PathTraced]:
-    """A dry image by the renderer, and the same by Mitsuba."""
+    """Return a dry image by the renderer, and the same by Mitsuba."""
     settings = Settings(**({"atlas": 64, "samples": 16, "technique": "none", "shadow_size": 4096} | given))
     dry = renderer.draw(scene, settings).linear().astype(np.float64)
     albedo = tuple(load_profile(scene.skin.profile).weight.sum(axis=0).tolist())

@@ -24,7 +24,7 @@ STEPS = 400
 
 
 def straight(radius_mm: float, absorption: tuple[float, float, float]) -> HairFibres:
-    """A hair along x."""
+    """Return a straight hair along x."""
     knots = np.zeros((1, 5, 3))
     knots[0, :, 0] = np.linspace(-20.0, 20.0, 5)
     radius = np.full((1, 5), radius_mm, np.float32)

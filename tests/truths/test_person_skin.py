@@ -32,7 +32,7 @@ SHORT = np.full(3, 0.02)
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A grid that is made at once: these balls are of one colour."""
+    """Use a coarse colour grid, which is enough for balls of one colour."""
     monkeypatch.setattr(medium, "VOXELS", 8)
 
 

@@ -38,7 +38,7 @@ def alike(deviations: Floats) -> bool:
 
 
 def stack(row: dict[str, str]) -> list[ScatteringLayer]:
-    """The layers of a row of the table of runs."""
+    """Return the layers of a row of the table of runs."""
     columns = (row["mua_per_mm"], row["mus_per_mm"], row["d_mm"])
     rows = zip(*([float(value) for value in column.split("|")] for column in columns), strict=True)
     return [ScatteringLayer(a, s, d, float(row["g"]), float(row["n"])) for a, s, d in rows]

@@ -28,7 +28,7 @@ AXIS = np.array([0.36, 0.48, 0.8])
 
 
 def rough_plane(size_mm: float, segments: int, roughness: float = 0.0) -> Surface:
-    """A square whose inner vertices, but for the middle one, are off their grid by a share of a cell."""
+    """Return a square whose inner vertices, except the middle one, are displaced by a fraction of a cell."""
     positions, triangles = welded_surface(plane(size_mm, segments))
     inside = (np.abs(positions[:, :2]) < 0.49 * size_mm).all(axis=1)
     inside[middle_of(positions)] = False

@@ -15,7 +15,7 @@ RADIUS_MM, HEIGHT_MM, AROUND, ALONG = 5.0, 16.0, 72, 36
 
 
 def cylinder(seam: int) -> Mesh:
-    """An open cylinder about the y axis, its uv seam at one of the columns; places are always the same."""
+    """Return an open cylinder about the y axis with its uv seam at one of the columns."""
     row, column = np.mgrid[: ALONG + 1, : AROUND + 1]
     place = (column + seam) % AROUND
     angle = 2 * np.pi * place / AROUND
@@ -29,7 +29,7 @@ def cylinder(seam: int) -> Mesh:
 
 
 def light(positions: Floats) -> Floats:
-    """A spot at angle 0, not in the middle of its side of the seam."""
+    """Return a spot at angle 0, not in the middle of its side of the seam."""
     return np.exp(-((positions - [1.0, 0.5, RADIUS_MM]) ** 2).sum(axis=1, keepdims=True))
 
 

@@ -124,8 +124,10 @@ def test_all_light_comes_out_again() -> None:
 
 @pytest.mark.parametrize(("radius", "variance"), [(5.0, 7.41), (5.0, 0.567), (20.0, 7.41), (2.0, 1.0)])
 def test_harmonics_of_a_sphere(radius: float, variance: float) -> None:
-    """With k = R²/v the chord's Gaussian times P_l integrates to 2 k exp(-k) i_l(k), a Bessel function:
-    1 - exp(-2k) for even light and 1 + exp(-2k) - (1 - exp(-2k)) / k for light that goes with z."""
+    """With k = R²/v the chord's Gaussian times P_l integrates to 2 k exp(-k) i_l(k), a Bessel function.
+
+    That is 1 - exp(-2k) for even light and 1 + exp(-2k) - (1 - exp(-2k)) / k for light that goes with z.
+    """
 
     def light(places: MeshPoints) -> Floats:
         up = places.positions[:, 2] / radius
@@ -144,7 +146,7 @@ def test_harmonics_of_a_sphere(radius: float, variance: float) -> None:
 
 
 def bumpy() -> IrradianceSamples:
-    """A hilly patch of coarse triangles under coloured light with a dark side and a stripe."""
+    """Return a hilly patch of coarse triangles under coloured light with a dark side and a stripe."""
     flat = sample_irradiance(plane(30.0), even, 1.3)
     x, y = flat.positions[:, 0], flat.positions[:, 1]
     places = np.column_stack((x, y, 3.0 * np.sin(0.5 * x) * np.cos(0.4 * y)))

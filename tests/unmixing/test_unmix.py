@@ -36,7 +36,7 @@ def shares(count: int, seed: int = 3) -> tuple[Floats, Floats]:
 
 
 def exact(melanin: float, blood: float) -> Floats:
-    """The colour by diffusion at each wavelength, without a table."""
+    """Return the colour by diffusion at each wavelength, without a table."""
     medium = spectral_medium("dj2006", replace(DEFAULT_SKIN, melanin=melanin, blood=blood))
     total = diffusion_profile(medium, "layered", "layer").total
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
@@ -44,7 +44,7 @@ def exact(melanin: float, blood: float) -> Floats:
 
 @pytest.fixture(scope="module")
 def colours() -> Pixels:
-    """A made-up map of skin."""
+    """Return a synthetic colour map of skin."""
     m, b = shares(SIDE * SIDE)
     return skin_model().colours(m, b).reshape(SIDE, SIDE, 3).astype(np.float32)
 

@@ -168,7 +168,7 @@ def test_copies_take_time(device: Device) -> None:
 
 @pytest.fixture(scope="module")
 def made(row: BenchmarkRow) -> Benchmark:
-    """A benchmark of which one row was measured."""
+    """Return a benchmark of which one row was measured."""
     others = [
         replace(row, case=replace(TINY, atlas=128, varies="atlas")),
         replace(row, case=replace(TINY, technique=GPU_GEMS_3, varies="technique"), gpu_ms={"total": 1e3}),

@@ -28,7 +28,7 @@ SETTINGS = Settings(size=(64, 64), atlas=1024, shadow_size=256)
 
 @pytest.fixture(scope="module")
 def lasered() -> Comparison:
-    """A narrow stripe: all that is seen next to it is scattered light."""
+    """Return a narrow stripe: all that is seen next to it is scattered light."""
     return compare(
         BALL,
         "surface-integral",

@@ -68,7 +68,7 @@ class FakeRenderer:
 
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The benchmark with everything that renders replaced."""
+    """Return the benchmark with all renderers replaced."""
     monkeypatch.setattr(rendering, "cycles_passes", cycles_passes)
     monkeypatch.setattr(rendering, "path_trace", path_trace)
     monkeypatch.setattr(report, "load_mitsuba", lambda: None)
@@ -87,14 +87,14 @@ def test_noise_bias_and_time_are_told_apart(peers: Any, tmp_path: Path, capsys: 
     rows = {(row["renderer"], row["setting"]): row for row in told["rows"]}
     ours = rows["dermis", "texture space, atlas 1024"]
     assert (ours["relrmse"], ours["energy_ratio"]) == pytest.approx((OURS, 1.0 + OURS), rel=0.02)
-    walk = rows["Cycles, random walk", "4 paths a pixel"]
+    walk = rows["Cycles, random walk", "4 paths per pixel"]
     # Noise is relative to the mean picture, error to the truth; the pictures' power is alike for both.
     assert walk["noise"] == pytest.approx(NOISE / 2.0 / (1.0 + BIAS), rel=0.03)
     assert walk["relrmse"] == pytest.approx(np.hypot(BIAS, NOISE / 2.0), rel=0.03)
     assert walk["seconds"] == 2.0
-    limit = rows["Cycles, random walk", "noise taken off"]
+    limit = rows["Cycles, random walk", "noise subtracted"]
     assert limit["relrmse"] == pytest.approx(BIAS, rel=0.03) and limit["seconds"] is None
-    assert rows["Mitsuba, volpathmis", "16 paths a pixel"]["seconds"] == 9.0
+    assert rows["Mitsuba, volpathmis", "16 paths per pixel"]["seconds"] == 9.0
     assert "goal 50" in capsys.readouterr().out
 
 
@@ -128,9 +128,9 @@ def test_without_blender_its_rows_are_left_out_and_it_is_said(
     monkeypatch.setattr(rendering, "cycles_passes", no_blender)
     peers.peers(lights="front", quick=True)
     said = capsys.readouterr()
-    assert "Cycles is left out. Cycles: expected a Python that has Blender's module bpy" in said.err
+    assert "Cycles is skipped. Cycles: expected a Python that has Blender's module bpy" in said.err
     assert "Cycles, random walk" not in said.out and "Mitsuba, volpathmis" in said.out
-    assert "Left out: random-walk. Cycles: expected a Python" in said.out
+    assert "Skipped: random-walk. Cycles: expected a Python" in said.out
 
 
 def test_without_mitsuba_there_is_no_truth(
@@ -180,7 +180,7 @@ def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, caps
 
     dermis.Renderer = Nearer  # type: ignore[misc]  # put back by the fixture's patch
     peers.peers(lights="front", quick=True)
-    assert "never comes as near, for its own bias is greater" in capsys.readouterr().out
+    assert "never has as small an error, because its bias is larger" in capsys.readouterr().out
 
 
 def test_page_is_written_with_all_its_places_filled(

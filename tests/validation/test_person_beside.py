@@ -115,7 +115,7 @@ def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> N
 
 
 def made(shift: int, gain: float) -> PersonComparison:
-    """A dark pupil in an uneven iris, ours and a truth that lies further to the right and is brighter."""
+    """Return a dark pupil in an uneven iris, and a truth that is shifted to the right and brighter."""
     side = 128
     along = (np.arange(side) + 0.5 - 0.5 * side) * EYE_FRAME_MM / side
     x, y = np.meshgrid(along, along)

@@ -18,7 +18,7 @@ ONE = Estimate(1.0, 0.01)
 
 
 def noisy(name: str, side: int) -> PersonComparison:
-    """A view of nothing but noise, which compresses worst."""
+    """Return a view of nothing but noise, which compresses worst."""
     rng = np.random.default_rng(len(name))
     image, mask = rng.random((side, side, 3)), np.ones((side, side), bool)
     return PersonComparison(name, image, image, 0 * image, mask, ONE, ONE, (ONE,) * 3, 40, 12.0)

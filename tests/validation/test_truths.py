@@ -29,14 +29,14 @@ ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 
 @pytest.fixture(scope="module")
 def lasered() -> Iterator[ComparisonSubject]:
-    """A narrow stripe of light, seen close by."""
+    """Return a narrow stripe of light, seen close by."""
     settings = Settings(size=(64, 64), atlas=64, shadow_size=256)
     with comparison_subject(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
         yield subject
 
 
 def spread_by(subject: ComparisonSubject, *variance_mm2: float) -> ComparisonSubject:
-    """The subject with a profile of equal Gaussians that keeps all light."""
+    """Return the subject with a profile of equal Gaussians that keeps all light."""
     weight = np.full((len(variance_mm2), 3), 1 / len(variance_mm2))
     return replace(subject, profile=GaussianSum("test", np.array(variance_mm2), weight))
 

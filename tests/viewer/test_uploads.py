@@ -140,7 +140,7 @@ def test_a_file_that_does_not_go_on_is_given_up(
         await asyncio.sleep(60.0)
 
     status, said = server.send("a.obj", b"v 0", whole=False, then=never)
-    assert status == 400 and "got nothing" in said and not list(tmp_path.rglob("*.obj"))
+    assert status == 400 and "got no data" in said and not list(tmp_path.rglob("*.obj"))
     monkeypatch.undo()
     assert server.send("a.obj", b"v")[0] == 200
 

@@ -104,5 +104,5 @@ def test_a_pose_stays_where_the_names_are_the_same(rigged: ViewerState, rigged_f
         opening.open(name)
         end, found = time.monotonic() + PATIENCE_S, None
         while found is None and time.monotonic() < end:
-            found = opening.take(posed)
+            found = opening.take_loaded(posed)
         assert found is not None and (found.scene.pose is not None) is kept

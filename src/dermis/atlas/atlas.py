@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.mesh.mesh import Mesh
 
 _ALL_ROWS = slice(None)
@@ -36,19 +37,19 @@ class Atlas:
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
-    triangle: NDArray[np.int32]
+    triangle: Ints
     barycentric: NDArray[np.uint16]
     stretch: NDArray[np.float16]
     shear: NDArray[np.float16]
     edge_distance: NDArray[np.uint16]
-    corner_uv: NDArray[np.float32]
+    corner_uv: Floats
     gutter: NDArray[np.uint16]
-    source: NDArray[np.float32]
+    source: Floats
     outside: NDArray[np.uint16]
-    border_triangle: NDArray[np.int32]
+    border_triangle: Ints
     border_weights: NDArray[np.uint16]
-    texels_per_uv: NDArray[np.float32]
-    mapped: NDArray[np.bool_]
+    texels_per_uv: Floats
+    mapped: Mask
 
     @property
     def size(self) -> int:
@@ -56,12 +57,12 @@ class Atlas:
         return len(self.triangle)
 
     @property
-    def coverage(self) -> NDArray[np.bool_]:
+    def coverage(self) -> Mask:
         """Return the (n, n) mask of texels that map to the surface, gutters included."""
         return np.asarray(self.triangle >= 0)
 
     @property
-    def lit(self) -> NDArray[np.bool_]:
+    def lit(self) -> Mask:
         """Return the (n, n) mask of texels whose light is computed, not copied from other texels."""
         lit = self.coverage
         lit[self.gutter[:, 1], self.gutter[:, 0]] = False
@@ -72,14 +73,12 @@ class Atlas:
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 
-    def weights(self, rows: slice = _ALL_ROWS) -> NDArray[np.float64]:
+    def weights(self, rows: slice = _ALL_ROWS) -> Doubles:
         """Return the (n, n, 3) barycentric weights of the three corners, of all or some rows."""
         bc = self.barycentric[rows] / 65535.0
         return np.concatenate([1.0 - bc.sum(axis=-1, keepdims=True), bc], axis=-1)
 
-    def interpolate(
-        self, mesh: Mesh, values: NDArray[np.floating], rows: slice = _ALL_ROWS
-    ) -> NDArray[np.float64]:
+    def interpolate(self, mesh: Mesh, values: NDArray[np.floating], rows: slice = _ALL_ROWS) -> Doubles:
         """Return a (v, c) vertex attribute interpolated at the texels (n, n, c), of all or some rows."""
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
         return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))

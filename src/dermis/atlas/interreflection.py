@@ -8,13 +8,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import expand_runs
+from dermis.base.arrays import Doubles, Floats, Index, Mask
 from dermis.base.disk import load_or_make
 from dermis.base.progress import logged_step
+from dermis.mesh.geometry import expand_runs
 from dermis.mesh.mesh import Mesh
 
-Floats = NDArray[np.float64]
-Index = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
 SIDE = 128
@@ -46,12 +45,12 @@ class FormFactors:
 
     cell_first: Words
     cell_target: Words
-    cell_factor: NDArray[np.float32]
+    cell_factor: Floats
     nearest_patch: Words
-    confidence: NDArray[np.float32]
+    confidence: Floats
     patch_first: Words
     patch_target: Words
-    patch_factor: NDArray[np.float32]
+    patch_factor: Floats
     sample_triangle: Words
     sample_weights: Words
 
@@ -61,7 +60,7 @@ class FormFactors:
         return len(self.patch_first) - 1
 
 
-def cached_form_factors(mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]) -> FormFactors:
+def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
     """Return `compute_form_factors` with these arguments, cached on disk."""
     digest = hashlib.sha256(
         f"{_CACHE_VERSION} {SIDE} {SAMPLES} {BUNDLES} {LINES} {_MIN_FORM_FACTOR}".encode()
@@ -78,9 +77,7 @@ def cached_form_factors(mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDAr
     return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make))
 
 
-def compute_form_factors(
-    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
-) -> FormFactors:
+def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
     """Compute form factors between cells and patches with bundles of parallel lines [Sbert1993].
 
     Lines are distributed uniformly over all directions and positions: of those that leave one patch, the
@@ -97,8 +94,8 @@ def compute_form_factors(
 
 
 def _trace_lines(
-    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
-) -> tuple[Index, Floats]:
+    mesh: Mesh, corner_uv: Floats, mapped: Mask, bundles: int, lines: int
+) -> tuple[Index, Doubles]:
     """Return pairs of cells (m, 2) that lines connect, and the number of lines that left each cell."""
     used, corner = np.unique(mesh.triangles, return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
@@ -115,7 +112,7 @@ def _trace_lines(
     return np.concatenate(facing), left
 
 
-def intersect_lines(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
+def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
     """Intersect the lines parallel to z through all integers x, y with triangles.
 
     Returns line index, z, whether the surface faces +z, triangle, and (n, 3) weights of its corners.
@@ -140,14 +137,14 @@ def intersect_lines(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], I
     return line, depth_a + depth_b + depth_c, area > 0.0, triangle, weights
 
 
-def _integer_range(corner: Floats) -> tuple[Floats, Index]:
+def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
     """Return the lowest integer between the corners (3, f) of each triangle, and the number of integers."""
     low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
     high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
     return low, np.maximum(high - low + 1, 0).astype(np.int64)
 
 
-def _facing_cells(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
+def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> Index:
     """Return pairs of cells (m, 2): the one that a line leaves, and the one that it meets next.
 
     Each line is followed in both directions; lines that meet nothing more are left out. The second cell is -1
@@ -161,13 +158,13 @@ def _facing_cells(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: 
     return np.concatenate([pair, pair[:, ::-1]])
 
 
-def _cell_index(corner_uv: NDArray[np.float32], weights: Floats) -> Index:
+def _cell_index(corner_uv: Floats, weights: Doubles) -> Index:
     uv = np.einsum("nk,nkc->nc", weights, corner_uv)
     x, y = np.clip((SIDE * uv).astype(np.int64), 0, SIDE - 1).T
     return np.asarray(y * SIDE + x)
 
 
-def _hemisphere_directions(count: int) -> Floats:
+def _hemisphere_directions(count: int) -> Doubles:
     """Return (count, 3) unit vectors that are evenly distributed over a hemisphere."""
     index = np.arange(count) + 0.5
     z, phi = index / count, np.pi * (1.0 + np.sqrt(5.0)) * index
@@ -175,7 +172,7 @@ def _hemisphere_directions(count: int) -> Floats:
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
 
-def _axes(direction: Floats, angle: float) -> Floats:
+def _axes(direction: Doubles, angle: float) -> Doubles:
     """Return the (3, 3) axes right, up and along a direction, rotated about it by an angle [rad]."""
     right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     right /= np.linalg.norm(right)
@@ -184,9 +181,7 @@ def _axes(direction: Floats, angle: float) -> Floats:
     return np.stack([c * right + s * up, c * up - s * right, direction])
 
 
-def _form_factors(
-    facing: Index, left: Floats, mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
-) -> FormFactors:
+def _form_factors(facing: Index, left: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
     """Return the form factors from the cells at the ends of lines.
 
     facing : (m, 2) from `_trace_lines`
@@ -221,9 +216,7 @@ def _nearest_patch(patch_of: Index) -> Words:
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
-def _sparse_rows(
-    row: Index, target: Index, left: Floats, patches: int
-) -> tuple[Words, Words, NDArray[np.float32]]:
+def _sparse_rows(row: Index, target: Index, left: Doubles, patches: int) -> tuple[Words, Words, Floats]:
     """Return the rows of a sparse matrix of form factors: start of each row, columns, and factors.
 
     row, target : (m,) cell or patch that each line left, and the patch that it met
@@ -239,9 +232,7 @@ def _sparse_rows(
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
-def _patches(
-    mesh: Mesh, corner_uv: NDArray[np.float32], mapped: NDArray[np.bool_]
-) -> tuple[Index, Words, Words]:
+def _patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
     """Return the patch of each cell (SIDE^2,), -1 for none, and random sample points of all patches."""
     triangle, weights, rank = _sample_points(mesh, mapped)
     half, cell = SIDE // 2, _cell_index(corner_uv[triangle], weights)
@@ -258,7 +249,7 @@ def _patches(
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 
 
-def _sample_points(mesh: Mesh, mapped: NDArray[np.bool_]) -> tuple[Index, Floats, Floats]:
+def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
     """Return random points, at least one on each triangle with texels: triangle, weights and rank.
 
     The points with the lowest ranks are uniformly distributed over the surface.

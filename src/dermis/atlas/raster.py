@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
-from dermis.base.arrays import Doubles, Ints
-from dermis.mesh.geometry import MIN_UV_CROSS, components, edges, uv_cross, weld
+from dermis.base.arrays import Doubles, Index, Ints, Mask
+from dermis.mesh.geometry import MIN_UV_CROSS, components, cross_2d, edges, expand_runs, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
-Floats = NDArray[np.float64]
-Index = NDArray[np.int64]
 _EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
 _MIN_CHART_TEXELS = 4.0  # area of a chart; smaller ones are too small to be blurred
 
@@ -41,7 +41,7 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
     return np.asarray(np.bincount(chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
 
 
-def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> NDArray[np.bool_]:
+def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> Mask:
     """Return the mask (f,) of triangles that can be processed in texture space.
 
     Triangles without uv area and all triangles of a collapsed chart cannot.
@@ -54,7 +54,7 @@ def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXEL
     return np.asarray(large_enough[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))
 
 
-def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Floats:
+def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Doubles:
     """Return the uv of some triangles' corners (t, 3, 2) in texels, integers at texel centres."""
     return np.asarray(mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5)
 
@@ -66,7 +66,7 @@ def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Ind
 
 
 def covered_texels(
-    p: Floats, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
+    p: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
 ) -> tuple[Index, Index]:
     """Return the texels of a grid whose centres triangles cover, as flat indices, and their row in `p`.
 
@@ -83,23 +83,13 @@ def covered_texels(
     return y[span] * width + x, which[span]
 
 
-def _integers_between(low: Floats, high: Floats, size: int, margin: float) -> tuple[Index, Index]:
+def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> tuple[Index, Index]:
     """Return the first and last integer between two bounds, within 0 .. size - 1."""
     first = np.clip(np.ceil(low + margin), 0, size).astype(np.int64)
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
-    """Expand runs of consecutive integers: return the run that each integer belongs to, and the integers.
-
-    first, count : first integer of each run and its length
-    """
-    which = np.repeat(np.arange(len(count)), count)
-    start = np.repeat(np.cumsum(count) - count, count)
-    return which, np.arange(len(which)) - start + first[which]
-
-
-def _row_interval(p: Floats, which: Index, y: Index) -> tuple[Floats, Floats]:
+def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]:
     """Return the x interval in which each row y intersects its triangle."""
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
@@ -115,11 +105,6 @@ def _row_interval(p: Floats, which: Index, y: Index) -> tuple[Floats, Floats]:
         np.minimum(highest, crossing, out=highest, where=slope < 0)
         highest[(slope == 0) & (offset < 0)] = -np.inf
     return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
-
-
-def cross_2d(a: Floats, b: Floats) -> Floats:
-    """Return the z component of the cross product of (..., 2) vectors."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
@@ -156,9 +141,7 @@ def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
     )
 
 
-def _overlapped_charts(
-    chart: NDArray[np.integer], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
-) -> NDArray[np.bool_]:
+def _overlapped_charts(chart: NDArray[np.integer], texel: Index, triangle: Index, size: int) -> Mask:
     """Return the mask (f,) of triangles in charts that are mostly covered by a larger chart."""
     count = int(chart.max()) + 1
     area = np.bincount(chart[triangle], minlength=count)
@@ -166,13 +149,11 @@ def _overlapped_charts(
     winner = np.full(size * size, -1, dtype=np.int64)
     winner[texel[order]] = chart[triangle[order]]
     own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
-    hidden: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
+    hidden: Mask = own < 0.5 * np.maximum(area, 1)
     return np.asarray(hidden[chart])
 
 
-def _assign_texels(
-    mesh: Mesh, mapped: NDArray[np.bool_], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size: int) -> tuple[Ints, Mask]:
     """Return the triangle of each texel, and the mask of triangles mostly covered by others of their chart.
 
     Where two mirrored halves are folded onto each other in one chart, the half that is not mirrored in uv
@@ -181,7 +162,7 @@ def _assign_texels(
     is_mapped = mapped[triangle]
     texel, triangle = texel[is_mapped], triangle[is_mapped]
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
-    owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
+    owner: Ints = np.full((size, size), -1, dtype=np.int32)
     owner.ravel()[texel[order]] = triangle[order]
     count = len(mapped)
     area = np.bincount(triangle, minlength=count)
@@ -189,7 +170,7 @@ def _assign_texels(
     return owner, own < 0.5 * area
 
 
-def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
+def _dilate(owner: Ints) -> Ints:
     """Assign to each empty texel the triangle of one of its eight neighbours, direct neighbours first."""
     dilated = owner.copy()
     padded = np.pad(owner, 1, constant_values=-1)
@@ -200,7 +181,7 @@ def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
     return dilated
 
 
-def _interpolable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _interpolable(mesh: Mesh, size: int, owner: Ints) -> Mask:
     """Return the mask (f,) of triangles whose corners can be interpolated; slivers may have no texels."""
     low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
@@ -210,23 +191,30 @@ def _interpolable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np
     return found
 
 
-def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:
+def _barycentric(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
     """Return the weights at each texel centre; in gutters those of the nearest point of the triangle."""
     y, x = np.nonzero(owner >= 0)
-    p = texel_corners(mesh, size, owner[y, x])
-    q = np.stack([x, y], axis=-1) - p[:, 0]
-    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    area = cross_2d(e1, e2)
-    area = np.where(area == 0, 1.0, area)
-    b = np.clip(np.stack([cross_2d(q, e2) / area, cross_2d(e1, q) / area], axis=-1), 0.0, 1.0)
-    b /= np.maximum(b.sum(axis=-1, keepdims=True), 1.0)
+    weights = barycentric_weights(texel_corners(mesh, size, owner[y, x]), np.column_stack((x, y)))
     packed = np.zeros((size, size, 2), dtype=np.uint16)
-    packed[y, x] = np.floor(b * 65535.0).astype(np.uint16)
+    packed[y, x] = np.floor(weights * 65535.0).astype(np.uint16)
     return packed
 
 
+def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
+    """Return the weights (n, 2) of the second and third corner at points, clipped to the triangles.
+
+    corners : (n, 3, 2)
+    points : (n, 2)
+    """
+    e1, e2, offset = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    area = cross_2d(e1, e2)
+    area = np.where(area == 0, 1.0, area)
+    weights = np.clip(np.stack((cross_2d(offset, e2) / area, cross_2d(e1, offset) / area), axis=1), 0.0, 1.0)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1), 1.0)[:, None])
+
+
 def _texel_metric(
-    mesh: Mesh, size: int, owner: NDArray[np.int32], barycentric: NDArray[np.uint16]
+    mesh: Mesh, size: int, owner: Ints, barycentric: NDArray[np.uint16]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
     """Return texels per mm along u and v, and the cosine between u and v, from interpolated derivatives."""
     y, x = np.nonzero(owner >= 0)
@@ -244,16 +232,23 @@ def _texel_metric(
     return stretch, shear
 
 
-def _edge_distance(chart: NDArray[np.integer]) -> NDArray[np.uint16]:
+def _edge_distance(chart: Ints) -> NDArray[np.uint16]:
     """Return the number of texels of the same chart to the left, right, up and down of each texel."""
+    left, right = run_lengths(np.pad(chart[:, 1:] == chart[:, :-1], ((0, 0), (1, 0))))
+    up, down = run_lengths(np.pad(chart.T[:, 1:] == chart.T[:, :-1], ((0, 0), (1, 0))))
+    return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)
 
-    def run_before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
-        index = np.arange(rows.shape[1])[None, :]
-        breaks = np.ones(rows.shape, dtype=bool)
-        breaks[:, 1:] = rows[:, 1:] != rows[:, :-1]
-        start: NDArray[np.int64] = np.maximum.accumulate(np.where(breaks, index, 0), axis=1)
-        return index - start
 
-    right, down = run_before(chart[:, ::-1])[:, ::-1], run_before(chart.T[:, ::-1])[:, ::-1].T
-    runs = run_before(chart), right, run_before(chart.T).T, down
-    return np.stack(runs, axis=-1).astype(np.uint16)
+def run_lengths(joined: Mask) -> tuple[Ints, Ints]:
+    """Return the number of connected texels before and after each texel of a row (h, w).
+
+    joined : (h, w) whether each texel is connected to the one before it
+    """
+    after = np.zeros_like(joined)
+    after[:, :-1] = joined[:, 1:]
+    return _run_before(joined), _run_before(after[:, ::-1])[:, ::-1]
+
+
+def _run_before(joined: Mask) -> Ints:
+    index = np.arange(joined.shape[1], dtype=np.int32)
+    return index - np.maximum.accumulate(np.where(joined, 0, index), axis=1)

@@ -29,10 +29,10 @@ def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
     for l in range(1, degree + 1):
         if l <= orders:
             table[l - 1, l] = np.sqrt(2.0 * l + 1.0) * cosine * table[l - 1, l - 1]
-        m = np.arange(min(l - 1, orders), dtype=np.float64)[:, None]
-        a = np.sqrt((4.0 * l * l - 1.0) / (l * l - m * m))
-        b = np.sqrt(((l - 1.0) ** 2 - m * m) / (4.0 * (l - 1.0) ** 2 - 1.0))
-        table[: len(m), l] = a * (cosine * table[: len(m), l - 1] - b * table[: len(m), l - 2])
+        order = np.arange(min(l - 1, orders), dtype=np.float64)[:, None]
+        a = np.sqrt((4.0 * l * l - 1.0) / (l * l - order**2))
+        b = np.sqrt(((l - 1.0) ** 2 - order**2) / (4.0 * (l - 1.0) ** 2 - 1.0))
+        table[: len(order), l] = a * (cosine * table[: len(order), l - 1] - b * table[: len(order), l - 2])
     return [table[m, m:] for m in range(orders)]
 
 

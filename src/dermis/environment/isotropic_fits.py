@@ -57,10 +57,8 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     and steep, each from its neighbours, so that lobes vary smoothly over the table.
     """
     found: dict[Node, Floats] = {}
-    targets = {
-        (i, j): lobe_target(lobe, float(LOBE_TABLE_COSINES[j]), float(LOBE_TABLE_ROUGHNESSES[i]))
-        for i, j in _nodes()
-    }
+    cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
+    targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _nodes()}
     for _ in range(_PASSES):
         for i, j in _nodes():
             adjacent = (i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)
@@ -166,7 +164,7 @@ def _fit(target: LobeTarget, column: int, start: Floats, neighbours: Floats) -> 
 
     inside = np.clip(first, low + 1e-4, high - 1e-4)
     solution = least_squares(
-        residual, inside, jac=jacobian_at, bounds=(low, high), max_nfev=_MAX_EVALUATIONS, ftol=1e-4, xtol=1e-5
+        residual, inside, jacobian_at, (low, high), ftol=1e-4, xtol=1e-5, max_nfev=_MAX_EVALUATIONS
     )
     return np.asarray(fixed + free @ solution.x).reshape(4, LOBE_COUNT)
 

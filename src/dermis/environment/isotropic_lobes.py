@@ -44,26 +44,21 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
     is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the mirror
     direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns, the
     last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
-    which at grazing views is elongated, offset the mirror direction, and ends at the horizon. Lobes of weight
+    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight
     0 need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
-    columns = " ".join(
+    columns = [
         f"{name}_{k}" for k in range(LOBE_COUNT) for name in ("angle", "beside", "roughness", "weight")
-    )
-    fits = (
-        float_columns(rows, columns).reshape(ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4)
-        if rows
-        else _fit_model(model)
-    )
+    ]
+    shape = ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4
+    fits = float_columns(rows, " ".join(columns)).reshape(shape) if rows else _fit_model(model)
     angle, out_of_plane, roughness, weight = np.moveaxis(fits, -1, 0)
     weight = weight / weight.sum(axis=-1, keepdims=True)
     offset = angle - np.arccos(LOBE_TABLE_COSINES)[:, None]
-    farther = 1.0 + np.cos(offset) * np.cos(out_of_plane)
-    return np.stack(
-        [np.sin(offset) * np.cos(out_of_plane) / farther, np.sin(out_of_plane) / farther, roughness, weight],
-        -1,
-    )
+    scale = 1.0 + np.cos(offset) * np.cos(out_of_plane)
+    x, y = np.sin(offset) * np.cos(out_of_plane) / scale, np.sin(out_of_plane) / scale
+    return np.stack([x, y, roughness, weight], -1)
 
 
 @logged_step("finding what the surface reflects of the environment")

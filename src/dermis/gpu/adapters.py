@@ -138,11 +138,6 @@ class Adapter:
     handle: Untyped
     number: int = 0
 
-    @property
-    def missing_features(self) -> tuple[str, ...]:
-        """Return the optional features that the adapter lacks."""
-        return tuple(f for f in OPTIONAL_FEATURES if f not in self.features)
-
 
 def list_adapters() -> list[Adapter]:
     """Return all adapters, the best first: GPUs before software, then by number of features.
@@ -160,7 +155,7 @@ def list_adapters() -> list[Adapter]:
             adapters = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
         refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
-    adapters.sort(key=lambda a: (_rank(a.kind), len(a.missing_features), a.backend == "OpenGL"))
+    adapters.sort(key=lambda a: (_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
     return [replace(one, number=number) for number, one in enumerate(adapters)]
 
 
@@ -178,18 +173,19 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
         actual = "this machine shows only OpenGL's" if adapters else "this machine shows none"
         refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, INSTALL_HINT)
     if match := re.fullmatch(r"#(\d{1,4})", selector):
-        return [_numbered(adapters, int(match[1]))], f"it is the one with the number {match[1]}"
-    if selector == "auto":
-        return reliable, "it is the fastest kind, with the most features"
-    if selector == "cpu":
+        number = int(match[1])
+        fitting, reason = adapters[number : number + 1], f"it is the one with the number {number}"
+    elif selector == "auto":
+        fitting, reason = reliable, "it is the fastest kind, with the most features"
+    elif selector == "cpu":
         fitting, reason = [a for a in reliable if a.kind == "CPU"], "software was requested"
     else:
         fitting = [a for a in adapters if selector.lower() in f"{a.name} {a.driver} {a.backend}".lower()]
         reason = f"its name contains {selector!r}"
     if not fitting:
-        names = ", ".join(f"{a.name} ({a.backend})" for a in adapters)
-        hint = INSTALL_HINT if selector == "cpu" else "Choose auto, cpu, a part of one of those names, or #0"
-        refuse(f"adapter {selector!r}", "one of this machine's adapters", f"it has {names}", hint)
+        names = ", ".join(f"#{a.number} {a.name} ({a.backend})" for a in adapters)
+        advice = INSTALL_HINT if selector == "cpu" else "Choose auto, cpu, part of one of these names, or #0"
+        refuse(f"adapter {selector!r}", "one of this machine's adapters", f"it has {names}", advice)
     return fitting, reason
 
 
@@ -226,13 +222,6 @@ def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str
         for name, default in DEFAULT_LIMITS.items()
     }
     return limits | {name: offered[name] for name in raised}
-
-
-def _numbered(adapters: list[Adapter], number: int) -> Adapter:
-    if number >= len(adapters):
-        names = ", ".join(f"#{k} {one.name} ({one.backend})" for k, one in enumerate(adapters))
-        refuse(f"adapter '#{number}'", "one of this machine's adapters", f"it has {names}", "Correct it")
-    return adapters[number]
 
 
 def _describe(handle: Untyped) -> Adapter:

@@ -57,10 +57,8 @@ def make_bind_group(
         entry, kind = entries[k], binding.entry
         entry.binding = binding.index
         if "buffer" in kind:
-            entry.buffer, entry.size = (
-                value._internal,
-                value.size if k < first_uniform else records[k - first_uniform],
-            )
+            entry.buffer = value._internal
+            entry.size = value.size if k < first_uniform else records[k - first_uniform]
         elif "sampler" in kind:
             entry.sampler = value._internal
         else:

@@ -175,7 +175,7 @@ class FrameCapture(Graph):
         attachments = {"indices": indices, "depth": target.depth, "target": target.colour}
         numbers = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
         captured = self._add_pass(stage, program, resources, (vertices,))
-        captured.raster = {"layer": layer, "far": target.far, **numbers}
+        captured.raster = {"layer": layer, "far": target.clear_depth, **numbers}
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]

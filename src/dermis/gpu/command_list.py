@@ -43,11 +43,11 @@ class CommandList(Recorder):
         self.submitted = 0
         self._stage = ""
         self._pass: ComputePass | None = None
-        is_software, is_whole = device.adapter.kind == "CPU", timed == "whole"
+        is_software, frame_only = device.adapter.kind == "CPU", timed == "whole"
         self._wall_clock = WallClock() if is_software and timed else None
         has_timestamps = device.has_timestamps and timed and not is_software
-        self._timestamps = Timestamps(device, whole=is_whole) if has_timestamps else None
-        self._splits_stages = self._wall_clock is not None or (has_timestamps and not is_whole)
+        self._timestamps = Timestamps(device, frame_only=frame_only) if has_timestamps else None
+        self._splits_stages = self._wall_clock is not None or (has_timestamps and not frame_only)
 
     def dispatch(
         self,
@@ -125,7 +125,7 @@ class CommandList(Recorder):
             "view": target.depth,
             "depth_load_op": "clear",
             "depth_store_op": "store",
-            "depth_clear_value": target.far,
+            "depth_clear_value": target.clear_depth,
         }
         targets = [] if target.colour is None else [target.colour]
         render_pass = self._render_pass(stage, program, resources, targets, depth)
@@ -289,18 +289,18 @@ class ComputePass:
 class Timestamps:
     """Timestamps at the start of each pass; a pass lasts until the next one begins, so stages add up.
 
-    whole : True takes only the first and the last timestamp, as each of them takes time itself
+    frame_only : True takes only the first and the last timestamp, as each of them takes time itself
     """
 
-    def __init__(self, device: Device, *, whole: bool = False) -> None:
-        self._device, self._whole = device, whole
+    def __init__(self, device: Device, *, frame_only: bool = False) -> None:
+        self._device, self._frame_only = device, frame_only
         self._queries, self._resolved = device.timestamp_pool()
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
         """Return the `timestamp_writes` of a pass descriptor; None for no timestamp."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
-        if is_full or (self._whole and self._stages):
+        if is_full or (self._frame_only and self._stages):
             return None
         return self._add(stage)
 
@@ -324,7 +324,7 @@ class Timestamps:
         times: dict[str, float] = {}
         for stage, duration in zip(self._stages, np.diff(ticks), strict=False):
             times[stage] = times.get(stage, 0.0) + float(duration) * tick_ms
-        times = {} if self._whole else times
+        times = {} if self._frame_only else times
         times["total"] = float(ticks[-1] - ticks[0]) * tick_ms
         return times
 

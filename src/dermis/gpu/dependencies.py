@@ -116,9 +116,8 @@ class Dependencies:
         for index, (_, reads, writes) in enumerate(passes):
             found = [one for state in reads for one in state.overlapping(writers) or [state, *state.views]]
             unwritten = set(found).difference(writers, writes)
-            self._reads.append(
-                [(writers.get(one), one) for one in found if one in writers or one in unwritten]
-            )
+            sources = [one for one in found if one in writers or one in unwritten]
+            self._reads.append([(writers.get(one), one) for one in sources])
             for state in writes:
                 self._add_write(state, index, writers)
 
@@ -144,9 +143,7 @@ class Dependencies:
         while True:
             stale = self._stale_given(valid)
             running = [writes for (*_, writes), now in zip(self.passes, stale, strict=True) if now]
-            overwritten = {
-                state for writes in running for state in writes if not stale[self._last_writer[state]]
-            }
+            overwritten = {one for writes in running for one in writes if not stale[self._last_writer[one]]}
             if not overwritten & valid:
                 return stale
             valid -= overwritten
@@ -157,9 +154,8 @@ class Dependencies:
         for index in range(len(stale) - 1, -1, -1):
             for state in self.passes[index][-1]:
                 is_last = self._last_writer[state] == index
-                if not (is_last and state in valid) and (
-                    (is_last and not state.scratch) or (index, state) in needed
-                ):
+                is_needed = (is_last and not state.scratch) or (index, state) in needed
+                if is_needed and not (is_last and state in valid):
                     stale[index] = True
                     needed.update(self._reads[index])
                     break

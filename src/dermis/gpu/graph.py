@@ -215,9 +215,8 @@ class Graph(Recorder):
 
         access = program.access(resources)
         index_state = None if indices is None else resource_state(self.device, indices)
-        self._add(
-            stage, program, resources, (vertices,), access, writes, run, (layer, target.far, index_state)
-        )
+        more_keys = layer, target.clear_depth, index_state
+        self._add(stage, program, resources, (vertices,), access, writes, run, more_keys)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -238,15 +237,9 @@ class Graph(Recorder):
         recording, result = self.recordings.get(self.device, record, args)
         if self.listing is not None:
             record(ListingRecorder(self.device, self.listing, len(self._passes)), *args)
-        access, dispatches = recording.access, recording.dispatches
-        self._passes.append(
-            DeclaredPass(
-                recording.stages,
-                lambda frame: frame.run(dispatches),
-                access.id,
-                (access.id, access.reads, access.writes),
-            )
-        )
+        stages, access, dispatches = recording.stages, recording.access, recording.dispatches
+        found = access.id, access.reads, access.writes
+        self._passes.append(DeclaredPass(stages, lambda frame: frame.run(dispatches), access.id, found))
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:

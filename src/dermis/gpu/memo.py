@@ -64,13 +64,10 @@ class Memo:
         """
         key = function, owner
         results = self._results.setdefault(key, [])
-        found = None
-        for one in results:
-            if are_equal(one.args, args):
-                found = one
+        for found in results:
+            if are_equal(found.args, args):
+                found.args = args  # these may be equal copies, which are recognised faster from now on
                 break
-        if found is not None:
-            found.args = args  # these may be equal copies, which are recognised faster from now on
         else:
             self._mark_hits_used(key)
             results[:] = results[: self._cache_size - 1]  # before the call, which may need the space

@@ -20,12 +20,12 @@ class DrawTarget(NamedTuple):
     """Attachments of a render pass, which are cleared first.
 
     depth : depth attachment
-    far : value that the depth attachment is cleared to
+    clear_depth : value that the depth attachment is cleared to
     colour : colour attachment; None to draw only depth
     """
 
     depth: TextureView
-    far: float
+    clear_depth: float
     colour: TextureOrView | None = None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
-from dermis.human.movement import expression_targets, gaze_turns
+from dermis.human.movement import expression_targets, gaze_rotations
 from dermis.human.skin.surface import average_surface, lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, LidContact, build_eyeball, radial_distances_mm
 
@@ -73,8 +73,8 @@ class LidSide(NamedTuple):
 
     def reindexed(self, point: Index) -> LidSide:
         """Return the same with indices into sorted points, which must include all of these."""
-        rings, own, contact = (np.searchsorted(point, one) for one in (self.rings, self.point, self.contact))
-        return self._replace(rings=rings, point=own, contact=contact)
+        names = "rings", "point", "contact"
+        return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 
 
 def fit_socket(balls: Points) -> EyeSocket:
@@ -92,28 +92,24 @@ def fit_lids(
     closed : whether the upper lids are moved to end at the lower lids
     axis : (3,) unit viewing direction of the eyes
     """
-    found = points_mm.copy()
+    fitted = points_mm.copy()
     for side, eye in zip(lid_sides(), sockets, strict=True):
-        _project_lids(found, side, eye, closed, axis)
-    return found
+        _project_lids(fitted, side, eye, closed, axis)
+    return fitted
 
 
-def _project_lids(
-    points_mm: Points, side: LidSide, eye: EyeSocket, closed: bool | Flags, axis: Points
-) -> None:
+def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | Flags, axis: Points) -> None:
     """Move the lids of one eye onto its eyeball in place, for one person or for several poses (m, n, 3).
 
     closed, axis : as for `fit_lids`; (m,) and (m, 1, 3) for several poses
     """
-    points_mm[..., side.point, :] += side.weights @ _lid_displacements(
-        points_mm[..., side.rings, :], eye, closed
-    )
+    points[..., side.point, :] += side.weights @ _lid_displacements(points[..., side.rings, :], eye, closed)
     centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
     size = CONTROL_SCALE * eye.size
-    off = (points_mm[..., side.contact, :] - centre) / size
-    far, surface = radial_distances_mm(off, axis)
-    out = np.maximum(1.0, (surface + side.clearances_mm) / far)
-    points_mm[..., side.contact, :] = centre + size * off * out[..., None]
+    relative = (points[..., side.contact, :] - centre) / size
+    distance, surface = radial_distances_mm(relative, axis)
+    scale = np.maximum(1.0, (surface + side.clearances_mm) / distance)
+    points[..., side.contact, :] = centre + size * relative * scale[..., None]
 
 
 def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidContact:
@@ -140,19 +136,20 @@ def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> P
     touch the eyeball; the thickness of the lids is kept.
     """
     published = (rings - eye.centre) / eye.size
-    off, shut = published.copy(), np.asarray(closed)
-    lids = off.reshape(-1, len(_ROW_CONTACT), _RINGS, 3)
-    for one in np.flatnonzero(shut):
+    relative, is_closed = published.copy(), np.asarray(closed)
+    lids = relative.reshape(-1, len(_ROW_CONTACT), _RINGS, 3)
+    for one in np.flatnonzero(is_closed):
         _close_upper_lid(lids[one])
-    above = (np.linalg.norm(published, axis=-1) - PUBLISHED_EYE_RADIUS_MM).reshape(*shut.shape, -1, _RINGS)
+    above = np.linalg.norm(published, axis=-1) - PUBLISHED_EYE_RADIUS_MM
+    above = above.reshape(*is_closed.shape, -1, _RINGS)
     above += (_ROW_CONTACT * (_EDGE_HEIGHT_MM - above[..., _EDGE]))[..., None]
-    radius = SCLERA_MM + np.maximum(above.reshape(*shut.shape, -1), _MIN_HEIGHT_MM)
-    across = np.linalg.norm(off[..., :2], axis=-1)
+    radius = SCLERA_MM + np.maximum(above.reshape(*is_closed.shape, -1), _MIN_HEIGHT_MM)
+    across = np.linalg.norm(relative[..., :2], axis=-1)
     target_radius = radius * _compress_radius(across / radius)
-    floor = np.where(shut[..., None], 0.0, _CARUNCLE_RISE_MM.ravel())
+    floor = np.where(is_closed[..., None], 0.0, _CARUNCLE_RISE_MM.ravel())
     depth = EYE_OFFSET_MM + np.sqrt(radius**2 - target_radius**2) + floor
-    flat = off[..., :2] * (target_radius / np.maximum(across, 1e-9))[..., None]
-    return np.asarray(eye.size * (np.concatenate([flat, depth[..., None]], axis=-1) - published))
+    front = relative[..., :2] * (target_radius / np.maximum(across, 1e-9))[..., None]
+    return np.asarray(eye.size * (np.concatenate([front, depth[..., None]], axis=-1) - published))
 
 
 def _close_upper_lid(rings: Points) -> None:
@@ -166,9 +163,8 @@ def _close_upper_lid(rings: Points) -> None:
 def _compress_radius(across: Points) -> Points:
     """Return distances from the axis, in eyeball radii, compressed near the outline."""
     room = _MAX_RADIUS - _LINEAR_RADIUS
-    return np.where(
-        across < _LINEAR_RADIUS, across, _LINEAR_RADIUS + room * np.tanh((across - _LINEAR_RADIUS) / room)
-    )
+    compressed = _LINEAR_RADIUS + room * np.tanh((across - _LINEAR_RADIUS) / room)
+    return np.where(across < _LINEAR_RADIUS, across, compressed)
 
 
 @cache
@@ -183,32 +179,34 @@ def lid_sides() -> tuple[LidSide, LidSide]:
 
 
 def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSide:
-    every = rings.ravel()
-    near = body[np.abs(points_mm[body] - points_mm[every].mean(axis=0)).max(axis=1) < 4 * _SKIN_REACH_MM]
-    far = np.linalg.norm(points_mm[near][:, None] - points_mm[every], axis=-1)
-    point, far = near[far.min(axis=1) < _SKIN_REACH_MM], far[far.min(axis=1) < _SKIN_REACH_MM]
-    weights = 1.0 / (far**2 + _FALLOFF_MM**2) ** 2
+    ring_points = rings.ravel()
+    centre = points_mm[ring_points].mean(axis=0)
+    near = body[np.abs(points_mm[body] - centre).max(axis=1) < 4 * _SKIN_REACH_MM]
+    distance = np.linalg.norm(points_mm[near][:, None] - points_mm[ring_points], axis=-1)
+    within = distance.min(axis=1) < _SKIN_REACH_MM
+    point, distance = near[within], distance[within]
+    weights = 1.0 / (distance**2 + _FALLOFF_MM**2) ** 2
     weights /= weights.sum(axis=1, keepdims=True)
-    t = far.min(axis=1) / _SKIN_REACH_MM
+    t = distance.min(axis=1) / _SKIN_REACH_MM
     weights *= (1.0 - t * t * (3.0 - 2.0 * t))[:, None]
-    own = np.isin(point, every)
-    weights[own] = point[own][:, None] == every
+    is_ring = np.isin(point, ring_points)
+    weights[is_ring] = point[is_ring][:, None] == ring_points
     sliding = _sliding_points(rings, point, name)
     clear = np.concatenate([np.repeat(_CLEARANCES_MM, len(rings)), np.full(len(sliding), _CLEARANCES_MM[-1])])
-    return LidSide(every, point, weights, np.concatenate([rings.T.ravel(), sliding]), clear)
+    return LidSide(ring_points, point, weights, np.concatenate([rings.T.ravel(), sliding]), clear)
 
 
 def _sliding_points(rings: Index, point: Index, name: str) -> Index:
     """Return the skin points beyond the rings that a blink moves (c,)."""
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{name}")
     part = slice(*target_deltas().first[index : index + 2])
-    far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _BLINK_DISPLACEMENT_MM
-    moved = np.intersect1d(target_deltas().point[part][far], point)
+    is_far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _BLINK_DISPLACEMENT_MM
+    moving = np.intersect1d(target_deltas().point[part][is_far], point)
     quads, skin = model_data()["quads"].astype(np.int64), rings[:, -1]
-    quads = quads[np.isin(quads, moved).any(axis=1) & ~np.isin(quads, rings[:, :-1]).any(axis=1)]
+    quads = quads[np.isin(quads, moving).any(axis=1) & ~np.isin(quads, rings[:, :-1]).any(axis=1)]
     for _ in range(_SLIDING_ROWS):  # from the lids outwards
         skin = np.union1d(skin, quads[np.isin(quads, skin).any(axis=1)])
-    return np.setdiff1d(np.intersect1d(skin, moved), rings)
+    return np.setdiff1d(np.intersect1d(skin, moving), rings)
 
 
 def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> NDArray[np.float32]:
@@ -216,17 +214,17 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 
     points_mm : (n, 3) published points of the person
     """
-    lids, found = _lid_targets(), expression_targets().delta_mm.copy()
+    lids, delta_mm = _lid_targets(), expression_targets().delta_mm.copy()
     rest_points = points_mm[lids.point]
     posed = np.tile(rest_points, (len(lids.closed), 1, 1))
-    posed[lids.target, lids.point_index] += found[lids.row]
+    posed[lids.target, lids.point_index] += delta_mm[lids.row]
     for side, eye, target_index in zip(lids.lid_sides, sockets, lids.target_index, strict=True):
         _project_lids(rest_points, side, eye, False, FORWARD)
         near = posed[target_index]
         _project_lids(near, side, eye, lids.closed[target_index], lids.axis[target_index])
         posed[target_index] = near
-    found[lids.row] = posed[lids.target, lids.point_index] - rest_points[lids.point_index]
-    return found
+    delta_mm[lids.row] = posed[lids.target, lids.point_index] - rest_points[lids.point_index]
+    return delta_mm
 
 
 class _LidTargets(NamedTuple):
@@ -252,33 +250,35 @@ class _LidTargets(NamedTuple):
 
 @cache
 def _lid_targets() -> _LidTargets:
-    both, moved = lid_sides(), expression_targets()
-    point = np.unique(np.concatenate([side.point for side in both]))
-    names = [name for name in moved.names if name.startswith(_LID_TARGET_PREFIXES)]
-    parts = [np.arange(*moved.first[index : index + 2]) for index in map(moved.names.index, names)]
-    rows = [part[np.isin(moved.point[part], point)] for part in parts]
-    near = [[np.isin(moved.point[row], side.point).any() for row in rows] for side in both]
+    sides, expressions = lid_sides(), expression_targets()
+    point = np.unique(np.concatenate([side.point for side in sides]))
+    names = [name for name in expressions.names if name.startswith(_LID_TARGET_PREFIXES)]
+    index = [expressions.names.index(name) for name in names]
+    parts = [np.arange(*expressions.first[k : k + 2]) for k in index]
+    rows = [part[np.isin(expressions.point[part], point)] for part in parts]
+    near = [[np.isin(expressions.point[row], side.point).any() for row in rows] for side in sides]
     row = np.concatenate(rows)
     return _LidTargets(
         np.array(["Blink" in name for name in names]),
         np.array([gaze_axes().get(name, FORWARD) for name in names])[:, None],
         point,
-        tuple(side.reindexed(point) for side in both),
+        tuple(side.reindexed(point) for side in sides),
         tuple(np.flatnonzero(one) for one in near),
         row,
         np.repeat(np.arange(len(rows)), [len(one) for one in rows]),
-        np.searchsorted(point, moved.point[row]),
+        np.searchsorted(point, expressions.point[row]),
     )
 
 
 @cache
 def gaze_axes() -> dict[str, Points]:
     """Return the viewing direction (3,) of an eye for each gaze target."""
-    turns = {turn.target: np.radians(turn.degrees) for turn in gaze_turns()}
-    found = {
-        name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()
-    }
-    return {name: axis / np.linalg.norm(axis) for name, axis in found.items()}
+    angles = {rotation.target: np.radians(rotation.degrees) for rotation in gaze_rotations()}
+    axes = {}
+    for name, (x, y, _) in angles.items():
+        axis = np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)])
+        axes[name] = axis / np.linalg.norm(axis)
+    return axes
 
 
 def eyeball_mesh() -> tuple[Doubles, Index]:

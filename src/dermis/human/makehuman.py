@@ -45,19 +45,19 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 
     Raises DermisError for unknown targets.
     """
-    found, moved = model_data(), target_deltas()
-    points = [np.arange(len(found["positions_mm"]))]
-    deltas: list[NDArray[np.floating]] = [found["positions_mm"].astype(np.float64)]
+    arrays, targets = model_data(), target_deltas()
+    points = [np.arange(len(arrays["positions_mm"]))]
+    deltas: list[NDArray[np.floating]] = [arrays["positions_mm"].astype(np.float64)]
     check_targets(weights)
     known = _target_indices()
     for name, weight in weights.items():
-        part = slice(*moved.first[known[name] : known[name] + 2])
-        points.append(moved.point[part])
-        deltas.append(weight * moved.delta_mm[part])
+        part = slice(*targets.first[known[name] : known[name] + 2])
+        points.append(targets.point[part])
+        deltas.append(weight * targets.delta_mm[part])
     point, delta = np.concatenate(points), np.concatenate(deltas)
-    places = np.stack([np.bincount(point, column) for column in delta.T], axis=1)
-    eyes = [list(map(str, found["joint_names"])).index(name) for name in ("l-eye", "r-eye")]
-    return np.asarray(places - places[mesh_point_count() :][eyes].mean(axis=0))
+    positions_mm = np.stack([np.bincount(point, column) for column in delta.T], axis=1)
+    eyes = [list(map(str, arrays["joint_names"])).index(name) for name in ("l-eye", "r-eye")]
+    return np.asarray(positions_mm - positions_mm[mesh_point_count() :][eyes].mean(axis=0))
 
 
 @cache
@@ -92,9 +92,8 @@ def human_targets() -> tuple[str, ...]:
     >>> "nose/nose-hump-incr" in dermis.human_targets()
     True
     """
-    return tuple(
-        name for name in target_deltas().names if not name.startswith((EXPRESSION_PREFIX, "expression/"))
-    )
+    excluded = EXPRESSION_PREFIX, "expression/"
+    return tuple(name for name in target_deltas().names if not name.startswith(excluded))
 
 
 @cache
@@ -108,21 +107,21 @@ def model_data() -> Mapping[str, NDArray[Any]]:
 @cache
 def group_points(name: str) -> NDArray[np.int64]:
     """Return the sorted points of a group of quads, such as "helper-l-eye"."""
-    found = model_data()
-    group = list(map(str, found["group_names"])).index(name)
-    return np.unique(found["quads"][found["group"] == group]).astype(np.int64)
+    arrays = model_data()
+    group = list(map(str, arrays["group_names"])).index(name)
+    return np.unique(arrays["quads"][arrays["group"] == group]).astype(np.int64)
 
 
 def mesh_point_count() -> int:
     """Return the number of mesh points, which precede the joints."""
-    found = model_data()
-    return len(found["positions_mm"]) - len(found["joint_names"])
+    arrays = model_data()
+    return len(arrays["positions_mm"]) - len(arrays["joint_names"])
 
 
 @cache
 def target_deltas() -> TargetDeltas:
     """Return the displacements of all targets."""
-    found = model_data()
-    delta = DELTA_UNIT_MM * found["target_delta"].astype(np.float32)
-    first, point = (found[name].astype(np.int64) for name in ("target_first", "target_point"))
-    return TargetDeltas(tuple(map(str, found["target_names"])), first, point, delta)
+    arrays = model_data()
+    delta = DELTA_UNIT_MM * arrays["target_delta"].astype(np.float32)
+    first, point = (arrays[name].astype(np.int64) for name in ("target_first", "target_point"))
+    return TargetDeltas(tuple(map(str, arrays["target_names"])), first, point, delta)

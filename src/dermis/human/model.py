@@ -14,7 +14,7 @@ from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
 from dermis.human.makehuman import Points, group_points, mesh_point_count, model_data, morphed_points_mm
-from dermis.human.movement import expression_targets, gaze_turns, skeleton
+from dermis.human.movement import expression_targets, gaze_rotations, skeleton
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
@@ -87,7 +87,7 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     targets = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
-    rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_turns(), contact=contact)
+    rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
     return Head("human", mesh, maps, CREDIT, rig, _eyes(eyes))
 
 
@@ -108,10 +108,8 @@ def _sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
 
 def _eyes(look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
-    apex, back, side = (
-        np.array([mesh_point_count() + mark, mesh_point_count() + size + mark], np.int32)
-        for mark in eyeball.axis_points()
-    )
+    first = mesh_point_count() + np.array([0, size], np.int32)
+    apex, back, side = (np.asarray(first + point, np.int32) for point in eyeball.axis_points())
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
@@ -129,16 +127,16 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
     Arrays: uv (u, 2), points of the quads (q, 4), their uv indices (q, 4), and their materials (q,).
     """
-    found = model_data()
+    arrays = model_data()
     if layout == "own":
-        uv, corner = found["uv"].astype(np.float64), found["quads_uv"].astype(np.int64)
+        uv, corner = arrays["uv"].astype(np.float64), arrays["quads_uv"].astype(np.int64)
     else:  # without the cut surface of the neck
-        uv, corner = found["uv1"] * [1.0, -1.0] + [0.0, 1.0], found["quads_uv1"].astype(np.int64)
-    names = [str(found["group_names"][group]) for group in found["group"][: len(corner)]]
-    stays = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
+        uv, corner = arrays["uv1"] * [1.0, -1.0] + [0.0, 1.0], arrays["quads_uv1"].astype(np.int64)
+    names = [str(arrays["group_names"][group]) for group in arrays["group"][: len(corner)]]
+    is_kept = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
     material = np.array([list(MATERIALS).index(name) for name in names])
     ball, quads = lids.eyeball_mesh()
-    size, points = len(ball), found["quads"][: len(corner)].astype(np.int64)
+    size, points = len(ball), arrays["quads"][: len(corner)].astype(np.int64)
     for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
         tooth_points, tooth_uv = teeth.layout(upper)
         is_tooth = np.array(names) == name
@@ -147,9 +145,9 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
         np.concatenate([uv, eyeball.eyeball_uv()]),
-        np.concatenate([points[stays], mesh_point_count() + quads, mesh_point_count() + size + quads]),
-        np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
-        np.concatenate([material[stays], *eyes]),
+        np.concatenate([points[is_kept], mesh_point_count() + quads, mesh_point_count() + size + quads]),
+        np.concatenate([corner[is_kept], len(uv) + quads, len(uv) + quads]),
+        np.concatenate([material[is_kept], *eyes]),
     )
 
 
@@ -181,10 +179,11 @@ class Template:
 @cache
 def template(layout: Layout, levels: int) -> Template:
     """Return the template of a uv layout and a level of subdivision."""
-    head = plain = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
-    found = refinement(plain.mesh, levels) if levels else None
-    if found is not None:
-        rig = replace(plain.control, stencils=found.stencils)
-        head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
-    mean_mm = plain.control.positions_mm.astype(np.float64)
-    return Template(head, RootFinder(plain.mesh, mean_mm, eye_centres(plain.mesh), head.mesh), found)
+    head = control_head = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
+    refined = refinement(control_head.mesh, levels) if levels else None
+    if refined is not None:
+        rig = replace(control_head.control, stencils=refined.stencils)
+        head = replace(control_head, mesh=refined.mesh(control_head.mesh), rig=rig, levels=levels)
+    mean_mm = control_head.control.positions_mm.astype(np.float64)
+    root_finder = RootFinder(control_head.mesh, mean_mm, eye_centres(control_head.mesh), head.mesh)
+    return Template(head, root_finder, refined)

@@ -35,7 +35,7 @@ _GAZE_ANGLES = {
 """Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
 
 
-def gaze_turns() -> tuple[BoneRotation, ...]:
+def gaze_rotations() -> tuple[BoneRotation, ...]:
     """Return the rotations of the eyes that belong to the eyeLook targets of ARKit."""
     return tuple(
         BoneRotation(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
@@ -46,27 +46,27 @@ def gaze_turns() -> tuple[BoneRotation, ...]:
 
 @cache
 def expression_targets() -> MorphTargets:
-    """Return the ARKit blend shapes of skin, teeth and tongue; eyeballs rotate by `gaze_turns` instead."""
-    moved, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
-    for index, name in enumerate(moved.names):
+    """Return the ARKit blend shapes of skin, teeth and tongue; `gaze_rotations` turn the eyeballs."""
+    targets, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
+    for index, name in enumerate(targets.names):
         if name.startswith(EXPRESSION_PREFIX):
-            part = np.arange(*moved.first[index : index + 2])
+            part = np.arange(*targets.first[index : index + 2])
             names.append(name.removeprefix(EXPRESSION_PREFIX))
-            rows.append(part[_moved_points()[moved.point[part]]])
+            rows.append(part[_moved_points()[targets.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
-    point, delta_mm = moved.point[chosen].astype(np.int32), moved.delta_mm[chosen]
+    point, delta_mm = targets.point[chosen].astype(np.int32), targets.delta_mm[chosen]
     return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
 
 
 @cache
 def _moved_points() -> NDArray[np.bool_]:
     """Return the mask (n,) of points that expressions move: neither joints nor eyeballs."""
-    found = model_data()
-    balls = [index for index, name in enumerate(found["group_names"]) if str(name).endswith("-eye")]
-    moving = np.ones(len(found["positions_mm"]), bool)
-    moving[len(moving) - len(found["joint_names"]) :] = False
-    moving[np.unique(found["quads"][np.isin(found["group"], balls)])] = False
-    return moving
+    arrays = model_data()
+    balls = [index for index, name in enumerate(arrays["group_names"]) if str(name).endswith("-eye")]
+    moved = np.ones(len(arrays["positions_mm"]), bool)
+    moved[len(moved) - len(arrays["joint_names"]) :] = False
+    moved[np.unique(arrays["quads"][np.isin(arrays["group"], balls)])] = False
+    return moved
 
 
 def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int) -> Skeleton:
@@ -77,9 +77,9 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
     eyeball_size : number of points of an eyeball; the left eyeball follows the published points, then the
         right
     """
-    found = model_data()
-    names = tuple(map(str, found["bone_names"]))
-    joints = dict(zip(map(str, found["joint_names"]), joint_mm, strict=True))
+    arrays = model_data()
+    names = tuple(map(str, arrays["bone_names"]))
+    joints = dict(zip(map(str, arrays["joint_names"]), joint_mm, strict=True))
     joints |= dict(zip(("l-eye", "r-eye"), centres, strict=True))
     origins_mm = np.array(
         [(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BONE_ORIGINS[name] for name in names)]
@@ -95,10 +95,10 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
 @cache
 def _skin_weights(eyes: tuple[int, ...], eyeball_size: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the bones (p, 4) of all points and their weights; an eyeball follows only its own bone."""
-    found = model_data()
-    weights = found["weight"].astype(np.float32)
-    own = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)
-    own[:, 0] = 1.0
-    bone = np.concatenate([found["bone"], np.zeros_like(own)]).astype(np.int32)
+    arrays = model_data()
+    weights = arrays["weight"].astype(np.float32)
+    eyeball_weights = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)
+    eyeball_weights[:, 0] = 1.0
+    bone = np.concatenate([arrays["bone"], np.zeros_like(eyeball_weights)]).astype(np.int32)
     bone[len(weights) :, 0] = np.repeat(eyes, eyeball_size)
-    return bone, np.concatenate([weights / weights.sum(axis=1, keepdims=True), own])
+    return bone, np.concatenate([weights / weights.sum(axis=1, keepdims=True), eyeball_weights])

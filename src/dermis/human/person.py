@@ -49,13 +49,7 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "ears": 0.25,
     "neck": 0.12,
 }
-_EXCLUDED = (
-    "trans",
-    "age",
-    "fat",
-    "measure",
-    "push",
-)  # covered by macro targets, or translations of whole parts
+_EXCLUDED = ("trans", "age", "fat", "measure", "push")  # macro quantities, and shifts of whole parts
 _SIDE_DEVIATION = 0.2  # difference between left and right, as a fraction of the deviation
 _ASYMMETRY_DEVIATION = 0.1
 _SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
@@ -74,7 +68,7 @@ _RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _MIN_HAIR_FRACTION = 0.05
-_MAX_TARGET_WEIGHT = 2.0
+_TARGET_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 Levels = int | Callable[[Head], int]
 
@@ -115,21 +109,19 @@ def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]
         return sampled
     weights = np.array([given.get(name, 0.0) for name in _ANCESTRY])
     if not weights.sum() > 0:
-        refuse(
-            "ancestry", "a weight of african, asian or caucasian above 0", "all given ones are 0", "Raise one"
-        )
+        refuse("ancestry", "a weight of african, asian or caucasian above 0", "all given are 0", "Raise one")
     return np.asarray(weights / weights.sum())
 
 
 def _sample_hair_and_skin(
     rng: np.random.Generator,
-    demographics: Demographics,
+    person: Demographics,
     typical: HairLook,
     skin: SkinLook,
     given: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return random hair, and the skin with the stubble and recession that match it."""
-    hair, recession = sample_hair(rng, demographics, typical), sample_recession(rng, demographics)
+    hair, recession = sample_hair(rng, person, typical), sample_recession(rng, person)
     hair = replace(hair, **given.get("hair", {}))
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
@@ -181,22 +173,21 @@ class _OppositeTargets(NamedTuple):
 @cache
 def _opposite_targets() -> tuple[_OppositeTargets, ...]:
     """Return all pairs of targets that are sampled, in the order of sampling."""
-    known, found = human_targets(), list[_OppositeTargets]()
+    known, pairs = human_targets(), list[_OppositeTargets]()
     for name in known:
         folder, local_name = name.split("/")
         if folder == "asym" and name.endswith("-l"):
-            found.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
+            pairs.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
         if folder not in _FOLDER_DEVIATIONS or any(word in local_name for word in _EXCLUDED):
             continue
         sided = local_name[:2] in ("l-", "r-")
         for low, high in _OPPOSITES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
-                mirrored = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
-                found.append(
-                    _OppositeTargets(name, f"{stem}{high}", _FOLDER_DEVIATIONS[folder], True, mirrored)
-                )
-    return tuple(found)
+                side_free = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
+                deviation = _FOLDER_DEVIATIONS[folder]
+                pairs.append(_OppositeTargets(name, f"{stem}{high}", deviation, True, side_free))
+    return tuple(pairs)
 
 
 @dataclass(frozen=True)
@@ -263,13 +254,7 @@ class Human:
         for name, weight in self.targets.items():
             if not isinstance(name, str):
                 refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
-            checked_number(
-                f"target {name!r}",
-                weight,
-                -_MAX_TARGET_WEIGHT,
-                _MAX_TARGET_WEIGHT,
-                "beyond it is no face",
-            )
+            checked_number(f"target {name!r}", weight, *_TARGET_RANGE, "beyond it is no face")
         for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
             if not isinstance(look := getattr(self, name), kind | None):
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
@@ -411,10 +396,10 @@ class Human:
 
     def weights(self) -> dict[str, float]:
         """Return the non-zero weights of published targets by name."""
-        found = {**self._ancestry_weights(), **self._build_weights()}
+        weights = {**self._ancestry_weights(), **self._build_weights()}
         for name, weight in self.targets.items():
-            found[name] = found.get(name, 0.0) + weight
-        return {name: weight for name, weight in found.items() if weight}
+            weights[name] = weights.get(name, 0.0) + weight
+        return {name: weight for name, weight in weights.items() if weight}
 
     def _ancestry_weights(self) -> dict[str, float]:
         total = self.african + self.asian + self.caucasian
@@ -426,14 +411,14 @@ class Human:
 
     def _build_weights(self) -> dict[str, float]:
         """Return the weights of targets for weight and muscle; the average of both needs no target."""
-        found = {}
+        weights = {}
         for kind, fraction in self._adult_fractions().items():
             for muscle, muscle_fraction in _blend_steps(self.muscle).items():
                 for weight, weight_fraction in _blend_steps(self.weight).items():
                     if (muscle, weight) != ("average", "average"):
                         name = f"macrodetails/universal-{kind}-{muscle}muscle-{weight}weight"
-                        found[name] = fraction * muscle_fraction * weight_fraction
-        return found
+                        weights[name] = fraction * muscle_fraction * weight_fraction
+        return weights
 
     def _adult_fractions(self) -> dict[str, float]:
         """Return the fractions of the four published kinds of adults."""

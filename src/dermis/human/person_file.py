@@ -31,9 +31,9 @@ _STRETCH_ATLAS_SIDE = 1024
 
 def person_numbers(person: Human) -> dict[str, Any]:
     """Return all numbers of a person by name, including typical looks of skin, eyes and hair."""
-    found = {one.name: getattr(person, one.name) for one in fields(person)}
-    found |= {"targets": dict(person.targets), "skin": asdict(person.look)}
-    return found | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
+    numbers = {one.name: getattr(person, one.name) for one in fields(person)}
+    numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
+    return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
 def write_person_json(path: Path, person: Human) -> int:
@@ -55,8 +55,8 @@ def read_person(path: Path) -> Human:
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
     parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
-    made = {name: _build(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
-    human = _build(path, Human, person | made)
+    looks = {name: _build(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
+    human = _build(path, Human, person | looks)
     with error_context(path):
         check_targets(human.targets)
     return human
@@ -116,6 +116,6 @@ def relief_slopes(head: Head) -> NDArray[np.float32] | None:
     coarse = max(MIN_SIZE, min(side, _STRETCH_ATLAS_SIDE))
     stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
     if side > coarse:
-        places = np.arange(side) * coarse // side
-        stretch = stretch[places][:, places] * np.float32(side / coarse)
+        texels = np.arange(side) * coarse // side
+        stretch = stretch[texels][:, texels] * np.float32(side / coarse)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)

@@ -105,13 +105,8 @@ class Clip(ShortRepr):
 
     def __post_init__(self) -> None:
         """Check the duration."""
-        checked_number(
-            f"{self.name}: duration",
-            self.duration_s,
-            0.0,
-            MAX_DURATION_S,
-            "s: no motion is longer than a day",
-        )
+        unit = "s: no motion is longer than a day"
+        checked_number(f"{self.name}: duration", self.duration_s, 0.0, MAX_DURATION_S, unit)
 
     @property
     def note(self) -> str:

@@ -6,12 +6,7 @@ from dataclasses import dataclass
 
 from dermis.base.quantities import check_fields
 
-LIMITS = {
-    "eumelanin": (0.0, 1.0),
-    "pupil_mm": (1.0, 4.0),
-    "redness": (0.0, 1.0),
-    "seed": (0, 2**32 - 1),
-}
+LIMITS = {"eumelanin": (0.0, 1.0), "pupil_mm": (1.0, 4.0), "redness": (0.0, 1.0), "seed": (0, 2**32 - 1)}
 """Bounds of the fields of `EyeLook`."""
 
 

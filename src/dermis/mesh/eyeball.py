@@ -107,9 +107,8 @@ def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # even in angle
     u, v = (part.ravel() for part in np.meshgrid(grid, grid))
     corner = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
-    face = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(
-        -1, 4
-    )
+    around = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    face = np.stack(around, axis=-1).reshape(-1, 4)
     ones = np.ones_like(u)
     for axis in range(3):
         for sign in (1.0, -1.0):

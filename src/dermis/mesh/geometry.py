@@ -99,14 +99,18 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
     return np.asarray(np.linalg.norm(cross, axis=1) / 2)
 
 
+def cross_2d(a: Doubles, b: Doubles) -> Doubles:
+    """Return the z component of the cross product of (..., 2) vectors."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def uv_cross(corners: NDArray[np.floating]) -> Doubles:
     """Return twice the signed uv area of each triangle (f,).
 
     corners : (f, 3, 2)
     """
     p = np.asarray(corners, dtype=np.float64)
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
@@ -190,6 +194,16 @@ def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> In
         label = label[label]
         if np.array_equal(label, before):
             return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+
+
+def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
+    """Expand runs of consecutive integers: return the run that each integer belongs to, and the integers.
+
+    first, count : first integer of each run and its length
+    """
+    which = np.repeat(np.arange(len(count)), count)
+    start = np.repeat(np.cumsum(count) - count, count)
+    return which, np.arange(len(which)) - start + first[which]
 
 
 def fibonacci_sphere(count: int) -> Doubles:

@@ -71,9 +71,8 @@ class Pose(ShortRepr):
         if value is None or isinstance(value, Pose):
             return value
         if not isinstance(value, Mapping):
-            refuse(
-                "pose", "a Pose or a mapping of weights by name", f"got {format_value(value)}", "Correct it"
-            )
+            expected = "a Pose or a mapping of weights by name"
+            refuse("pose", expected, f"got {format_value(value)}", "Correct it")
         return cls(weights=value)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:

@@ -19,13 +19,13 @@ from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
 __all__ = [
     "INFLUENCES",
-    "RigidFollowers",
+    "BoneRotation",
     "MorphTargets",
     "Motion",
     "Rig",
+    "RigidFollowers",
     "Skeleton",
     "Stencils",
-    "BoneRotation",
     "no_targets",
 ]
 

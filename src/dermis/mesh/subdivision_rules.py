@@ -77,9 +77,8 @@ def _sides(cage: Cage) -> _Sides:
     start = cage.point[cage.corner]
     ends, edge, counts = unique_sides(np.column_stack((start, start[following])))
     face = np.repeat(np.arange(len(cage.sides)), cage.sides)
-    return _Sides(
-        int(cage.point.max()) + 1, start, previous, face, ends, edge, counts != 2, seam_edges, seam_edge
-    )
+    points, border = int(cage.point.max()) + 1, counts != 2
+    return _Sides(points, start, previous, face, ends, edge, border, seam_edges, seam_edge)
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
@@ -97,10 +96,8 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
     neighbours = np.where(sides.valence == 3, 9 / 16, 3 / 8)
     old = _old_point_weights(sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), along=1 / 8)
     opposite = sides.start[sides.previous]
-    opposite_weights = _matrix(
-        sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), (len(sides.ends), sides.points)
-    )
-    new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8)) + opposite_weights
+    ends = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8))
+    new = ends + _matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), ends.shape)
     uv, point = _add_edge_vertices(cage, sides)
     a, b, c = cage.corner.reshape(-1, 3).T
     ab, bc, ca = (len(cage.uv) + sides.seam_edge).reshape(-1, 3).T
@@ -122,14 +119,12 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
     sides = _sides(cage)
     n, count = np.maximum(sides.valence, 1), len(cage.sides)
     centres = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
-    face_weights = _matrix(
-        sides.edge, sides.face, _inner_edge_weights(sides, 1 / 4), (len(sides.ends), count)
-    )
-    new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4)) + face_weights @ centres
-    face_points = _matrix(
-        sides.start, sides.face, _inner_point_weights(sides, 1 / n**2), (sides.points, count)
-    )
-    old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8) + face_points @ centres
+    new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4))
+    weights = _inner_edge_weights(sides, 1 / 4)
+    new += _matrix(sides.edge, sides.face, weights, (len(sides.ends), count)) @ centres
+    old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8)
+    weights = _inner_point_weights(sides, 1 / n**2)
+    old += _matrix(sides.start, sides.face, weights, (sides.points, count)) @ centres
     uv, point = _add_edge_vertices(cage, sides)
     centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
     edge, face = len(cage.uv) + sides.seam_edge, len(uv) + sides.face
@@ -185,11 +180,9 @@ def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float)
     neighbour_weight[np.tile(sides.border, 2) & is_border[both]] = along
     # points where borders meet, or where the surface is not manifold, stay
     own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
-    index = np.arange(sides.points)
+    index, weights = np.arange(sides.points), np.concatenate((own_weight, neighbour_weight))
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
-    return _matrix(
-        rows, columns, np.concatenate((own_weight, neighbour_weight)), (sides.points, sides.points)
-    )
+    return _matrix(rows, columns, weights, (sides.points, sides.points))
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:

@@ -12,14 +12,14 @@ from pydantic import Field, model_validator
 
 from dermis.base.errors import refuse
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import BoundsReason
+from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
 _DISTANCE_MM = 1100.0  # of portrait photography; from a shorter distance the nose looks large
 
 
-_Fraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
+_Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -58,16 +58,12 @@ class Camera(FrozenModel):
     """Point on the optical axis, normally in the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction that is up in the picture."""
-    frame_mm: Annotated[
-        float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a part of a pore to a crowd")
-    ] = 340.0
+    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Reason("mm: from a part of a pore to a crowd")] = 340.0
     """Height of the picture in the plane of the target [mm]."""
     principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
     """Point of the picture on the optical axis, as fractions of width and height from the upper left
     corner."""
-    pixel_aspect: Annotated[
-        float, Field(ge=0.1, le=10), BoundsReason("pixels of sensors are nearly square")
-    ] = 1.0
+    pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Reason("pixels of sensors are nearly square")] = 1.0
     """Width of a pixel divided by its height."""
 
     @model_validator(mode="after")
@@ -226,18 +222,11 @@ def ear(head: Head) -> Camera:
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
     focus = float(x), float(y), float(z)
-    return Camera(
-        position=_offset_point(focus, _azimuth_direction(75.0), 600.0), target=focus, frame_mm=120.0
-    )
+    position = _offset_point(focus, _azimuth_direction(75.0), 600.0)
+    return Camera(position=position, target=focus, frame_mm=120.0)
 
 
-PRESETS = {
-    "portrait": portrait,
-    "three-quarter": three_quarter,
-    "profile": side,
-    "ear": ear,
-    "cheek": cheek,
-}
+PRESETS = {"portrait": portrait, "three-quarter": three_quarter, "profile": side, "ear": ear, "cheek": cheek}
 
 
 def preset(name: str, head: Head) -> Camera:
@@ -246,9 +235,8 @@ def preset(name: str, head: Head) -> Camera:
     Raises DermisError for a name that is not in `PRESETS`.
     """
     if name not in PRESETS:
-        refuse(
-            f"camera {name}", f"one of {', '.join(PRESETS)} or a TOML file", "it is neither", "Check the name"
-        )
+        expected = f"one of {', '.join(PRESETS)} or a TOML file"
+        refuse(f"camera {name}", expected, "it is neither", "Check the name")
     return PRESETS[name](head)
 
 

@@ -108,10 +108,10 @@ def _check_positions(lights: Sequence[Light]) -> Sequence[Light]:
     return lights
 
 
-def _warn_near_centre(what: str, position: Vector) -> None:
+def _warn_near_centre(label: str, position: Vector) -> None:
     distance = float(np.linalg.norm(position))
     if 0.0 < distance < _NEAR_CENTRE_MM:
         notify(
-            f"{what}: expected a position outside the head in mm, but it is {distance:g} mm from the centre. "
+            f"{label}: expected a position outside the head [mm], but it is {distance:g} mm from the centre. "
             "Write 1100 for 1.1 m."
         )

@@ -16,14 +16,8 @@ from pydantic_core import ErrorDetails
 from dermis.base.errors import DermisError, format_value, shorten
 
 _BOUND_ERRORS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}
-_NUMBER_ERRORS = {
-    "float_type",
-    "float_parsing",
-    "int_type",
-    "int_parsing",
-    "int_from_float",
-    "int_parsing_size",
-}
+_INT_ERRORS = {"int_type", "int_parsing", "int_from_float", "int_parsing_size"}
+_NUMBER_ERRORS = {"float_type", "float_parsing"} | _INT_ERRORS
 _TEXT_TYPES = (str, bytes, bytearray)
 _MAX_NAME_LENGTH = 80
 _MAX_TABLE_LENGTH = 160
@@ -46,7 +40,7 @@ class Keywords:
         return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=unchanged)
 
 
-class BoundsReason(str):
+class Reason(str):
     """Reason for the bounds of a numeric field, shown in error messages."""
 
     __slots__ = ()
@@ -140,18 +134,18 @@ def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
     return f"expected {expected}, but got {actual}"
 
 
-def _number_range(place: tuple[int | str, ...], model: type[BaseModel]) -> str:
+def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     """Return the range of a number in a field, with the reason; empty without bounds.
 
     location : path of the number, from the name of the field
     """
-    info = model.model_fields.get(str(place[0])) if place else None
+    info = model.model_fields.get(str(location[0])) if location else None
     if info is None:
         return ""
-    if len(place) > 1 and get_args(info.annotation):
+    if len(location) > 1 and get_args(info.annotation):
         info = FieldInfo.from_annotation(get_args(info.annotation)[-1])
     low, high = field_bounds(info)
-    reasons = [one for one in info.metadata if isinstance(one, BoundsReason)]
+    reasons = [one for one in info.metadata if isinstance(one, Reason)]
     why = f" ({reasons[0]})" if reasons else ""
     whole = "a whole number" if set(_leaf_types(info.annotation)) <= {int, NoneType} else "a number"
     return f"{whole} from {low:.10g} to {high:.10g}{why}" if low is not None and high is not None else ""
@@ -182,13 +176,11 @@ def _unknown_field(name: str, model: type[Any]) -> str:
     """Return the message for an unknown field: the most similar name, or the model that has such a field."""
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
-    near = (
-        [model.synonyms[plain]]
-        if plain in model.synonyms
-        else difflib.get_close_matches(plain, known, 1, 0.7)
-    )
-    if near:
-        return f"expected {near[0]}, {finding}"
+    similar = difflib.get_close_matches(plain, known, 1, 0.7)
+    if plain in model.synonyms:
+        similar = [model.synonyms[plain]]
+    if similar:
+        return f"expected {similar[0]}, {finding}"
     base = [one for one in model.__mro__ if "synonyms" in vars(one)][-1]
     owners = [one.__name__ for one in _subclasses(base) if name in one.model_fields]
     if owners:

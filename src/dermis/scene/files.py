@@ -17,7 +17,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
+from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, has_region_table
 from dermis.scene.heads import load_head
@@ -31,9 +31,7 @@ from dermis.scene.smoothness import SmoothIn
 P = TypeVar("P", bound=FrozenModel)
 _TABLES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
-_Weight = Annotated[
-    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), BoundsReason("faces break apart long before")
-]
+_Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
 
 
 def load_lights(name: str | Path) -> tuple[Light, ...]:

@@ -30,8 +30,8 @@ from pydantic_core import PydanticUndefined
 from dermis.base.errors import format_value, refuse
 from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import (
-    BoundsReason,
     InvalidFieldsError,
+    Reason,
     field_bounds,
     field_keywords,
     messages_by_field,
@@ -59,15 +59,15 @@ def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
 Coordinate = Annotated[
     float,
     Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM),
-    BoundsReason("mm: beyond a kilometre single precision is too coarse for skin"),
+    Reason("mm: beyond a kilometre single precision is too coarse for skin"),
 ]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 _Component = Annotated[
-    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), BoundsReason("only their ratios count")
+    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), Reason("only their ratios count")
 ]
 Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
 Intensity = Annotated[
-    float, Field(ge=0, le=1e6), BoundsReason("light is not negative, and the sun on skin is about 3")
+    float, Field(ge=0, le=1e6), Reason("light is not negative, and the sun on skin is about 3")
 ]
 Colour = tuple[Intensity, Intensity, Intensity]
 
@@ -93,9 +93,8 @@ class _Documented(ModelMetaclass):
         def __dir__(self) -> list[str]:
             bases = self.__mro__[: self.__mro__.index(BaseModel)]
             members = {name: thing for base in reversed(bases) for name, thing in vars(base).items()}
-            return [
-                name for name, thing in members.items() if name[0] != "_" and isinstance(thing, _MEMBER_TYPES)
-            ]
+            public = ((name, thing) for name, thing in members.items() if name[0] != "_")
+            return [name for name, thing in public if isinstance(thing, _MEMBER_TYPES)]
 
 
 class FrozenModel(BaseModel, metaclass=_Documented):
@@ -226,9 +225,8 @@ def model_docstring(model: type[BaseModel]) -> str:
         lines.append(f"{parameter.name} : {formatannotation(parameter.annotation)}{default}")
         bounds = "" if "Literal" in lines[-1] else accepted_values(model, parameter.name)
         text = field_help(model, parameter.name) + (f" [{bounds}]" if bounds else "")
-        lines += textwrap.wrap(
-            text, _DOCSTRING_WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
-        )
+        wrapped = textwrap.wrap(text, _DOCSTRING_WIDTH - 4, break_on_hyphens=False)
+        lines += [f"    {line}" for line in wrapped]
     listed = ["\n".join(["", title, "-" * len(title), *lines]) for title, lines in sections.items() if lines]
     text, *examples = re.split(r"\n(?=\nExamples\n-)", cleandoc(vars(model)["__doc__"] or ""))
     return "\n".join([text, *listed, *examples])
@@ -282,9 +280,7 @@ def _positional_field(model: type[BaseModel], value: tuple[Any, ...]) -> str:
     """Return the name of the field that a positional argument sets."""
     required = _required(model)
     if len(required) != 1 or len(value) != 1:
-        some, actual = (
-            ", ".join(f"{name}=..." for name in list(model.model_fields)[:3]),
-            f"got {format_value(value[0])}",
-        )
-        refuse(model.__name__, f"values by name, such as {some}", f"{actual} without one", "Name it")
+        names = ", ".join(f"{name}=..." for name in list(model.model_fields)[:3])
+        actual = f"got {format_value(value[0])} without one"
+        refuse(model.__name__, f"values by name, such as {names}", actual, "Name it")
     return required[0]

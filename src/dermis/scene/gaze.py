@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_array
 from dermis.formats.motion.captures import match_targets
-from dermis.human.movement import gaze_turns
+from dermis.human.movement import gaze_rotations
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_DISTANCE_MM, Pose
 from dermis.mesh.rig import BoneRotation, Rig
@@ -42,38 +42,31 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     if eyes is None or rig.skeleton is None:
         advice = f"{head.note}. {_EYES_ADVICE}" if head.note else _EYES_ADVICE
         refuse(head.name, "a head with eyes that turn", "it has none", advice)
-    goal_mm = checked_array(
-        "look at", target_mm, (3,), -MAX_DISTANCE_MM, MAX_DISTANCE_MM, "mm from the head's centre"
-    )
+    bounds = -MAX_DISTANCE_MM, MAX_DISTANCE_MM
+    goal_mm = checked_array("look at", target_mm, (3,), *bounds, "mm from the head's centre")
     eye_bones = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
-    weights = {
-        name: value
-        for name, value in base.weights.items()
-        if name not in _target_names(rig.bone_rotations, eye_bones)
-    }
+    gaze_targets = {rotation.target for rotation in rig.bone_rotations if rotation.bone in eye_bones}
+    weights = {name: value for name, value in base.weights.items() if name not in gaze_targets}
     bones = {name: value for name, value in base.bones.items() if name not in eye_bones}
     frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
     resting = eyes.frames(rig, rig.rest)
     for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
-        to_target = (frame @ np.append(goal_mm + np.array(head.centre_mm), 1.0))[:3] - [
-            0.0,
-            0.0,
-            eyes.centre_offset_mm[k],
-        ]
+        to_target = (frame @ np.append(goal_mm + np.array(head.centre_mm), 1.0))[:3]
+        to_target = to_target - [0.0, 0.0, eyes.centre_offset_mm[k]]
         angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.gaze[k]))
-        turns = [turn for turn in rig.bone_rotations if turn.bone == bone]
-        if not turns:
+        rotations = [rotation for rotation in rig.bone_rotations if rotation.bone == bone]
+        if not rotations:
             bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
-            turns = _eyelid_turns(rig, _SIDES[k])
-        weights |= _weights(turns, angles)
+            rotations = _eyelid_rotations(rig, _SIDES[k])
+        weights |= _weights(rotations, angles)
     return Pose(weights, bones, base.positions_mm)
 
 
-def _eyelid_turns(rig: Rig, side: str) -> list[BoneRotation]:
+def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
     """Return the gaze targets of an eye that the head has; in files they move only the lids."""
-    arkit_turns = [turn for turn in gaze_turns() if turn.target.endswith(side)]
-    known = match_targets([turn.target for turn in arkit_turns], rig.targets.names)
-    return [turn._replace(target=known[turn.target]) for turn in arkit_turns if turn.target in known]
+    arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side)]
+    known = match_targets([rotation.target for rotation in arkit], rig.targets.names)
+    return [one._replace(target=known[one.target]) for one in arkit if one.target in known]
 
 
 def _rotation_angles(goal: Doubles, axis: Doubles) -> tuple[float, float]:
@@ -98,15 +91,11 @@ def _unit(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _target_names(turns: tuple[BoneRotation, ...], bones: list[str]) -> set[str]:
-    return {turn.target for turn in turns if turn.bone in bones}
-
-
-def _weights(turns: list[BoneRotation], goal: tuple[float, float]) -> dict[str, Any]:
+def _weights(rotations: list[BoneRotation], goal: tuple[float, float]) -> dict[str, Any]:
     """Return the weights of targets for rotation angles about x and y [rad]."""
     target_weights = {}
-    for turn in turns:
-        for angle, most in zip(np.degrees(goal), turn.degrees[:2], strict=True):
-            if most and angle / most > 0:
-                target_weights[turn.target] = float(min(angle / most, MAX_GAZE_WEIGHT))
+    for rotation in rotations:
+        for angle, limit in zip(np.degrees(goal), rotation.degrees[:2], strict=True):
+            if limit and angle / limit > 0:
+                target_weights[rotation.target] = float(min(angle / limit, MAX_GAZE_WEIGHT))
     return target_weights

@@ -33,8 +33,8 @@ def gaze_directions(scene: Scene) -> Doubles | None:
     if head.eyes is None:
         return None
     directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.gaze)
-    seen = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera(scene)[0].T
-    return np.asarray(seen)
+    in_camera = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera(scene)[0].T
+    return np.asarray(in_camera)
 
 
 def _camera(scene: Scene) -> tuple[Doubles, Doubles]:

@@ -142,15 +142,12 @@ def load_head(
     check_files_and_lengths(given_maps, unit_mm=unit_mm, height_mm=height_mm)
     mesh_options: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
     mesh_options["eye_groups"], levels = eye_groups, resolve_levels(subdivide)
-    others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye}
-    check_options(
-        **mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide, regions=regions
-    )
+    others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
+    check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
     mesh_options |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
     if is_person_name(name):
-        return _with_look(
-            _load_human(name, given_maps, height_mm, normal_y, mesh_options | {"eyes": eyes}, levels), eye
-        )
+        mesh_options["eyes"] = eyes
+        return _with_look(_load_human(name, given_maps, height_mm, normal_y, mesh_options, levels), eye)
     sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
     if sample is not None:
         _check_sample_kind(sample)
@@ -176,11 +173,9 @@ def load_head(
     if notice:
         notify(notice)
     credit = f"{sample.attribution}, {sample.licence}" if sample else ""
-    head_model = _subdivided(Head(name, rigged.mesh, maps, credit, rigged.rig), levels)
-    head_model = with_default_regions(head_model) if regions == AUTO else head_model
-    return _with_look(
-        with_fitted_eyes(head_model, rigged.mesh, look) if eyes == "fitted" else head_model, eye
-    )
+    loaded = _subdivided(Head(name, rigged.mesh, maps, credit, rigged.rig), levels)
+    loaded = with_default_regions(loaded) if regions == AUTO else loaded
+    return _with_look(with_fitted_eyes(loaded, rigged.mesh, look) if eyes == "fitted" else loaded, eye)
 
 
 def is_person_name(name: str) -> bool:
@@ -190,10 +185,10 @@ def is_person_name(name: str) -> bool:
 
 def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
     """Return the head on a subdivided mesh; its rig keeps the file's own vertices for sequences."""
-    head_model = subdivide_head(head, levels)
-    if head_model.levels and head_model.rig is not None:
-        return replace(head_model, rig=replace(head_model.rig, vertex_point=head.mesh.point))
-    return head_model
+    finer = subdivide_head(head, levels)
+    if finer.levels and finer.rig is not None:
+        return replace(finer, rig=replace(finer.rig, vertex_point=head.mesh.point))
+    return finer
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
@@ -257,14 +252,8 @@ def _load_human(
     name : "human", "human:SEED", or a file of numbers
     mesh_options : options of mesh files, which must have their defaults
     """
-    defaults = {
-        "unit_mm": None,
-        "v_origin": "auto",
-        "up": "y",
-        "opaque": (),
-        "eye_groups": (),
-        "eyes": "fitted",
-    }
+    texts = {"v_origin": "auto", "up": "y", "eyes": "fitted"}
+    defaults = {"unit_mm": None, "opaque": (), "eye_groups": (), **texts}
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")
@@ -272,9 +261,9 @@ def _load_human(
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     found = levels if callable(levels) else lambda plain: levels
-    head_model = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, found(plain)))
+    head = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, found(plain)))
     given_maps = {role: getattr(loaded, role) for role in given}  # the other maps are painted
-    return replace(head_model, name=name, maps=replace(head_model.maps, **given_maps))
+    return replace(head, name=name, maps=replace(head.maps, **given_maps))
 
 
 def load_person(name: str) -> Human:

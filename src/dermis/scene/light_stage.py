@@ -22,10 +22,8 @@ def light_stage(count: int) -> list[DirectionalLight]:
     count = checked_integer("light stage", count, 1, _MAX_LIGHTS, "lights")
     y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     azimuth, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
-    light_directions = np.stack([radius * np.sin(azimuth), y, radius * np.cos(azimuth)], axis=-1)
-    return [
-        DirectionalLight(direction=tuple(-place), irradiance=(1.0, 1.0, 1.0)) for place in light_directions
-    ]
+    towards = np.stack([radius * np.sin(azimuth), y, radius * np.cos(azimuth)], axis=-1)
+    return [DirectionalLight(direction=tuple(-one), irradiance=(1.0, 1.0, 1.0)) for one in towards]
 
 
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
@@ -40,14 +38,12 @@ def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environ
     radiance = load_panorama(environment.name)
     size = radiance.shape[0], radiance.shape[1]
     texel_irradiance = environment.exposure * radiance * solid_angles(*size)[..., None]
-    azimuth = np.radians(environment.rotation_degrees)
+    angle = np.radians(environment.rotation_degrees)
+    cosine, sine = np.cos(angle), np.sin(angle)
     x, y, z = np.moveaxis(directions(*size).reshape(-1, 3), -1, 0)
-    rotated = np.stack(
-        [np.cos(azimuth) * x + np.sin(azimuth) * z, y, np.cos(azimuth) * z - np.sin(azimuth) * x], axis=-1
-    )
-    light_directions = -np.array([light.direction for light in lights], dtype=np.float64)
-    nearest = (
-        rotated @ (light_directions / np.linalg.norm(light_directions, axis=1, keepdims=True)).T
-    ).argmax(axis=1)
+    rotated = np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=-1)
+    towards = -np.array([light.direction for light in lights], dtype=np.float64)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    nearest = (rotated @ towards.T).argmax(axis=1)
     sums = [np.bincount(nearest, texel_irradiance[..., c].ravel(), len(lights)) for c in range(3)]
     return np.stack(sums, axis=-1)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
-from dermis.scene.field_errors import BoundsReason
+from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Colour, Direction, FrozenModel, Vector, slider
 
 __all__ = [
@@ -32,9 +32,9 @@ __all__ = [
 _Degrees = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
-    BoundsReason("degrees: half angle of a cone in front of the lamp"),
+    Reason("degrees: half angle of a cone in front of the lamp"),
 ]
-_LAMP_REASON = BoundsReason("mm: from the thickness of paper to 100 m")
+_LAMP_REASON = Reason("mm: from the thickness of paper to 100 m")
 _Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMP_REASON]
 
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
@@ -58,7 +58,7 @@ class _LightBase(FrozenModel):
     softness_mm: Annotated[
         float,
         Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
-        BoundsReason("mm: from the wavelength of light to a metre"),
+        Reason("mm: from the wavelength of light to a metre"),
     ] = 1.5
     """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
     minimum width [mm]."""
@@ -186,9 +186,7 @@ class DirectionalLight(_LightBase):
     """Word for this kind of light in scene files."""
     direction: Direction = Field(kw_only=False)
     """Direction in which the light travels."""
-    angle_degrees: Annotated[
-        float, Field(ge=0, le=20), BoundsReason("degrees: wider light is not parallel")
-    ] = 0.0
+    angle_degrees: Annotated[float, Field(ge=0, le=20), Reason("degrees: wider light is not parallel")] = 0.0
     """Angular diameter of the source, 0.53 for the sun; shadows are sharper near the surface that casts
     them."""
 

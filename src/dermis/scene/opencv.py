@@ -43,11 +43,9 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
     width, height = _size(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     position = -rotation.T @ translation
-    distance = (
-        translation[2]
-        if translation[2] > _MIN_DISTANCE_MM
-        else max(float(np.linalg.norm(translation)), _MIN_DISTANCE_MM)
-    )
+    distance = translation[2]
+    if distance <= _MIN_DISTANCE_MM:
+        distance = max(float(np.linalg.norm(translation)), _MIN_DISTANCE_MM)
     return {
         "position": position,
         "target": position + distance * rotation[2],

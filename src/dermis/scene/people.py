@@ -15,11 +15,11 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
     The colour is still that of the person's painted maps; darker skin scatters light less far.
     """
     look = person.look
-    own = Pigments(
+    pigments = Pigments(
         melanin=look.melanin,
         eumelanin=look.eumelanin,
         blood=look.blood,
         oxygen=look.oxygen,
         epidermis_mm=DEFAULT_SKIN.epidermis_mm,
     )
-    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL, "pigments": own}))
+    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL, "pigments": pigments}))

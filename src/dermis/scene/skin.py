@@ -8,7 +8,7 @@ from pydantic import Field
 
 from dermis.base.errors import format_value, refuse
 from dermis.optics.pigments.parameters import Structure
-from dermis.scene.field_errors import BoundsReason
+from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import FrozenModel, slider
 from dermis.scene.talk import Energy, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
@@ -27,7 +27,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
-_COEFFICIENT_REASON = BoundsReason("1/mm: white paint has some hundreds")
+_COEFFICIENT_REASON = Reason("1/mm: white paint has some hundreds")
 _Absorption = Annotated[float, Field(ge=0, le=1e4), _COEFFICIENT_REASON]
 _Scattering = Annotated[float, Field(ge=1e-6, le=1e4), _COEFFICIENT_REASON]
 _COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, log=True))
@@ -49,7 +49,7 @@ class Pigments(FrozenModel):
     epidermis_mm: Annotated[
         float | None,
         Field(ge=1e-3, le=2, json_schema_extra=slider(0.02, 0.5)),
-        BoundsReason("mm: from less than a cell to a callus"),
+        Reason("mm: from less than a cell to a callus"),
     ] = None
     """Thickness of the epidermis [mm]."""
     epidermal_blood: Annotated[_Fraction, Field(json_schema_extra=slider(0, 0.1))] = None
@@ -68,7 +68,7 @@ class TissueLayer(FrozenModel):
     thickness_mm: Annotated[
         float | None,
         Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, log=True)),
-        BoundsReason("mm: from a cell membrane to more than a body"),
+        Reason("mm: from a cell membrane to more than a body"),
     ] = None
     """Thickness; None for a last layer that is infinitely deep [mm]."""
     absorption_per_mm: Annotated[tuple[_Absorption, _Absorption, _Absorption], _COEFFICIENT_SLIDER]
@@ -105,7 +105,7 @@ class Skin(FrozenModel):
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Fraction of the colour map that is applied before scattering; the rest is applied after it."""
     roughness: Annotated[
-        float, Field(ge=0.05, le=1), BoundsReason("from near-mirror skin to slopes of 45 degrees")
+        float, Field(ge=0.05, le=1), Reason("from near-mirror skin to slopes of 45 degrees")
     ] = DEFAULT_ROUGHNESS
     """Beckmann roughness m of the surface; with a roughness map a factor relative to 0.3: 0.6 doubles the
     values of the map."""
@@ -126,7 +126,7 @@ class Skin(FrozenModel):
     anisotropy: Annotated[
         float,
         Field(ge=0, le=0.95),
-        BoundsReason("more is nearly unscattered light, which the model does not describe"),
+        Reason("more is nearly unscattered light, which the model does not describe"),
     ] = 0.0
     """Mean cosine of the scattering angle, with direction "half-space", at constant reduced scattering: at
     0.8, as in real tissue, more oblique light is reflected and more light passes thin parts."""

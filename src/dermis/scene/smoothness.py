@@ -83,11 +83,8 @@ class Silhouette(NamedTuple):
             return 0.0
         order = np.argsort(self.deviation_px)
         cumulative_length = np.cumsum(self.length_px[order])
-        return float(
-            self.deviation_px[order][
-                np.searchsorted(cumulative_length, _SMOOTH_FRACTION * cumulative_length[-1])
-            ]
-        )
+        index = np.searchsorted(cumulative_length, _SMOOTH_FRACTION * cumulative_length[-1])
+        return float(self.deviation_px[order][index])
 
 
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
@@ -109,12 +106,11 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
     on_silhouette = (sides == 2) & (np.bincount(of_side, facing, len(ends)) == 1)
     a, b = ends[on_silhouette].T
     middle = (pixels[a] + pixels[b]) / 2
-    seen = ((middle >= 0) & (middle < size)).all(axis=1) & (np.minimum(depth[a], depth[b]) > _NEAR_PLANE_MM)
-    a, b = a[seen], b[seen]
-    bend_mm = (
-        np.einsum("ek,ek->e", (normals[a] - normals[b])[:, :2], (camera_points[a] - camera_points[b])[:, :2])
-        / 8
-    )
+    visible = ((middle >= 0) & (middle < size)).all(axis=1)
+    visible &= np.minimum(depth[a], depth[b]) > _NEAR_PLANE_MM
+    a, b = a[visible], b[visible]
+    chords = (camera_points[a] - camera_points[b])[:, :2]
+    bend_mm = np.einsum("ek,ek->e", (normals[a] - normals[b])[:, :2], chords) / 8
     scale = K[1, 1] / (0.5 * (depth[a] + depth[b]))
     return Silhouette(np.linalg.norm(pixels[a] - pixels[b], axis=1), np.abs(bend_mm) * scale)
 

@@ -50,10 +50,7 @@ def _power(angles: Cosines, s: Floats) -> Floats:
 
 
 BLINN_PHONG = Model(
-    blinn_phong,
-    "normalised power of n.h",
-    reciprocal=True,
-    sources=("Blinn1977", "Walter2007"),
+    blinn_phong, "normalised power of n.h", reciprocal=True, sources=("Blinn1977", "Walter2007")
 )
 BLINN_PHONG_PLAIN = Model(
     blinn_phong_plain,

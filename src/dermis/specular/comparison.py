@@ -33,8 +33,8 @@ def reciprocity_error(model: str) -> float:
     lobe = MODELS[model].lobe
     errors = []
     for m in ROUGHNESSES:
-        there, back = lobe(cosines(_UP, l, v), m), lobe(cosines(_UP, v, l), m)
-        errors.append(np.abs(there - back).max() / max(there.max(), back.max()))
+        forward, backward = lobe(cosines(_UP, l, v), m), lobe(cosines(_UP, v, l), m)
+        errors.append(np.abs(forward - backward).max() / max(forward.max(), backward.max()))
     return float(max(errors))
 
 

@@ -136,9 +136,9 @@ def scattering(
         entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(ETA**2 - o * o))
         for p, term in enumerate(attenuations(o, depth, np.full(o.shape, h))):
             exit_azimuth = 2 * p * inner - 2 * entry + p * np.pi
-            around = (
-                logistic(phi - exit_azimuth, parameters.width) if p < 3 else np.full(o.shape, 0.5 / np.pi)
-            )
+            around = np.full(o.shape, 0.5 / np.pi)
+            if p < 3:
+                around = logistic(phi - exit_azimuth, parameters.width)
             along = longitudinal(i, tilted_sine(o, p), parameters.variance[p])
             total += term * (along * around / FIBRE_SAMPLES)[..., None]
     return total

@@ -43,10 +43,7 @@ def _power(angles: Cosines, s: Floats) -> Floats:
 
 
 PHONG = Model(
-    phong,
-    "normalised power of r.v",
-    reciprocal=True,
-    sources=("Phong1975", "LafortuneWillems1994"),
+    phong, "normalised power of r.v", reciprocal=True, sources=("Phong1975", "LafortuneWillems1994")
 )
 PHONG_PLAIN = Model(
     phong_plain,

@@ -43,10 +43,8 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
 
 def _mean(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
     """Return the weighted mean of a quantity for the roughnesses of both lobes."""
-    narrow, wide = (
-        np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS)
-        for factor in (NARROW_FACTOR, WIDE_FACTOR)
-    )
+    factors = NARROW_FACTOR, WIDE_FACTOR
+    narrow, wide = (np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors)
     return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))
 
 

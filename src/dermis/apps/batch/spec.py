@@ -21,7 +21,7 @@ from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
 from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.landmarks.sets import SETS
-from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
+from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.outputs import check_outputs
 from dermis.scene.settings import Settings
@@ -45,17 +45,17 @@ P = TypeVar("P", bound=FrozenModel)
 class Spec(FrozenModel):
     """Specification of a data set."""
 
-    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), BoundsReason("a billion images")] = 1000
+    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), Reason("a billion images")] = 1000
     """Number of images."""
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1), BoundsReason("32 bits")] = 0
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
     """Seed of all random numbers."""
-    images_per_person: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million of each")] = 1
+    images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
     """Outputs written for each image beside the picture, as in `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
     """Landmark sets, or tables of name,vertex for your own meshes (.csv, in the spec's folder)."""
-    shard_size: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million in a file")] = 1000
+    shard_size: Annotated[int, Field(ge=1, le=10**6), Reason("a million in a file")] = 1000
     """Images per shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
     """Shards as tar files (webdataset) or as folders."""

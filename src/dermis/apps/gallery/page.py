@@ -48,8 +48,8 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
         deck=_deck(pictures),
         works=_bibliography(pictures),
     )
-    with atomic_file(path) as trial:
-        trial.write_text(page, encoding="utf-8")
+    with atomic_file(path) as file:
+        file.write_text(page, encoding="utf-8")
 
 
 def _entry(picture: GalleryPicture) -> str:
@@ -68,30 +68,30 @@ def _section(picture: GalleryPicture) -> str:
 
 def _equation(text: str) -> str:
     """Return HTML of an equation in one line, where _ begins a subscript and ^ a superscript."""
-    low = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
-    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
+    text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
+    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
 
 
 def _panels(picture: GalleryPicture) -> str:
     if picture.fault:
-        return f'<p class="fault">Not made: {html.escape(picture.fault)}</p>'
+        return f'<p class="fault">Not drawn: {html.escape(picture.fault)}</p>'
     slider, panels = picture.script.slider, dict(picture.panels)
-    laid_over = _slider(slider, [panels.pop(name) for name in slider]) if slider else ""
+    comparison = _slider(slider, [panels.pop(name) for name in slider]) if slider else ""
     if not panels:
-        return laid_over
+        return comparison
     columns = picture.script.columns or min(len(panels), 4)
     figures = "".join(_figure(caption, file) for caption, file in panels.items())
-    return f'{laid_over}<div class="panels" style="--columns: {columns}">{figures}</div>'
+    return f'{comparison}<div class="panels" style="--columns: {columns}">{figures}</div>'
 
 
 def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
     before, after = (html.escape(caption) for caption in captions)
     below, above = (_data_url(file) for file in files)
-    said = f"{before} on the left, {after} on the right"
+    label = f"{before} on the left, {after} on the right"
     return (
         f'<figure class="slider"><img src="{above}" alt="{after}">'
         f'<img class="before" src="{below}" alt="{before}">'
-        f'<input type="range" min="0" max="100" value="50" aria-label="{said}">'
+        f'<input type="range" min="0" max="100" value="50" aria-label="{label}">'
         f"<figcaption><span>{before}</span><span>{after}</span></figcaption></figure>"
     )
 
@@ -110,8 +110,8 @@ def _facts(picture: GalleryPicture) -> str:
     width, height = picture.size
     facts = [f"<code>dermis gallery --only {script.name}</code>"]
     facts += [f"{width}×{height}"] if width else []
-    facts += [f"{_short_number(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
-    facts += [f"{picture.seconds:.0f} s in all"]
+    facts += [f"{_short_number(picture.frame_ms)} ms per frame"] if picture.frame_ms else []
+    facts += [f"{picture.seconds:.0f} s in total"]
     facts += [f'<a href="#{row}" title="row {row[1:]} of the talk, below">{row}</a>' for row in script.deck]
     facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
     return " · ".join(facts)
@@ -172,9 +172,7 @@ def _fields(entry: str) -> Iterator[tuple[str, str]]:
 def _without_tex(value: str) -> str:
     """Return a value without TeX markup."""
     text = value.replace("{", "").replace("}", "")
-    for sign, meant in _TEX_SYMBOLS.items():
-        text = text.replace(sign, meant)
-    text = _ACCENT.sub(
-        lambda accent: unicodedata.normalize("NFC", accent[2] + _COMBINING_ACCENTS[accent[1]]), text
-    )
-    return " ".join(text.split())
+    for markup, character in _TEX_SYMBOLS.items():
+        text = text.replace(markup, character)
+    text = _ACCENT.sub(lambda found: found[2] + _COMBINING_ACCENTS[found[1]], text)
+    return " ".join(unicodedata.normalize("NFC", text).split())

@@ -15,7 +15,7 @@ from dermis.scene.outputs import OUTPUTS
 
 Image = NDArray[np.uint8] | NDArray[np.float32]
 Panel = Image | list[Image]
-"""A picture, or a film as a list of frames."""
+"""A picture, or an animation as a list of frames."""
 Panels = Mapping[str, Panel]
 Bytes = NDArray[np.uint8]
 _FIGURE_INCHES = 4.4
@@ -30,12 +30,12 @@ def to_srgb8(image: Image) -> Bytes:
 
 
 def first_frame(panel: Panel) -> Image:
-    """Return a panel, or the first frame of a film."""
+    """Return a panel, or the first frame of an animation."""
     return panel[0] if isinstance(panel, list) else panel
 
 
 def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
-    """Return (h, w, 3) sRGB bytes of all panels in rows with captions; films show their first frame.
+    """Return (h, w, 3) sRGB bytes of all panels in rows with captions; animations show their first frame.
 
     columns : panels in a row; 0 for all in one row
     """
@@ -70,8 +70,8 @@ def _cell(image: Bytes, caption: str) -> Bytes:
     from PIL import ImageDraw, ImageFont
 
     bar = Pillow.new("RGB", (image.shape[1], _BAR), _PAPER)
-    place = (image.shape[1] / 2, _BAR / 2)
-    ImageDraw.Draw(bar).text(place, caption, _INK, ImageFont.load_default(_TEXT), anchor="mm")
+    centre = (image.shape[1] / 2, _BAR / 2)
+    ImageDraw.Draw(bar).text(centre, caption, _INK, ImageFont.load_default(_TEXT), anchor="mm")
     return np.vstack([image, np.asarray(bar)])
 
 
@@ -81,9 +81,9 @@ def _row(cells: Sequence[Bytes]) -> Bytes:
 
 
 def _padded(image: Bytes, height: int, width: int) -> Bytes:
-    room: Bytes = np.full((height, width, 3), _PAPER, np.uint8)
-    room[: image.shape[0], : image.shape[1]] = image
-    return room
+    padded: Bytes = np.full((height, width, 3), _PAPER, np.uint8)
+    padded[: image.shape[0], : image.shape[1]] = image
+    return padded
 
 
 _RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
@@ -117,11 +117,11 @@ def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
         colours = np.random.default_rng(8).integers(40, 255, (_LABEL_COLOURS, 3), np.uint8)
         colours = colours[values.astype(int) % _LABEL_COLOURS]
         return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
-    each = values.reshape(*values.shape[:2], -1)[..., :3]
-    seen = (each != 0).any(axis=-1)
-    low, high = np.quantile(each[seen], _QUANTILES, axis=0)
-    levels = np.clip((each - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * seen[..., None]
+    channels = values.reshape(*values.shape[:2], -1)[..., :3]
+    nonzero = (channels != 0).any(axis=-1)
+    low, high = np.quantile(channels[nonzero], _QUANTILES, axis=0)
+    levels = np.clip((channels - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * nonzero[..., None]
     if levels.shape[2] == 1:
         levels = levels.repeat(3, axis=2)
-    wide = np.pad(levels, ((0, 0), (0, 0), (0, 3 - levels.shape[2])))
-    return np.asarray(np.rint(255 * wide), np.uint8)
+    padded = np.pad(levels, ((0, 0), (0, 0), (0, 3 - levels.shape[2])))
+    return np.asarray(np.rint(255 * padded), np.uint8)

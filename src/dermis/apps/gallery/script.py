@@ -63,18 +63,18 @@ class Script:
 def read_script(path: Path) -> Script:
     """Return the description in a script's docstring, without running the script."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    facts: dict[str, str] = dict(_METADATA.findall(text))
+    metadata: dict[str, str] = dict(_METADATA.findall(text))
     title, _, caption = _METADATA.sub("", text).partition("\n")
-    before, _, after = (part.strip() for part in facts.get("Slider", "").partition("|"))
+    before, _, after = (part.strip() for part in metadata.get("Slider", "").partition("|"))
     return Script(
         path=path,
         title=title.rstrip("."),
         caption=" ".join(caption.split()),
-        deck=_split_list(facts.get("Deck", "")),
-        equation=facts.get("Equation", ""),
-        sources=_split_list(facts.get("Sources", "")),
+        deck=_split_list(metadata.get("Deck", "")),
+        equation=metadata.get("Equation", ""),
+        sources=_split_list(metadata.get("Sources", "")),
         slider=(before, after) if after else None,
-        columns=int(facts.get("Columns", 0)),
+        columns=int(metadata.get("Columns", 0)),
     )
 
 
@@ -156,14 +156,14 @@ def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Gallery
 
 
 def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
-    """Return a panel as a WebP file, animated if it is a film."""
+    """Return a panel as a WebP file, animated if it has several frames."""
     from PIL import Image as Pillow
 
     images = panel if isinstance(panel, list) else [panel]
     first, *others = (Pillow.fromarray(to_srgb8(image)) for image in images)
     file = io.BytesIO()
-    film: dict[str, Any] = {"save_all": True, "append_images": others, "duration": _FRAME_MS, "loop": 0}
-    first.save(file, "webp", quality=quality, method=4, **(film if others else {}))
+    animation: dict[str, Any] = {"save_all": True, "append_images": others, "duration": _FRAME_MS, "loop": 0}
+    first.save(file, "webp", quality=quality, method=4, **(animation if others else {}))
     return file.getvalue()
 
 
@@ -172,6 +172,6 @@ def write_panels(folder: Path, picture: GalleryPicture) -> None:
 
     Raises DermisError when that is not possible.
     """
-    for number, file in enumerate(picture.panels.values(), 1):
-        with atomic_file(folder / f"{picture.script.name}-{number}.webp") as trial:
-            trial.write_bytes(file)
+    for number, data in enumerate(picture.panels.values(), 1):
+        with atomic_file(folder / f"{picture.script.name}-{number}.webp") as file:
+            file.write_bytes(data)

@@ -32,8 +32,7 @@ class Studio:
         self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
     ) -> None:
         self.name = name or (_SCAN if is_available(_SCAN) else HUMAN)
-        self.side = side
-        self.adapter, self._settings = adapter, settings
+        self.side, self.adapter, self._settings = side, adapter, settings
         self.frames_ms: list[float] = []
         self._load = cache(load_head)
 
@@ -78,12 +77,12 @@ class Studio:
         if view in ("picture", *PARTS):
             return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)
 
-        def seen() -> NDArray[np.uint8]:
+        def draw_view() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)
             texture = IntermediateViews(self.renderer).draw(scene, self.settings(scale, **settings), view)
             return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
 
-        return self.renderer.reopening_device.run(seen)
+        return self.renderer.reopening_device.run(draw_view)
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
         """Return (n, n, 3) light on the atlas, as irradiance over pi.
@@ -92,22 +91,22 @@ class Studio:
         """
         from dermis.gpu import download
 
-        def light() -> NDArray[np.float32]:
+        def read_light() -> NDArray[np.float32]:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
             levels, blur = inputs.resources.diffusion.levels, inputs.blurs[0]
             layer = blur.profile_levels[level]
             halved = blur.halvings[layer]
-            found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
-            return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)
+            light = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
+            return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
 
-        return self.renderer.reopening_device.run(light)
+        return self.renderer.reopening_device.run(read_light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """Return the settings of a panel."""
         side = round(scale * self.side)
-        chosen: dict[str, Any] = {"size": (side, side), "atlas": 1024}
-        return Settings(**(chosen | settings | self._settings))
+        defaults: dict[str, Any] = {"size": (side, side), "atlas": 1024}
+        return Settings(**(defaults | settings | self._settings))
 
     def _draw(self, scene: Scene, scale: float, settings: dict[str, Any]) -> RenderedFrame:
         rendered = self.renderer.draw(scene, self.settings(scale, **settings))

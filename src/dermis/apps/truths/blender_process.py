@@ -44,13 +44,13 @@ def blender_python(python: str | Path | None = None) -> Path:
 
 
 def run_blender(
-    python: Path, script: Path, arguments: Sequence[str], timeout_s: float, task: BlenderTask
+    python: Path, script: Path, options: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
     """Run a script in Blender's Python, isolated from the modules beside it and from the user's.
 
     Raises DermisError when it cannot be run, fails, or takes longer than the timeout.
     """
-    command = [str(python), "-I", str(script), *arguments]
+    command = [str(python), "-I", str(script), *options]
     try:
         process = subprocess.run(command, capture_output=True, check=False, timeout=timeout_s)
     except OSError as fault:
@@ -64,7 +64,7 @@ def run_blender(
 
 def _refuse_exit(python: Path, process: subprocess.CompletedProcess[bytes], task: BlenderTask) -> NoReturn:
     output = (process.stderr.strip() or process.stdout.strip()).decode("utf-8", "replace").splitlines()
-    last_line = output[-1] if output else "it said nothing"
+    last_line = output[-1] if output else "no output"
     if "No module named" in last_line:
         _refuse_python(f"{python} says: {last_line}")
     outcome = f"signal {-process.returncode} ended it" if process.returncode < 0 else "it failed"

@@ -82,9 +82,8 @@ def cycles_render(
     """
     _check_samples(samples)
     samples_per_pass = -(-int(samples) // _PASS_COUNT)
-    passes = cycles_passes(
-        scene, medium, [samples_per_pass] * _PASS_COUNT, settings, method=method, python=python
-    )
+    samples_by_pass = [samples_per_pass] * _PASS_COUNT
+    passes = cycles_passes(scene, medium, samples_by_pass, settings, method=method, python=python)
     images = np.stack([p.image for p in passes]).astype(np.float64)
     coverage = np.stack([p.coverage for p in passes]).astype(np.float64)
     return PathTraced(
@@ -175,7 +174,7 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
             for p, count, (clock, cores) in results
         ]
     except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
-        _refuse_render(f"it left something else ({str(fault) or type(fault).__name__})")
+        _refuse_render(f"its files are unusable ({str(fault) or type(fault).__name__})")
 
 
 def _refuse_render(actual: str) -> NoReturn:
@@ -266,7 +265,7 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
 
     Cycles divides radii by 4 pi, and finds the albedo of its random walk from the colour by a fit whose
     inverse is `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and
-    leaves as off a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for the
+    leaves through a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for the
     same two numbers. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
     % by the profile.
     """
@@ -274,15 +273,11 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
         return _diffuse_material(medium.albedo)
     if isinstance(medium, BeckmannSurface):
         # Blender's roughness is the square root of Beckmann's m.
-        return {"method": "FACETS", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
+        return {"method": "BECKMANN", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
     if isinstance(medium, PrincipledSkin):
         radius = [part / UNIT_MM for part in medium.radius_mm]
-        return {
-            "method": "COATED",
-            "roughness": float(np.sqrt(medium.roughness)),
-            "ior": SKIN_ETA,
-            "radius": radius,
-        }
+        roughness = float(np.sqrt(medium.roughness))
+        return {"method": "PRINCIPLED", "roughness": roughness, "ior": SKIN_ETA, "radius": radius}
     if len(medium.layers) != 1:
         actual = f"it has {len(medium.layers)}"
         refuse(medium.name, "one layer, for Cycles", actual, "Take a medium of one layer, such as skin1")
@@ -299,8 +294,5 @@ def cycles_camera(scene: Scene) -> SceneDict:
     """
     camera = scene.camera
     check_camera(camera, "Cycles")
-    view_direction = np.subtract(camera.target, camera.position)
-    return {
-        "to_world": cycles_look_at(camera.position, view_direction, camera.up),
-        "half_tangent": camera.half_tangent,
-    }
+    to_world = cycles_look_at(camera.position, np.subtract(camera.target, camera.position), camera.up)
+    return {"to_world": to_world, "half_tangent": camera.half_tangent}

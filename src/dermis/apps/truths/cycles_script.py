@@ -20,30 +20,30 @@ from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
 def main(folder: Path) -> None:
     """Render the scene in a folder and write the passes there."""
-    described = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+    description = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
     with np.load(folder / "arrays.npz") as stored:
         arrays = dict(stored)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
     maps = {name: arrays[name] for name in ("normal_map", "colour_map") if name in arrays}
-    materials = [make_material(one, maps) for one in described["materials"]]
+    materials = [make_material(one, maps) for one in description["materials"]]
     add_mesh(arrays, materials)
-    for light in described["lights"]:
+    for light in description["lights"]:
         add_light(light)
-    set_world(described["world"], arrays.get("panorama"))
-    set_camera(described["camera"])
-    set_render(described)
-    times = [render(folder / f"pass_{k}.exr", **one) for k, one in enumerate(described["passes"])]
+    set_world(description["world"], arrays.get("panorama"))
+    set_camera(description["camera"])
+    set_render(description)
+    times = [render(folder / f"pass_{k}.exr", **one) for k, one in enumerate(description["passes"])]
     done = {"version": bpy.app.version_string, "times": times}
     (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
 
 
 def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
     """Add the head's mesh with its materials, normals and uv coordinates."""
-    places, corners = arrays["positions"], arrays["triangles"]
+    positions, corners = arrays["positions"], arrays["triangles"]
     mesh = bpy.data.meshes.new("head")
-    mesh.vertices.add(len(places))
-    mesh.vertices.foreach_set("co", places.ravel())
+    mesh.vertices.add(len(positions))
+    mesh.vertices.foreach_set("co", positions.ravel())
     mesh.loops.add(corners.size)
     mesh.loops.foreach_set("vertex_index", corners.ravel())
     mesh.polygons.add(len(corners))
@@ -52,54 +52,54 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", arrays["material"])
     if "uv" in arrays:
-        places = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # Blender's first row is the lowest
-        mesh.uv_layers.new(name="uv").uv.foreach_set("vector", places.astype(np.float32).ravel())
+        uv = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # Blender's first row is the lowest
+        mesh.uv_layers.new(name="uv").uv.foreach_set("vector", uv.astype(np.float32).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
     mesh.normals_split_custom_set_from_vertices(arrays["normals"].tolist())
     add_object("head", mesh)
 
 
-def make_material(described: dict[str, Any], maps: dict[str, Any]) -> Any:
+def make_material(description: dict[str, Any], maps: dict[str, Any]) -> Any:
     """Return the material of a description, with its maps as images."""
-    material = bpy.data.materials.new(described["name"])
+    material = bpy.data.materials.new(description["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    if described["method"] == "FACETS":
+    if description["method"] == "BECKMANN":
         shader = nodes.new("ShaderNodeBsdfGlass")  # transmitted light is lost, as there is one bounce
         shader.distribution = "BECKMANN"
-        shader.inputs["Roughness"].default_value = described["roughness"]
-        shader.inputs["IOR"].default_value = described["ior"]
-        add_normals(nodes, links, maps, shader)
-    elif described["method"] == "COATED":
-        shader = add_coated(nodes, links, maps, described)
-        add_normals(nodes, links, maps, shader)
-    elif described["method"] == "DIFFUSE":
+        shader.inputs["Roughness"].default_value = description["roughness"]
+        shader.inputs["IOR"].default_value = description["ior"]
+        connect_normal_map(nodes, links, maps, shader)
+    elif description["method"] == "PRINCIPLED":
+        shader = principled_shader(nodes, links, maps, description)
+        connect_normal_map(nodes, links, maps, shader)
+    elif description["method"] == "DIFFUSE":
         shader = nodes.new("ShaderNodeBsdfDiffuse")
     else:
         shader = nodes.new("ShaderNodeSubsurfaceScattering")
-        shader.falloff = described["method"]
+        shader.falloff = description["method"]
         shader.inputs["Scale"].default_value = 1.0
-        shader.inputs["Radius"].default_value = described["radius"]
+        shader.inputs["Radius"].default_value = description["radius"]
         if "Roughness" in shader.inputs:
             shader.inputs["Roughness"].default_value = 1.0
     if "Color" in shader.inputs:
-        shader.inputs["Color"].default_value = (*described.get("colour", (1.0, 1.0, 1.0)), 1.0)
+        shader.inputs["Color"].default_value = (*description.get("colour", (1.0, 1.0, 1.0)), 1.0)
     links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
 
 
-def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str, Any]) -> Any:
+def principled_shader(nodes: Any, links: Any, maps: dict[str, Any], description: dict[str, Any]) -> Any:
     """Return a Principled BSDF with random-walk subsurface scattering and a colour map."""
     shader = nodes.new("ShaderNodeBsdfPrincipled")
     shader.distribution = "GGX"
     shader.subsurface_method = "RANDOM_WALK"
     numbers = {"Subsurface Weight": 1.0, "Subsurface Scale": 1.0, "Specular IOR Level": 0.5}
-    numbers |= {"IOR": described["ior"], "Roughness": described["roughness"]}
+    numbers |= {"IOR": description["ior"], "Roughness": description["roughness"]}
     for name, value in numbers.items():
         shader.inputs[name].default_value = value
-    shader.inputs["Subsurface Radius"].default_value = described["radius"]
+    shader.inputs["Subsurface Radius"].default_value = description["radius"]
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeUVMap")
     node.uv_map = "uv"
     links.new(node.outputs["UV"], texture.inputs["Vector"])
@@ -108,7 +108,7 @@ def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str
     return shader
 
 
-def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
+def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
     """Connect the normal map, if there is one, to a shader."""
     if "normal_map" not in maps:
         return
@@ -130,17 +130,17 @@ def packed_image(name: str, rows: Any) -> Any:
     return image
 
 
-def add_light(described: dict[str, Any]) -> None:
+def add_light(description: dict[str, Any]) -> None:
     """Add a light from its description."""
-    light = bpy.data.lights.new("light", described["type"])
-    for name, value in described["set"].items():
+    light = bpy.data.lights.new("light", description["type"])
+    for name, value in description["set"].items():
         setattr(light, name, value)
-    if "stripe" in described:
-        paint_stripe(light, described["stripe"])
-    add_object("light", light).matrix_world = Matrix(described["to_world"])
+    if "stripe" in description:
+        shape_stripe(light, description["stripe"])
+    add_object("light", light).matrix_world = Matrix(description["to_world"])
 
 
-def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
+def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     """Shape a distant point light into a stripe by nodes: Gaussian across, constant along its length."""
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
@@ -159,15 +159,13 @@ def paint_stripe(light: Any, stripe: dict[str, Any]) -> None:
 
     depth = dot(stripe["forward"])
     across = math("MULTIPLY", math("DIVIDE", dot(stripe["across"]), depth), stripe["distance"])
-    along = math(
-        "ABSOLUTE", math("MULTIPLY", math("DIVIDE", dot(stripe["along"]), depth), stripe["distance"])
-    )
+    along = math("MULTIPLY", math("DIVIDE", dot(stripe["along"]), depth), stripe["distance"])
     gaussian = math("EXPONENT", math("MULTIPLY", math("MULTIPLY", across, across), -2.0))
     fade = nodes.new("ShaderNodeMapRange")
     fade.interpolation_type = "SMOOTHSTEP"
     for name, value in zip(("From Min", "From Max", "To Min", "To Max"), (0.95, 1.0, 1.0, 0.0), strict=True):
         fade.inputs[name].default_value = value
-    links.new(along, fade.inputs["Value"])
+    links.new(math("ABSOLUTE", along), fade.inputs["Value"])
     emission = next(node for node in nodes if node.type == "EMISSION")
     links.new(math("MULTIPLY", gaussian, fade.outputs["Result"]), emission.inputs["Strength"])
 
@@ -182,42 +180,42 @@ def connected(links: Any, node: Any, inputs: Any) -> Any:
     return node.outputs[0]
 
 
-def set_world(described: dict[str, Any], panorama: Any) -> None:
+def set_world(description: dict[str, Any], panorama: Any) -> None:
     """Set a constant environment, or a panorama with its rotation."""
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
     world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(node for node in nodes if node.type == "BACKGROUND")
-    background.inputs["Strength"].default_value = described["strength"]
+    background.inputs["Strength"].default_value = description["strength"]
     background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     if panorama is None:
         return
     texture, mapping = nodes.new("ShaderNodeTexEnvironment"), nodes.new("ShaderNodeMapping")
     texture.image = packed_image("panorama", panorama)
-    mapping.inputs["Rotation"].default_value = Matrix(described["turn"]).to_euler()
+    mapping.inputs["Rotation"].default_value = Matrix(description["turn"]).to_euler()
     links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
     links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
     links.new(texture.outputs["Color"], background.inputs["Color"])
 
 
-def set_camera(described: dict[str, Any]) -> None:
+def set_camera(description: dict[str, Any]) -> None:
     """Add the camera and make it the active one."""
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit = "VERTICAL"
     camera.sensor_height = 24.0
-    camera.lens = 12.0 / described["half_tangent"]
+    camera.lens = 12.0 / description["half_tangent"]
     camera.clip_start, camera.clip_end = 1e-3, 1e5
-    placed = add_object("camera", camera)
-    placed.matrix_world = Matrix(described["to_world"])
-    bpy.context.scene.camera = placed
+    camera_object = add_object("camera", camera)
+    camera_object.matrix_world = Matrix(description["to_world"])
+    bpy.context.scene.camera = camera_object
 
 
-def set_render(described: dict[str, Any]) -> None:
+def set_render(description: dict[str, Any]) -> None:
     """Set the size, the file format and the settings of Cycles."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = described["size"]
+    scene.render.resolution_x, scene.render.resolution_y = description["size"]
     scene.render.resolution_percentage = 100
     scene.render.film_transparent = True
     scene.render.use_persistent_data = True
@@ -230,7 +228,7 @@ def set_render(described: dict[str, Any]) -> None:
     cycles.pixel_filter_type = "BOX"
     # The defaults give less noise but a biased, darker image.
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.light_sampling_threshold = 0.0
-    if described["direct"]:
+    if description["direct"]:
         cycles.max_bounces = 0
 
 
@@ -246,9 +244,9 @@ def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
 
 def add_object(name: str, data: Any) -> Any:
     """Return a new object of the scene with this data."""
-    made = bpy.data.objects.new(name, data)
-    bpy.context.collection.objects.link(made)
-    return made
+    result = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(result)
+    return result
 
 
 if __name__ == "__main__":

@@ -105,11 +105,8 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
 def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> SceneDict:
     """Return Mitsuba's directional light, or a distant disc for a light with an angular diameter."""
     if light.angle_degrees == 0:
-        return {
-            "type": "directional",
-            "direction": list(light.direction),
-            "irradiance": rgb(light.irradiance),
-        }
+        irradiance = rgb(light.irradiance)
+        return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
     to_world = mitsuba_look_at(mi, -_FAR_MM * direction, (0.0, 0.0, 0.0)).scale(float(_FAR_MM * np.tan(half)))
@@ -174,16 +171,14 @@ def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a distant point light, which the script shapes into a stripe by nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
     power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
-    light_position = light.position - _FAR_MM * forward
-    light_dict = cycles_light(
-        "POINT", light.irradiance, power, light_position, light.direction, shadow_soft_size=0.0
-    )
+    source = light.position - _FAR_MM * forward
+    distant = cycles_light("POINT", light.irradiance, power, source, light.direction, shadow_soft_size=0.0)
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return light_dict | {"stripe": {**axes, "distance": _FAR_MM}}
+    return distant | {"stripe": {**axes, "distance": _FAR_MM}}
 
 
 def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **unit: float) -> SceneDict:
@@ -223,7 +218,7 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
         "directional": mitsuba_directional,
         "stripe": mitsuba_stripe,
     },
-    f"Leave the light out, or register in {__name__}.MITSUBA what stands for it",
+    f"Leave the light out, or register in {__name__}.MITSUBA its replacement",
 )
 """Functions that describe a kind of light for Mitsuba, from its module with a variant set, the light and its
 name for messages."""
@@ -238,6 +233,6 @@ CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
         "directional": cycles_directional,
         "stripe": cycles_stripe,
     },
-    f"Leave the light out, or register in {__name__}.CYCLES what stands for it",
+    f"Leave the light out, or register in {__name__}.CYCLES its replacement",
 )
 """Functions that describe a kind of light for Cycles: its type, fields and transform."""

@@ -72,14 +72,10 @@ def relative_rmse(
     rather than too small.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
-    v = (
-        np.zeros_like(I)
-        if image_variance is None
-        else _masked_pixels(image, reference, mask, image_variance)[2]
-    )
+    v = _masked_pixels(image, reference, mask, image_variance)[2]
     D, energy = I - T, float((T**2 - s2).sum())
     if energy <= 0:
-        refuse("relative error", "a reference brighter than its noise", "it is not", "Trace more paths")
+        refuse("relative error", "a reference brighter than its noise", "it is darker", "Trace more paths")
     E = float((D**2 - s2 - v).sum()) / energy
     U = 4 * s2 * (D + E * T) ** 2 - 2 * (1 - E) ** 2 * s2**2 + 4 * v * D**2
     error = _sum_standard_error(U) / energy
@@ -117,9 +113,7 @@ def _masked_pixels(
     s2 = np.zeros_like(T) if variance is None else np.asarray(variance, np.float64)
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
         actual = f"got {I.shape}, {T.shape} and {s2.shape}"
-        refuse(
-            "metrics", "image, reference and variance of one shape, (h, w) or (h, w, c)", actual, "Align them"
-        )
+        refuse("metrics", "image, reference and variance of one shape (h, w[, c])", actual, "Align them")
     is_counted = _checked_mask(mask, T.shape[:2])
     I, T, s2 = (values.reshape(*T.shape[:2], -1)[is_counted] for values in (I, T, s2))
     if not (np.isfinite(I).all() and np.isfinite(T).all() and np.isfinite(s2).all() and (s2 >= 0).all()):

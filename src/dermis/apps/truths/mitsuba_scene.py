@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -106,13 +106,12 @@ def mitsuba_scene(
 def coverage_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: SceneDict) -> MitsubaObject:
     """Return Mitsuba's scene whose image is the fraction of each pixel that shapes of radiance 1 cover."""
     sensor = mitsuba_sensor(mi, camera, size, sampler="multijitter")
-    return mi.load_dict(
-        {"type": "scene", "integrator": {"type": "path", "max_depth": 1}, "sensor": sensor, **shapes}
-    )
+    integrator = {"type": "path", "max_depth": 1}
+    return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes})
 
 
 def mitsuba_sensor(
-    mi: Mitsuba, camera: Camera, size: tuple[int, int], sampler: str = "independent"
+    mi: Mitsuba, camera: Camera, size: Sequence[int], sampler: str = "independent"
 ) -> SceneDict:
     """Return Mitsuba's description of a camera, with a box filter over each pixel."""
     width, height = size
@@ -179,7 +178,7 @@ def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDic
     """Return surfaces around the skin and at each interface between layers, and notes on them."""
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
-    notes = [f"{skin.caps} openings shut, {skin.cap_area:.0f} mm2"] if skin.caps else []
+    notes = [f"{skin.caps} openings closed, {skin.cap_area:.0f} mm2"] if skin.caps else []
     gap = interface_gap_mm(mi, skin)
     layers = [mi.load_dict(_homogeneous_medium(layer)) for layer in medium.layers]
     media: list[MitsubaObject] = [None, *layers, None]
@@ -218,9 +217,8 @@ def _homogeneous_medium(layer: Layer) -> SceneDict:
 def interface_mesh(mi: Mitsuba, solid: ClosedSurface, media: SceneDict) -> MitsubaObject:
     """Return an invisible surface between two media: exterior and interior, None for vacuum."""
     non_vacuum = {side: medium for side, medium in media.items() if medium is not None}
-    return mesh_shape(
-        mi, solid.positions, solid.triangles, None, bsdf=mi.load_dict({"type": "null"}), **non_vacuum
-    )
+    invisible = mi.load_dict({"type": "null"})
+    return mesh_shape(mi, solid.positions, solid.triangles, None, bsdf=invisible, **non_vacuum)
 
 
 def mesh_shape(

@@ -44,14 +44,13 @@ def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
     if not skin.any():
         refuse(name, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
     used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
-    solid = _close_openings(
-        mesh.points_mm[used].astype(np.float32), triangles.reshape(-1, 3).astype(np.int32)
-    )
+    positions = mesh.points_mm[used].astype(np.float32)
+    solid = _close_openings(positions, triangles.reshape(-1, 3).astype(np.int32))
     corners = solid.positions[solid.triangles].astype(np.float64)
     depth = 3.0 * _enclosed_volume(corners) / float(triangle_areas(corners).sum())
     if depth < _MIN_DEPTH_MM:
-        actual = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep in the mean"
-        refuse(name, "a surface with a volume behind it", actual, "Close it, or turn its triangles round")
+        actual = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep on average"
+        refuse(name, "a surface with a volume behind it", actual, "Close it, or reverse its triangles")
     return solid
 
 
@@ -95,15 +94,13 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
         return ClosedSurface(positions, triangles)
     group = _edge_components(open_sides)
     labels, opening = np.unique(group, return_inverse=True)
-    centroids = np.stack(
-        [positions[open_sides[opening == k]].mean(axis=(0, 1)) for k in range(len(labels))]
-    ).astype(np.float32)
+    outlines = (positions[open_sides[opening == k]] for k in range(len(labels)))
+    centroids = np.stack([outline.mean(axis=(0, 1)) for outline in outlines]).astype(np.float32)
     apex = (len(positions) + opening).astype(np.int32)
     fan = np.column_stack((open_sides[:, 1], open_sides[:, 0], apex)).astype(np.int32)
     vertices = np.vstack((positions, centroids))
-    return ClosedSurface(
-        vertices, np.vstack((triangles, fan)), len(labels), float(triangle_areas(vertices[fan]).sum())
-    )
+    area = float(triangle_areas(vertices[fan]).sum())
+    return ClosedSurface(vertices, np.vstack((triangles, fan)), len(labels), area)
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:

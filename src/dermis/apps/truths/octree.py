@@ -20,16 +20,16 @@ _MAX_DEPTH = 20  # levels of three bits each, so that keys have 60 bits
 class Octree(NamedTuple):
     """Nodes of an octree in depth-first order; triangles are sorted in the order of the nodes.
 
-    first_triangle, end_triangle : (n,) range of the node's triangles
+    first, end : (n,) range of the node's triangles
     next_node : (n,) next node that is not inside this one
     centre : (n, 3) centroid of the light inside, weighted by irradiance and area [mm]
     radius : (n,) of a ball around the centre that contains the node's triangles and its three points [mm]
-    point_positions, flux : (n, 3, 3) the three points and their flux by channel; may be below 0 [mm, mm²]
+    points, flux : (n, 3, 3) the three points, and their flux by channel, which may be below 0 [mm, mm²]
     second_moment, moment_error, centroid_error : (n,) error bounds of the three points, for the worst
         channel: sum of the mean square distances of the light and of the points from the centre [mm²],
         difference of their second moments [mm²], distance between their centroids [mm]
     corners : (m, 3, 3) corners of the triangles [mm]
-    corner_irradiance : (m, 3, 3) irradiance at the corners
+    irradiance : (m, 3, 3) irradiance at the corners
     area : (m,) areas of the triangles [mm²]
     """
 
@@ -57,10 +57,8 @@ def build_octree(samples: IrradianceSamples) -> Octree:
     corners = (np.asarray(samples.positions, np.float64) - middle)[samples.triangles]
     morton_keys = _morton_keys(corners.mean(axis=1))
     order = np.argsort(morton_keys, kind="stable")
-    corners, irradiance = (
-        corners[order],
-        np.asarray(samples.irradiance, np.float64)[samples.triangles[order]],
-    )
+    corners = corners[order]
+    irradiance = np.asarray(samples.irradiance, np.float64)[samples.triangles[order]]
     area = triangle_areas(corners)
     first, end, next_node = _nodes(morton_keys[order])
     centre, points, flux, second_moment, moment_error, centroid_error = _point_approximation(
@@ -196,10 +194,9 @@ def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tupl
 def _point_flux(flux: Floats, first_moments: list[Floats], axis_lengths: Floats, axes: Floats) -> Floats:
     """Return (n, 3, 3) flux of each point and channel that preserves each channel's centroid in the plane."""
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), axes)
-    moment_ratio = np.divide(
-        moment, axis_lengths[:, None], where=axis_lengths[:, None] > 1e-9, out=np.zeros_like(moment)
-    )
-    point_flux: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, moment_ratio)) / 3
+    lengths = axis_lengths[:, None]
+    ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
+    point_flux: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3
     return point_flux
 
 

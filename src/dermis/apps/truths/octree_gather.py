@@ -122,12 +122,10 @@ def _add_midpoints(
         x = 0.5 * (corners[a, 0] + corners[b, 0])
         y = 0.5 * (corners[a, 1] + corners[b, 1])
         z = 0.5 * (corners[a, 2] + corners[b, 2])
-        red, green, blue = (
-            irradiance[a, 0] + irradiance[b, 0],
-            irradiance[a, 1] + irradiance[b, 1],
-            irradiance[a, 2] + irradiance[b, 2],
-        )
-        _add_flux(_distance(point, x, y, z), scale * red, scale * green, scale * blue, table, exitance)
+        red = scale * (irradiance[a, 0] + irradiance[b, 0])
+        green = scale * (irradiance[a, 1] + irradiance[b, 1])
+        blue = scale * (irradiance[a, 2] + irradiance[b, 2])
+        _add_flux(_distance(point, x, y, z), red, green, blue, table, exitance)
 
 
 @compiled

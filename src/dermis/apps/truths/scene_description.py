@@ -24,7 +24,7 @@ Vector = Sequence[float] | Floats
 """Three numbers."""
 UNIT_MM = 100.0
 """Length of Cycles' unit; a head is a few units in size, as its sampling expects."""
-
+_Y_AXIS = 0.0, 1.0, 0.0
 _TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
@@ -41,9 +41,7 @@ def rgb(components: Iterable[float]) -> SceneDict:
     return {"type": "rgb", "value": [float(value) for value in components]}
 
 
-def mitsuba_look_at(
-    mi: Mitsuba, origin: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0)
-) -> MitsubaObject:
+def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _Y_AXIS) -> MitsubaObject:
     """Return the transform to world space with +Z from the origin to the target and Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
@@ -53,12 +51,8 @@ def mitsuba_look_at(
 
 def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneDict:
     """Return a shape that emits light and neither casts shadows nor reflects."""
-    return {
-        "type": kind,
-        **shape,
-        "bsdf": {"type": "null"},
-        "emitter": {"type": "area", "radiance": rgb(radiance)},
-    }
+    emitter = {"type": "area", "radiance": rgb(radiance)}
+    return {"type": kind, **shape, "bsdf": {"type": "null"}, "emitter": emitter}
 
 
 def mitsuba_projector(
@@ -86,13 +80,11 @@ def mitsuba_projector(
     }
 
 
-def cycles_look_at(position: Vector, forward: Vector, up: Vector = (0.0, 1.0, 0.0)) -> list[list[float]]:
+def cycles_look_at(position: Vector, forward: Vector, up: Vector = _Y_AXIS) -> list[list[float]]:
     """Return the matrix to world space, in Cycles' units, of an object that looks along -Z with Y upwards."""
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack(
-        [right, upwards, -view_direction, np.asarray(position, np.float64) / UNIT_MM]
-    )
+    matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, UNIT_MM)])
     return [[float(value) for value in row] for row in matrix]
 
 
@@ -111,13 +103,10 @@ def cycles_light(
 ) -> SceneDict:
     """Return a light of Cycles whose energy is the irradiance times a factor."""
     brightest = float(max(irradiance))
-    colour = (
-        [float(component) / brightest for component in irradiance] if brightest > 0.0 else [0.0, 0.0, 0.0]
-    )
-    fields = {"color": colour, "energy": brightest * float(factor), **given}
-    fields = {
-        name: float(value) if isinstance(value, np.floating) else value for name, value in fields.items()
-    }
+    colour = [float(component) / brightest if brightest > 0.0 else 0.0 for component in irradiance]
+    fields: SceneDict = {"color": colour, "energy": brightest * float(factor), **given}
+    for name, value in given.items():  # NumPy's numbers are not valid JSON
+        fields[name] = value if isinstance(value, str) else float(value)
     return {"type": kind, "set": fields, "to_world": cycles_look_at(position, forward)}
 
 

@@ -133,7 +133,7 @@ def _unfinished_warnings(runs: Sequence[SlabResult]) -> list[str]:
     lost = max(run.per_entering.unfinished for run in runs)
     if lost < _REPORTED_LOSS:
         return []
-    return [f"{lost:.1%} of the light was given up after very many scatterings: the total lacks it"]
+    return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
 
 def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
@@ -145,7 +145,7 @@ def _checked_photons(layers: Sequence[ScatteringLayer], photons: int, seed: int)
     if not layers:
         refuse("slab", "at least one layer", "got none", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
-        refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
+        refuse("slab", "an infinite last layer only", "another layer is infinite", "Correct it")
     checked_integer("seed", seed, 0, _MAX_SEED)
     return checked_integer("photons", photons, 1, int(MAX_PHOTONS))
 
@@ -154,7 +154,7 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
     edges = np.asarray(edges_mm, dtype=np.float64)
     one_row = edges.ndim == 1 and len(edges) > 1
     if not (one_row and edges[0] == 0.0 and np.isfinite(edges).all() and (np.diff(edges) > 0.0).all()):
-        expected = "edges of rings that begin with 0 and increase [mm]"
+        expected = "increasing edges of rings from 0 on [mm]"
         refuse("edges_mm", expected, f"got {np.array2string(edges, threshold=8)}", "Correct them")
     return edges
 
@@ -220,21 +220,21 @@ def _slab_result(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabR
         p = count / photons
         return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
 
-    reflectance_mean, T = tally.reflected, tally.transmitted
+    reflected, transmitted = tally.reflected, tally.transmitted
     return SlabResult(
         photons=photons,
         edges_mm=edges,
         specular=specular,
-        reflectance=fraction(reflectance_mean[:-1]) / ring_areas,
-        reflectance_se=error(reflectance_mean[:-1]) / ring_areas,
-        transmittance=fraction(T[:-1]) / ring_areas,
-        transmittance_se=error(T[:-1]) / ring_areas,
-        total_reflectance=float(fraction(reflectance_mean.sum())),
-        total_reflectance_se=float(error(reflectance_mean.sum())),
-        total_transmittance=float(fraction(T.sum())),
-        total_transmittance_se=float(error(T.sum())),
-        overflow_reflectance=float(fraction(reflectance_mean[-1])),
-        overflow_transmittance=float(fraction(T[-1])),
+        reflectance=fraction(reflected[:-1]) / ring_areas,
+        reflectance_se=error(reflected[:-1]) / ring_areas,
+        transmittance=fraction(transmitted[:-1]) / ring_areas,
+        transmittance_se=error(transmitted[:-1]) / ring_areas,
+        total_reflectance=float(fraction(reflected.sum())),
+        total_reflectance_se=float(error(reflected.sum())),
+        total_transmittance=float(fraction(transmitted.sum())),
+        total_transmittance_se=float(error(transmitted.sum())),
+        overflow_reflectance=float(fraction(reflected[-1])),
+        overflow_transmittance=float(fraction(transmitted[-1])),
         unscattered_reflectance=float(fraction(tally.unscattered[0])),
         unscattered_transmittance=float(fraction(tally.unscattered[1])),
         absorbed=fraction(tally.absorbed),
@@ -270,12 +270,12 @@ class ScatteringLayer:
         culprit = "scattering layer"
         if not (0.0 <= self.sigma_a < np.inf and 0.0 <= self.sigma_s < np.inf):
             actual = f"got absorption {self.sigma_a:g} and scattering {self.sigma_s:g}"
-            refuse(culprit, "absorption and scattering of 0 or more [1/mm]", actual, "Correct them")
+            refuse(culprit, "coefficients of 0 or more [1/mm]", actual, "Correct them")
         if not self.thickness_mm > 0.0:
             refuse(culprit, "a thickness above 0 mm", f"got {self.thickness_mm:g}", "Correct it")
         if np.isinf(self.thickness_mm) and self.sigma_t == 0.0:
             actual = "it neither absorbs nor scatters"
-            refuse(culprit, "an infinite layer to stop light", actual, "Give it a thickness")
+            refuse(culprit, "an infinite layer with extinction", actual, "Give it a thickness")
         check_anisotropy(self.g)
         if not 1.0 <= self.eta <= 2.5:
             refuse(culprit, "an index of refraction from 1 to 2.5", f"got {self.eta:g}", "Correct it")
@@ -333,6 +333,5 @@ class SlabResult:
         """Return the result relative to the power that enters the stack, as in diffusion profiles."""
         names = [field.name for field in fields(self)][3:]
         entering_fraction = 1.0 - self.specular
-        return replace(
-            self, specular=0.0, **{name: getattr(self, name) / entering_fraction for name in names}
-        )
+        scaled = {name: getattr(self, name) / entering_fraction for name in names}
+        return replace(self, specular=0.0, **scaled)

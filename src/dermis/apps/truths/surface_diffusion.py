@@ -6,7 +6,7 @@ triangles themselves, so no uv map, seam or stretch plays a part. Open borders a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,7 @@ def diffuse_on_surface(
     positions: ArrayLike,
     triangles: ArrayLike,
     values: ArrayLike,
-    variances_mm2: Sequence[float] | Floats,
+    variances_mm2: ArrayLike,
     steps: int = STEPS_PER_LEVEL,
 ) -> Floats:
     """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
@@ -84,7 +84,7 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
     return float(triangle_edges(vertices, corners)[2].max())
 
 
-def resolved_levels(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
+def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (k,) of levels that edges resolve: each adds a sigma of at least two edges to the last.
 
     variances_mm2 : (k,) increasing, above 0 [mm2]
@@ -97,13 +97,13 @@ def resolved_levels(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> 
     return np.array(allowed)
 
 
-def max_edge_mm(variances_mm2: Sequence[float] | Floats) -> float:
+def max_edge_mm(variances_mm2: ArrayLike) -> float:
     """Return the longest edge that resolves all levels, half the smallest sigma that a level adds [mm]."""
     min_variance = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(min_variance)) / EDGES_PER_SIGMA
 
 
-def patch_margin_mm(variances_mm2: Sequence[float] | Floats) -> float:
+def patch_margin_mm(variances_mm2: ArrayLike) -> float:
     """Return the margin of a patch beyond its radius, four standard deviations of the widest level [mm]."""
     return MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
@@ -134,41 +134,35 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     vertices, corners = np.asarray(positions, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
     shaped = vertices.shape == (len(vertices), 3) and corners.shape == (len(corners), 3) and len(corners) > 0
     if not (shaped and np.isfinite(vertices).all() and 0 <= corners.min() <= corners.max() < len(vertices)):
-        actual = f"got arrays of shape {vertices.shape} and {corners.shape}, or numbers that are not"
-        refuse(
-            "surface", "finite positions (n, 3) and triangles (f, 3) among them", actual, "Correct the arrays"
-        )
+        actual = f"got shapes {vertices.shape} and {corners.shape}, or invalid values"
+        refuse("surface", "finite positions (n, 3) and indices (f, 3)", actual, "Correct the arrays")
     return vertices, corners
 
 
 def _checked_values(values: ArrayLike, count: int) -> Floats:
     vertex_values = np.asarray(values, dtype=np.float64)
     if not (vertex_values.ndim == 2 and len(vertex_values) == count and np.isfinite(vertex_values).all()):
-        actual = f"got an array of shape {vertex_values.shape}, or numbers that are not finite"
-        refuse("surface diffusion", f"finite values ({count}, c)", actual, "Give each vertex its values")
+        actual = f"got shape {vertex_values.shape}, or values that are not finite"
+        refuse("surface diffusion", f"finite values ({count}, c)", actual, "Give one row per vertex")
     return vertex_values
 
 
-def _checked_variances(variances_mm2: Sequence[float] | Floats) -> Floats:
+def _checked_variances(variances_mm2: ArrayLike) -> Floats:
     variances = np.asarray(variances_mm2, dtype=np.float64)
     if not (variances.ndim == 1 and len(variances) and (np.diff(variances, prepend=0.0) > 0).all()):
-        refuse("surface diffusion", "variances above 0 that rise", f"got {variances.tolist()}", "Sort them")
+        refuse("surface diffusion", "increasing variances above 0", f"got {variances.tolist()}", "Sort them")
     return variances
 
 
-def _check_resolution(
-    vertices: Floats, corners: Index, variances: Sequence[float] | Floats, steps: int
-) -> None:
+def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, steps: int) -> None:
     if steps < 1:
-        refuse("surface diffusion", "at least one step of time", f"got {steps}", "Choose 8 or more")
+        refuse("surface diffusion", "at least one time step", f"got {steps}", "Choose 8 or more")
     longest = longest_edge_mm(vertices, corners)
     allowed = resolved_levels(variances, longest)
     if not allowed.all():
         fine = ", ".join(f"{variance:g}" for variance in np.asarray(variances)[allowed]) or "none of them"
         actual = f"got {longest:.3g} mm, which resolves only the variances {fine}"
-        expected = (
-            f"edges of at most {max_edge_mm(variances):.3g} mm, half the smallest sigma that a level adds"
-        )
+        expected = f"edges of at most {max_edge_mm(variances):.3g} mm, half the sigma that a level adds"
         refuse("surface diffusion", expected, actual, "Refine the surface (refine_patch) or use wider levels")
 
 
@@ -305,7 +299,7 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
 
     Source: [PinkallPolthier1993] for the cotangents.
     """
-    from scipy.sparse import coo_array
+    from scipy.sparse import coo_array, diags_array
 
     start = surface.corners
     end = np.roll(start, -1, axis=1)
@@ -321,7 +315,5 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
 
     stiffness = assemble(-conductance, conductance + np.roll(conductance, 1, axis=1))
     isolated = np.bincount(start.ravel(), minlength=count) == 0
-    identity = coo_array(
-        (isolated.astype(np.float64), (np.arange(count), np.arange(count))), shape=(count, count)
-    )
+    identity = diags_array(isolated.astype(np.float64))
     return (assemble(corner_area / 24, corner_area / 4) + identity).tocsc(), stiffness

@@ -43,13 +43,7 @@ def integrate_exitance(
     if positions.ndim != 2 or positions.shape[1] != 3 or not np.isfinite(positions).all():
         refuse("points", "finite positions (n, 3) in mm", f"got {positions.shape}", "Correct them")
     if not 1e-5 <= error <= 0.05:
-        refuse("error", "a share from 1e-5 to 0.05", f"got {error}", "0.001 is enough for pictures")
-    return _gather_in_threads(positions, samples, profile, error)
-
-
-def _gather_in_threads(
-    positions: Floats, samples: IrradianceSamples, profile: Profile, error: float
-) -> Floats:
+        refuse("error", "a relative error from 1e-5 to 0.05", f"got {error}", "Take 0.001 for pictures")
     from numba import config
 
     from dermis.apps.truths.octree_gather import gather_exitance

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,10 +66,8 @@ class Patch:
             child = first[pending] + candidate
             inside = np.einsum("mi,mij->mj", barycentric[pending], inverse[child])
             is_inside = inside.min(axis=1) >= -_BARYCENTRIC_TOLERANCE
-            fine_triangle[pending[is_inside]], weights[pending[is_inside]] = (
-                order[child[is_inside]],
-                inside[is_inside],
-            )
+            located = pending[is_inside]
+            fine_triangle[located], weights[located] = order[child[is_inside]], inside[is_inside]
             candidate += 1
             pending = pending[~is_inside]
             pending = pending[count[pending] > candidate]
@@ -82,9 +79,7 @@ class Patch:
         return sum((weights[:, k, None] * values[..., corners[:, k], :] for k in range(3)), np.zeros(()))
 
 
-def mesh_patch(
-    mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: Sequence[float] | Floats
-) -> Patch:
+def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: ArrayLike) -> Patch:
     """Return the patch of a mesh, with welded uv seams, on which light of these variances can be diffused.
 
     centre_mm, radius_mm : ball inside which results are valid; an infinite radius takes the whole mesh [mm]

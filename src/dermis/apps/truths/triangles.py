@@ -51,21 +51,17 @@ def split_triangles(
     rotation = (np.arange(len(corners))[:, None], (first[:, None] + np.arange(3)) % 3)
     vertices = np.hstack((corners[rotation], midpoint[rotation]))
     corner_weights = weights[rotation]
-    corner_weights = np.concatenate(
-        (corner_weights, (corner_weights + np.roll(corner_weights, -1, axis=1)) / 2), axis=1
-    )
+    midpoint_weights = (corner_weights + np.roll(corner_weights, -1, axis=1)) / 2
+    vertex_weights = np.concatenate((corner_weights, midpoint_weights), axis=1)
     pattern_index = count
     if positions is not None:
         diagonals = positions[vertices[:, [0, 3]]] - positions[vertices[:, [4, 2]]]
         first_longer = np.subtract(*np.square(diagonals).sum(axis=2).T) > 0
         pattern_index = np.where((count == 2) & first_longer, len(_SPLIT_PATTERNS) - 1, count)
-    cut_parts = []
+    parts = []
     for number, pattern in enumerate(_SPLIT_PATTERNS):
-        triangle_index = np.flatnonzero(pattern_index == number)
-        selection = (
-            vertices[triangle_index][:, pattern].reshape(-1, 3),
-            corner_weights[triangle_index][:, pattern].reshape(-1, 3, 3),
-        )
-        cut_parts.append((selection[0], np.repeat(triangle_index, len(pattern)), selection[1]))
-    new_triangles, source, new_weights = (np.concatenate(parts) for parts in zip(*cut_parts, strict=True))
-    return new_triangles, source, new_weights
+        parent = np.flatnonzero(pattern_index == number)
+        new_triangles = vertices[parent][:, pattern].reshape(-1, 3)
+        new_weights = vertex_weights[parent][:, pattern].reshape(-1, 3, 3)
+        parts.append((new_triangles, np.repeat(parent, len(pattern)), new_weights))
+    return tuple(np.concatenate(one) for one in zip(*parts, strict=True))  # type: ignore[return-value]

@@ -59,8 +59,8 @@ def data_file(name: str) -> Path:
 def write_page(page: Path, text: str) -> None:
     """Write a page of the documentation atomically."""
     in_checkout(page.parent)
-    with atomic_file(page) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
+    with atomic_file(page) as file:
+        file.write_text(text, encoding="utf-8")
 
 
 def template_path(page: Path) -> Path:
@@ -85,8 +85,8 @@ def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = N
     digits : significant digits of floats; None for all of them
     """
     values = figures if digits is None else _rounded(figures, digits)
-    with atomic_file(path) as unfinished:
-        unfinished.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    with atomic_file(path) as file:
+        file.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 def read_results(path: Path) -> Any:

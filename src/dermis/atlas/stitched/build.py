@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.atlas.atlas import MAX_SHEAR, Atlas
 from dermis.atlas.stitched.coverage import (
@@ -16,8 +15,9 @@ from dermis.atlas.stitched.coverage import (
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.pack import pack_pieces
-from dermis.atlas.stitched.surface import Doubles, FlatSurface, Index, flat_surface
+from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.atlas.unwrap.charts import connected_pieces
+from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.mesh import Mesh
 
 _MIN_DENSITY = 0.05  # of a piece, relative to the mesh's mean; what has less is too small to be blurred
@@ -87,13 +87,12 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     # where a piece overlaps itself, gutters must read only the layer that has texels
     piece = np.where(hidden_triangles(surface, piece, packing, size), -1, piece)
     own = np.flatnonzero(piece >= 0)
-    coverage = compute_coverage(
-        surface, piece, own, find_border(surface, piece, own), packing, width, (size, size)
-    )
+    border = find_border(surface, piece, own)
+    coverage = compute_coverage(surface, piece, own, border, packing, width, (size, size))
     return _atlas(surface, packing, coverage, piece >= 0)
 
 
-def _atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: NDArray[np.bool_]) -> Atlas:
+def _atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:
     size = len(coverage.triangle)
     metric = texel_metric(surface, packing, coverage)
     distances = edge_distances(surface, packing, coverage)
@@ -103,10 +102,8 @@ def _atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: N
     source = np.einsum("nk,nka->na", weights, packing.corners[coverage.triangle[y, x]])
     corner_uv = np.where(mapped[:, None, None], (packing.corners + 0.5) / size, 0.0)
     # the rim of a piece shows the surface across a seam, but with the stretch of its own side
-    outside = (coverage.anchor_triangle >= 0) & (
-        (coverage.anchor_triangle != coverage.triangle) | coverage.gutter
-    )
-    row, column = np.nonzero(outside)
+    elsewhere = (coverage.anchor_triangle != coverage.triangle) | coverage.gutter
+    row, column = np.nonzero((coverage.anchor_triangle >= 0) & elsewhere)
     shear = np.clip(metric[..., 2], -MAX_SHEAR, MAX_SHEAR)
     return Atlas(
         triangle=coverage.triangle,

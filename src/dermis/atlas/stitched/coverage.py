@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.atlas.raster import run_lengths
 from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, trace_gutter
-from dermis.atlas.stitched.surface import Flags, FlatSurface, Index, interpolate_corners
+from dermis.atlas.stitched.surface import FlatSurface, interpolate_corners
 from dermis.atlas.stitched.texels import (
     AnchoredTexels,
     anchors_diverge,
@@ -16,11 +17,9 @@ from dermis.atlas.stitched.texels import (
     gap_limit_mm,
     mostly_hidden,
     rasterise_owners,
-    run_lengths,
     unconnected_pairs,
 )
-
-Singles = NDArray[np.float32]
+from dermis.base.arrays import Floats, Index, Ints, Mask
 
 
 @dataclass(frozen=True)
@@ -37,13 +36,13 @@ class Coverage:
     distance_mm : (h, w) distance from the piece
     """
 
-    triangle: NDArray[np.int32]
-    weights: NDArray[np.float32]
-    anchor_triangle: NDArray[np.int32]
-    anchor_weights: NDArray[np.float32]
-    piece: NDArray[np.int32]
-    gutter: Flags
-    distance_mm: NDArray[np.float32]
+    triangle: Ints
+    weights: Floats
+    anchor_triangle: Ints
+    anchor_weights: Floats
+    piece: Ints
+    gutter: Mask
+    distance_mm: Floats
 
 
 def compute_coverage(
@@ -71,21 +70,17 @@ def compute_coverage(
         distance_mm=np.zeros(shape, np.float32),
     )
     _add_gutters(coverage, piece, trace_gutter(surface, border, packing, width, owner))
-    coverage.piece[:] = np.where(
-        coverage.anchor_triangle >= 0, piece[np.maximum(coverage.anchor_triangle, 0)], -1
-    )
+    coverage.piece[:] = np.where(coverage.anchor_triangle >= 0, piece[coverage.anchor_triangle], -1)
     return coverage
 
 
 def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
     """Add rims and gutters to a coverage of pieces only."""
     y, x = texels.y, texels.x
-    coverage.anchor_triangle[y, x], coverage.anchor_weights[y, x], coverage.distance_mm[y, x] = (
-        texels.anchor_triangle,
-        texels.anchor_weights,
-        texels.distance_mm,
-    )
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
+    coverage.anchor_triangle[y, x] = texels.anchor_triangle
+    coverage.anchor_weights[y, x] = texels.anchor_weights
+    coverage.distance_mm[y, x] = texels.distance_mm
     coverage.gutter[y, x] = ~texels.rim
     ended = np.zeros(coverage.gutter.shape, np.bool_)
     ended[y, x] = ~texels.complete
@@ -93,13 +88,13 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
     coverage.triangle[y[incomplete], x[incomplete]] = -1
     _repeat_edge(coverage, piece, ended, y[incomplete], x[incomplete])
     # gutters end where the surface has no texels in the atlas
-    unlit = coverage.gutter & ((coverage.triangle < 0) | (piece[np.maximum(coverage.triangle, 0)] < 0))
+    unlit = coverage.gutter & ((coverage.triangle < 0) | (piece[coverage.triangle] < 0))
     for grid in (coverage.triangle, coverage.anchor_triangle):
         grid[unlit] = -1
     coverage.gutter[unlit] = False
 
 
-def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
+def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Mask:
     """Return the mask (f,) of triangles whose texels belong mostly to other triangles of their piece."""
     own = np.flatnonzero(piece >= 0)
     owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), (size, size))
@@ -111,13 +106,13 @@ def _drawing_order(surface: FlatSurface, piece: Index, own: Index) -> Index:
     return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
 
 
-def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
+def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Mask:
     """Return the mask of triangles `own` that are mirrored relative to most of their piece."""
     total = np.bincount(piece, surface.area_uv[own])
     return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[own]))
 
 
-def _repeat_edge(coverage: Coverage, piece: Index, ended: Flags, y: Index, x: Index) -> None:
+def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Index) -> None:
     """Copy neighbouring texels to gutter texels just beyond the end of the surface.
 
     A blur along the edge then reads the same from a gutter as from the rim of a piece.
@@ -126,32 +121,23 @@ def _repeat_edge(coverage: Coverage, piece: Index, ended: Flags, y: Index, x: In
     y, x : (n,) those of them that are in gutters
     """
     last = np.array(ended.shape) - 1
-    from_y, from_x = y.copy(), x.copy()
+    own, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
         anchor = coverage.anchor_triangle[next_y, next_x]
-        same = (
-            (anchor >= 0) & ~ended[next_y, next_x] & (piece[anchor] == piece[coverage.anchor_triangle[y, x]])
-        )
+        same = (anchor >= 0) & ~ended[next_y, next_x] & (piece[anchor] == own)
         from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
-    coverage.triangle[y, x], coverage.weights[y, x] = (
-        coverage.triangle[from_y, from_x],
-        coverage.weights[from_y, from_x],
-    )
+    for grid in (coverage.triangle, coverage.weights):
+        grid[y, x] = grid[from_y, from_x]
 
 
-def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Singles:
+def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Floats:
     """Return texels per mm along u and v, and the cosine between them (h, w, 3); in gutters of the anchor."""
-    metric, covered = (
-        np.zeros((*coverage.anchor_triangle.shape, 3), np.float32),
-        coverage.anchor_triangle >= 0,
-    )
-    found = interpolate_corners(
-        surface.uv_metric.astype(np.float32),
-        coverage.anchor_triangle[covered],
-        coverage.anchor_weights[covered],
-    )
-    texels_per_uv = packing.texels_per_uv[coverage.anchor_triangle[covered]].astype(np.float32)
+    covered = coverage.anchor_triangle >= 0
+    anchor, weights = coverage.anchor_triangle[covered], coverage.anchor_weights[covered]
+    metric = np.zeros((*covered.shape, 3), np.float32)
+    found = interpolate_corners(surface.uv_metric.astype(np.float32), anchor, weights)
+    texels_per_uv = packing.texels_per_uv[anchor].astype(np.float32)
     found[:, :2] = texels_per_uv[:, None] / np.maximum(found[:, :2], 1e-3)
     metric[covered] = found
     return metric
@@ -163,9 +149,8 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
     There is a gap between two texels if their points are farther apart than `gap_limit_mm` and their anchors
     are farther apart than either texel is from its anchor.
     """
-    owner = np.where(
-        coverage.anchor_triangle >= 0, np.where(coverage.distance_mm > 0, -1, coverage.anchor_triangle), -2
-    )
+    anchor = coverage.anchor_triangle
+    owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
     distance = np.empty((*owner.shape, 4), np.uint16)
     for axis in (0, 1):
         joined = np.zeros(owner.shape, np.bool_)
@@ -181,7 +166,7 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
 
 def _has_gap(
     surface: FlatSurface, packing: Packing, coverage: Coverage, first: Index, second: Index, axis: int
-) -> Flags:
+) -> Mask:
     """Return whether there is a gap between pairs of texels, given by flat indices."""
     one, other = (_anchored(surface, packing, coverage, texel) for texel in (first, second))
     triangle, weights = coverage.triangle.ravel(), coverage.weights.reshape(-1, 2)

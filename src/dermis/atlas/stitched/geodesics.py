@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.surface import Adjacency
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-Doubles = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 START_SHIFT = 1e-3
 """Fraction by which starts are moved towards an inner point, so that those at a corner are inside."""
@@ -43,7 +41,7 @@ class Geodesics(NamedTuple):
     direction: Complex
     orientation: Doubles
 
-    def select(self, chosen: Flags) -> Geodesics:
+    def select(self, chosen: Mask) -> Geodesics:
         """Return the chosen geodesics."""
         return Geodesics._make(part[chosen] for part in self)
 
@@ -56,9 +54,9 @@ class GeodesicEnds(NamedTuple):
     complete : whether the target was reached before the surface ended
     """
 
-    triangle: NDArray[np.int32]
+    triangle: Ints
     weights: Doubles
-    complete: Flags
+    complete: Mask
 
     def set_ends(self, rays: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
         """Set the ends of some geodesics.

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from dermis.atlas.raster import covered_texels
 from dermis.atlas.stitched.geodesics import GeodesicEnds, trace_geodesics
 from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_border_points
-from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.surface import FlatSurface
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 
 _MAX_STRETCH = 2.0  # largest texels per mm at a border, relative to its piece's mean, that widens a gutter
 
@@ -24,7 +25,7 @@ class Border(NamedTuple):
 
     triangle: Index
     side: Index
-    seam: Flags
+    seam: Mask
 
 
 class Packing(NamedTuple):
@@ -80,7 +81,7 @@ def needed_texels(
     packing: Packing,
     width: GutterWidth,
     shape: tuple[int, int],
-) -> Flags:
+) -> Mask:
     """Return the mask (h, w) of texels that pieces, rims and gutters may need."""
     found = np.zeros(shape, np.bool_)
     found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
@@ -102,17 +103,17 @@ class GutterTexels(NamedTuple):
 
     y: Index
     x: Index
-    rim: Flags
+    rim: Mask
     distance_mm: Doubles
-    anchor_triangle: NDArray[np.int32]
+    anchor_triangle: Ints
     anchor_weights: Doubles
-    triangle: NDArray[np.int32]
+    triangle: Ints
     weights: Doubles
-    complete: Flags
+    complete: Mask
 
 
 def trace_gutter(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
+    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints
 ) -> GutterTexels:
     """Return the gutter texels of a border, with the surface points that they show.
 
@@ -136,11 +137,8 @@ def trace_from_border(
     t, anchor_triangle = nearest.fraction[:, None], border.triangle[nearest.side]
     first, rows = border.side[nearest.side], np.arange(len(anchor_triangle))
     second = (first + 1) % 3
-    start = _lerp(
-        surface.adjacency.planar_corners[anchor_triangle, first],
-        surface.adjacency.planar_corners[anchor_triangle, second],
-        t,
-    )
+    corners = surface.adjacency.planar_corners
+    start = _lerp(corners[anchor_triangle, first], corners[anchor_triangle, second], t)
     offset = texels - border_points(sides, nearest)
     step = np.einsum("ns,nsa->na", offset, border_steps(sides, nearest))
     corner = np.zeros((len(anchor_triangle), 3))

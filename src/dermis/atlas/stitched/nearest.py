@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.atlas.raster import expand_runs
+from dermis.base.arrays import Doubles, Index, Mask
+from dermis.mesh.geometry import expand_runs
 
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 _TEXEL = 1.001  # a texel, with a margin for rounding
 
 
@@ -43,7 +40,7 @@ class NearestPoints(NamedTuple):
     side: Index
     fraction: Doubles
     distance_mm: Doubles
-    rim: Flags
+    rim: Mask
 
 
 class _SideMetric(NamedTuple):
@@ -61,7 +58,7 @@ class _SideMetric(NamedTuple):
     half_extent: Doubles
 
 
-def nearest_border_points(sides: BorderSides, inside: Flags) -> NearestPoints:
+def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
     """Return the nearest border point of each texel within the gutter, by the surface metric at the side.
 
     inside : (h, w) texels of pieces
@@ -117,7 +114,7 @@ def _candidate_texels(
     return k[row], x, y[row]
 
 
-def _within_a_texel(offset: Doubles, along: Doubles) -> Flags:
+def _within_a_texel(offset: Doubles, along: Doubles) -> Mask:
     """Return whether the segment from 0 to `along` is within a texel of `offset`, both (2, n)."""
     low, high = np.minimum(along, 0.0), np.maximum(along, 0.0)
     found = np.asarray(((offset > low - _TEXEL) & (offset < high + _TEXEL)).all(axis=0))

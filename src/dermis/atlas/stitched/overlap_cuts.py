@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.atlas.raster import barycentric_weights
 from dermis.atlas.stitched.gutter import (
     Border,
     GutterWidth,
@@ -18,25 +18,23 @@ from dermis.atlas.stitched.gutter import (
     trace_from_border,
 )
 from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_border_points
-from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.surface import FlatSurface
 from dermis.atlas.stitched.texels import (
     AnchoredTexels,
     anchors_diverge,
-    barycentric_weights,
     gap_limit_mm,
     rasterise_owners,
     unconnected_pairs,
 )
 from dermis.atlas.unwrap.charts import connected_pieces
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import components
 
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
 _MAX_TEXELS = 100_000  # of a piece on such a grid
 _MAX_GRID_CELLS = 600_000  # of the grid
 _CONFLICT_RANGE = 0.6  # fraction of the gutter width in which conflicts count
-_CLUSTER_CELL = (
-    0.7  # cell size for clusters, in gutter widths; conflicts in adjacent cells are in one cluster
-)
+_CLUSTER_CELL = 0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
 _CELLS_PER_GUTTER = 8  # cells of the grid for distances, per gutter width
 _MIN_LENGTH = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
 _MIN_BENEFIT = 0.2  # fewest separated conflicts per texel of a cut
@@ -77,7 +75,7 @@ class _Grid(NamedTuple):
     nearest : gutter texels
     """
 
-    owner: NDArray[np.int32]
+    owner: Ints
     row: Index
     anchored: AnchoredTexels
     packing: Packing
@@ -86,7 +84,7 @@ class _Grid(NamedTuple):
     nearest: NearestPoints
 
 
-def find_conflicts(surface: FlatSurface, mapped: Flags, own: Index, gutter_mm: float) -> Conflicts:
+def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Conflicts:
     """Return the conflicts of one piece, found on a grid of its own.
 
     mapped : (f,) triangles that belong to a piece
@@ -114,9 +112,7 @@ def find_conflicts(surface: FlatSurface, mapped: Flags, own: Index, gutter_mm: f
     return Conflicts(one.anchors + origin, other.anchors + origin, inside, texels_per_uv, texel_mm)
 
 
-def _grid(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: NDArray[np.int32]
-) -> _Grid:
+def _grid(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints) -> _Grid:
     sides = border_sides(surface, border, packing, width)
     sides = sides._replace(gutter_mm=_CONFLICT_RANGE * sides.gutter_mm)
     nearest, own = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
@@ -131,7 +127,7 @@ def _grid(
     return _Grid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
 
 
-def _gap_pairs(surface: FlatSurface, mapped: Flags, grid: _Grid) -> tuple[Index, Index]:
+def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _Grid) -> tuple[Index, Index]:
     """Return pairs (n,), (n,) of adjacent texels with a gap between them."""
     found = []
     for axis in (0, 1):
@@ -146,7 +142,7 @@ def _gap_pairs(surface: FlatSurface, mapped: Flags, grid: _Grid) -> tuple[Index,
     return one[gap], other[gap]
 
 
-def _texel_points(surface: FlatSurface, mapped: Flags, grid: _Grid, chosen: Index) -> Doubles:
+def _texel_points(surface: FlatSurface, mapped: Mask, grid: _Grid, chosen: Index) -> Doubles:
     """Return the surface points (n, 3) of chosen texels [mm]; NaN for others and beyond the surface's end."""
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -193,7 +189,7 @@ def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
 
-def _cut(surface: FlatSurface, mapped: Flags, own: Index, gutter_mm: float) -> Index | None:
+def _cut(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Index | None:
     """Return the part of each triangle of a piece, or None if it needs no cut."""
     found = find_conflicts(surface, mapped, own, gutter_mm)
     reach = gutter_mm / found.texel_mm
@@ -223,7 +219,7 @@ def _clusters(found: Conflicts, reach: float) -> list[Index]:
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
-def _within_reach(points: Doubles, others: Doubles, reach: float) -> Flags:
+def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
     """Return whether each of the points (..., 2) is about within `reach` of any of the others (n, 2)."""
     cell = reach / _CELLS_PER_GUTTER
     low = np.floor(others.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
@@ -238,7 +234,7 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Flags:
     return np.asarray(found[index[..., 0], index[..., 1]])  # cell 0 is always empty
 
 
-def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
+def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
     """Return the mask of triangles along the side of an overlap on which they have less area."""
     corners = surface.uv[own] * overlap.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed_texels
-from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.surface import FlatSurface
+from dermis.base.arrays import Doubles, Index, Mask
 
 Span = tuple[int, int, int]
 """Run of cells: row, first and last column."""
@@ -211,7 +212,7 @@ def _try_scale(masks: list[_Mask], scale: float, cells: int, order: int) -> _Lay
     return _Layout(scale, corners + low)
 
 
-def _scaled_mask(mask: _Mask, scale: float) -> tuple[Flags, Doubles]:
+def _scaled_mask(mask: _Mask, scale: float) -> tuple[Mask, Doubles]:
     """Return the mask (h, w) of all cells that a mask touches at another scale, and its margin there."""
     row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
@@ -243,7 +244,7 @@ def _mask(one: _Piece, scale: float, width: GutterWidth) -> _Mask:
     return _Mask(_spans(mask), margin, scale)
 
 
-def _spans(mask: Flags) -> Index:
+def _spans(mask: Mask) -> Index:
     """Return runs of true cells (m, 3): row, first and last column."""
     step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.charts import opposite_sides
-from dermis.mesh.geometry import MIN_UV_CROSS, tangents, triangle_areas, uv_cross, weld
+from dermis.base.arrays import Doubles, Index, Ints, Mask
+from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 _MIN_LENGTH_MM = 1e-9
 
 
@@ -29,12 +27,12 @@ class Adjacency(NamedTuple):
     passable : (f,) triangles that geodesics may cross
     """
 
-    planar_corners: NDArray[np.float64]
-    neighbour: NDArray[np.int32]
+    planar_corners: Doubles
+    neighbour: Ints
     neighbour_side: NDArray[np.int8]
-    flipped: NDArray[np.bool_]
-    apex: NDArray[np.float64]
-    passable: NDArray[np.bool_]
+    flipped: Mask
+    apex: Doubles
+    passable: Mask
 
 
 @dataclass(frozen=True)
@@ -57,8 +55,8 @@ class FlatSurface:
     uv: Doubles
     area_mm2: Doubles
     area_uv: Doubles
-    skin: Flags
-    valid: Flags
+    skin: Mask
+    valid: Mask
     adjacency: Adjacency
     uv_neighbour: Index
     uv_steps: Doubles
@@ -128,7 +126,7 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
     return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
 
 
-def side_neighbours(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags]:
+def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
     """Return the triangle across each side (f, 3), its side of this edge, and whether it is flipped.
 
     The triangle is -1 where there is none.
@@ -150,11 +148,11 @@ def side_neighbours(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Fl
 def _apexes(flat: Doubles) -> Doubles:
     """Return the third corner (f, 3, 2) along and to the left of each side, in lengths of the side."""
     side = np.roll(flat, -1, axis=1) - flat
-    rest = np.roll(flat, -2, axis=1) - flat
+    third = np.roll(flat, -2, axis=1) - flat
     square = np.maximum((side**2).sum(axis=2), _MIN_LENGTH_MM**2)
-    uv_steps = (side * rest).sum(axis=2) / square
-    left = (side[..., 0] * rest[..., 1] - side[..., 1] * rest[..., 0]) / square
-    return np.stack((uv_steps, left), axis=-1)
+    along = (side * third).sum(axis=2) / square
+    left = cross_2d(side, third) / square
+    return np.stack((along, left), axis=-1)
 
 
 def _uv_steps(
@@ -169,26 +167,23 @@ def _uv_steps(
     positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))
     steps = np.stack(tangents(positions, uvs, normals, corner), axis=1)[corner].astype(np.float64)
     length = np.linalg.norm(steps, axis=-1)
-    cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(length.prod(axis=-1), 1e-12)
-    # laid into the triangle's plane without getting shorter
+    product = length.prod(axis=-1)
+    cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(product, 1e-12)
+    # projected to the triangle's plane, with the length preserved
     uv_steps = np.einsum("fksi,fai->fksa", steps, axes)
     uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
     own = _triangle_steps(flat, uv)[:, None]
-    # the mean over triangles that face all ways may be meaningless: then the triangle's own steps
-    bad = _uv_orientation(uv_steps) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
+    # the mean over triangles of very different normals may be meaningless: use the triangle's own steps there
+    area = cross_2d(uv_steps[..., 0, :], uv_steps[..., 1, :])
+    bad = area * np.sign(area_uv)[:, None] >= -0.05 * product
     uv_steps = np.where(bad[..., None, None], own, uv_steps)
     return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
-
-
-def _uv_orientation(uv_steps: Doubles) -> Doubles:
-    """Return the cross product of the u and v steps, positive where v is to the left of u."""
-    return np.asarray(uv_steps[..., 0, 0] * uv_steps[..., 1, 1] - uv_steps[..., 0, 1] * uv_steps[..., 1, 0])
 
 
 def _triangle_steps(flat: Doubles, uv: Doubles) -> Doubles:
     """Return the steps (f, 2, 2) per unit of u and of v from each triangle alone [mm]."""
     e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
-    cross = d[:, 0, 0] * d[:, 1, 1] - d[:, 0, 1] * d[:, 1, 0]
+    cross = cross_2d(d[:, 0], d[:, 1])
     cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]
     u = (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:]) / cross
     v = (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1]) / cross

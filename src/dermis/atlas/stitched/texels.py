@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.atlas.raster import covered_texels, cross_2d
+from dermis.atlas.raster import barycentric_weights, covered_texels
 from dermis.atlas.stitched.surface import FlatSurface
-
-Doubles = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
 _GAP_STEPS, _GAP_SLACK_MM = (
     2.0,
@@ -22,7 +17,7 @@ _GAP_STEPS, _GAP_SLACK_MM = (
 _INNER_MARGIN = 1e-3  # texel centres this far from an edge are in no other triangle at this edge
 
 
-def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int]) -> NDArray[np.int32]:
+def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int]) -> Ints:
     """Return the last triangle that covers the centre of each texel (h, w), -1 for none.
 
     corners : (f, 3, 2) [texel]
@@ -34,7 +29,7 @@ def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int])
     return owner
 
 
-def mostly_hidden(corners: Doubles, triangles: Index, owner: NDArray[np.int32]) -> Flags:
+def mostly_hidden(corners: Doubles, triangles: Index, owner: Ints) -> Mask:
     """Return the mask (f,) of triangles whose texels mostly belong to others; see `rasterise_owners`."""
     texel, which = covered_texels(corners[triangles], owner.shape, _INNER_MARGIN)
     drawn, count = triangles[which], len(corners)
@@ -42,28 +37,12 @@ def mostly_hidden(corners: Doubles, triangles: Index, owner: NDArray[np.int32]) 
     return np.asarray(owned < 0.5 * np.bincount(drawn, minlength=count))
 
 
-def centre_weights(corners: Doubles, owner: NDArray[np.int32]) -> Singles:
+def centre_weights(corners: Doubles, owner: Ints) -> Floats:
     """Return the weights (h, w, 2) of the second and third corner at the centre of each covered texel."""
     y, x = np.nonzero(owner >= 0)
     weights = np.zeros((*owner.shape, 2), np.float32)
     weights[y, x] = barycentric_weights(corners[owner[y, x]], np.column_stack((x, y)))
     return weights
-
-
-def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
-    """Return the weights (n, 2) of the second and third corner at points of triangles.
-
-    corners : (n, 3, 2) [texel]
-    points : (n, 2) [texel]
-    """
-    e1, e2, offset = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    area = cross_2d(e1, e2)
-    area = np.where(area == 0, 1.0, area)
-    second, third = (
-        np.clip(cross_2d(offset, e2) / area, 0.0, 1.0),
-        np.clip(cross_2d(e1, offset) / area, 0.0, 1.0),
-    )
-    return np.stack((second, third), axis=1) / np.maximum(second + third, 1.0)[:, None]
 
 
 class AnchoredTexels(NamedTuple):
@@ -83,7 +62,7 @@ class AnchoredTexels(NamedTuple):
         return AnchoredTexels._make(part[chosen] for part in self)
 
 
-def unconnected_pairs(surface: FlatSurface, owner: NDArray[np.int32], axis: int) -> tuple[Index, Index]:
+def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:
     """Return flat indices of texels adjacent along x (0) or y (1) whose triangles share no side.
 
     owner : (h, w) triangle of a piece, -1 in its gutters, -2 elsewhere
@@ -100,7 +79,7 @@ def unconnected_pairs(surface: FlatSurface, owner: NDArray[np.int32], axis: int)
     return first[apart], first[apart] + step
 
 
-def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Flags:
+def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
     """Return whether the anchors of two texels are farther apart than either texel is from its anchor."""
     distance2 = np.maximum(_square(one.texels - one.anchors), _square(other.texels - other.anchors))
     return np.asarray(_square(one.anchors - other.anchors) > distance2)
@@ -114,18 +93,3 @@ def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubl
 def _square(offset: Doubles) -> Doubles:
     """Return the squared length of (n, 2) vectors."""
     return np.asarray(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-
-
-def run_lengths(joined: Flags) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the number of connected texels before and after each texel of a row (h, w).
-
-    joined : (h, w) whether each texel is connected to the one before it
-    """
-    after = np.zeros_like(joined)
-    after[:, :-1] = joined[:, 1:]
-    return _run_before(joined), _run_before(after[:, ::-1])[:, ::-1]
-
-
-def _run_before(joined: Flags) -> NDArray[np.int32]:
-    index = np.arange(joined.shape[1], dtype=np.int32)
-    return index - np.maximum.accumulate(np.where(joined, 0, index), axis=1)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, Atlas
-from dermis.atlas.raster import expand_runs
+from dermis.base.arrays import Floats, Index, Ints, Mask
+from dermis.mesh.geometry import expand_runs
 
-Index = NDArray[np.int64]
 Words = NDArray[np.uint32]
-Flags = NDArray[np.bool_]
 TILE_CELLS = 4
 """Cells along each side of a tile."""
 
@@ -52,7 +51,7 @@ class Cells:
     max_sigma_mm: float
     cell_mm: float
     stride: int
-    receiver_mask: Flags
+    receiver_mask: Mask
     receivers: Words
     receiver_points: Words
     receiver_first: Index
@@ -121,14 +120,14 @@ def _centre_texels(size: int, side: int) -> Index:
     return np.asarray(((np.arange(side) + 0.5) * size / side).astype(np.int64))
 
 
-def _cells_with(texels: Flags, size: int, side: int, stride: int) -> Flags:
+def _cells_with(texels: Mask, size: int, side: int, stride: int) -> Mask:
     """Return the (side, side) mask of cells with marked texels, of which every `stride`-th is given."""
     first = -(-np.arange(side) * size // (side * stride))
     rows = np.logical_or.reduceat(texels, first, axis=0)
     return np.asarray(np.logical_or.reduceat(rows, first, axis=1))
 
 
-def _dilated(cells: Flags) -> Flags:
+def _dilated(cells: Mask) -> Mask:
     """Return a mask of cells extended by the eight neighbours of each."""
     padded = np.pad(cells, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
@@ -141,19 +140,17 @@ def _sort_by_tile(tile: NDArray[np.integer], tiles: int) -> tuple[Index, Index]:
     return order, np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=tiles * tiles))])
 
 
-def _source_cells(lit: Flags, tiles: int) -> tuple[Index, Index]:
+def _source_cells(lit: Mask, tiles: int) -> tuple[Index, Index]:
     """Return the indices of the lit cells by tile, and the start of each tile."""
     y, x = np.nonzero(lit)
     order, first = _sort_by_tile((y // TILE_CELLS * tiles + x // TILE_CELLS).astype(np.int32), tiles)
     return (y * len(lit) + x)[order], first
 
 
-def _tile_of(atlas: Atlas, points: Words, side: int, tiles: int) -> NDArray[np.int32]:
+def _tile_of(atlas: Atlas, points: Words, side: int, tiles: int) -> Ints:
     """Return the tile (m,) of points on triangles, for gutter texels that of the point which they copy."""
-    column, row = (
-        np.clip(axis * np.float32(side), 0, side - 1).astype(np.int32) // TILE_CELLS
-        for axis in _atlas_uv(atlas, points[:, 0], points[:, 1])
-    )
+    uv = np.stack(_atlas_uv(atlas, points[:, 0], points[:, 1]))
+    column, row = np.clip(uv * np.float32(side), 0, side - 1).astype(np.int32) // TILE_CELLS
     return np.asarray(row * tiles + column, np.int32)
 
 
@@ -186,7 +183,7 @@ def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
     return first, np.column_stack([_pack(*texel[order].T), _pack(x[order], y[order])])
 
 
-def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
     """Return lit texels (r, 2) at the rim of charts that show points elsewhere, and these points [texel]."""
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):
@@ -199,7 +196,7 @@ def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     return texel[elsewhere].astype(np.uint16), uv[elsewhere]
 
 
-def _atlas_uv(atlas: Atlas, triangle: NDArray[np.integer], weights: Words) -> list[NDArray[np.float32]]:
+def _atlas_uv(atlas: Atlas, triangle: NDArray[np.integer], weights: Words) -> list[Floats]:
     """Return u and v in the atlas of points on triangles, v down.
 
     weights : packed weights of the second and third corner

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
-
-Index = NDArray[np.int64]
-Doubles = NDArray[np.float64]
 
 _SMOOTHING_STEPS = 4
 _BEND_PENALTY = 3.0  # extra distance across a right angle, in multiples of the distance
@@ -58,12 +55,10 @@ def merge_strays(chart: Index, triangles: Index) -> Index:
 def _smooth_borders(chart: Index, triangles: Index) -> Index:
     """Return charts (f,) in which each triangle belongs to the prevailing chart of its neighbourhood."""
     corner = triangles.ravel()
-    triangle_count = np.maximum(np.bincount(corner), 1)
+    triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
     weight = np.eye(int(chart.max()) + 1)[chart]
     for _ in range(_SMOOTHING_STEPS):
-        at_point = (
-            sum_by_index(corner, np.repeat(weight, 3, axis=0), len(triangle_count)) / triangle_count[:, None]
-        )
+        at_point = sum_by_index(corner, np.repeat(weight, 3, axis=0), len(triangle_count)) / triangle_count
         weight = at_point[triangles].mean(axis=1)
     return np.asarray(weight.argmax(axis=1), dtype=np.int64)
 
@@ -78,7 +73,7 @@ def connected_pieces(chart: Index, adjacent: Index) -> Index:
     return components(len(chart), here[same], there[same])
 
 
-def _stray_triangles(chart: Index, adjacent: Index) -> NDArray[np.bool_]:
+def _stray_triangles(chart: Index, adjacent: Index) -> Mask:
     """Return the mask (f,) of triangles outside the largest piece of their chart."""
     piece = connected_pieces(chart, adjacent)
     size = np.bincount(piece)

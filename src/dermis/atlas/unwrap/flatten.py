@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, edges, uv_cross
 
-Doubles = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Index = NDArray[np.int64]
 _MAX_RINGS = 5  # of triangles around mirrored ones whose points may move
 _REWEIGHTINGS, _ITERATIONS = 6, 8  # changes of the weights, and iterations after each
 
@@ -81,7 +80,7 @@ def untangle(positions: Doubles, triangles: Index) -> Doubles:
     return positions
 
 
-def _average_neighbours(positions: Doubles, ends: Index, free: NDArray[np.bool_]) -> Doubles:
+def _average_neighbours(positions: Doubles, ends: Index, free: Mask) -> Doubles:
     """Return the positions with each free point at the mean of its neighbours."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import laplacian

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.charts import grow_charts, merge_strays, neighbours, opposite_sides
 from dermis.atlas.unwrap.flatten import flatten, vertex_components
-from dermis.mesh.geometry import components, uv_cross
+from dermis.base.arrays import Doubles, Index, Mask
+from dermis.mesh.geometry import components, cross_2d, uv_cross
 
-Index = NDArray[np.int64]
-Doubles = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 _BLOCK = 256  # edges that are compared with all others at a time
 _MAX_REASSIGNMENTS = 6  # of faulty triangles to neighbouring charts, before charts are split
 
@@ -47,7 +44,7 @@ def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
     return vertex.reshape(3, f).T, point
 
 
-def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Flags:
+def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Mask:
     """Return the mask (f,) of mirrored or collapsed triangles, and of those at crossings of a chart's border.
 
     A chart without any does not overlap itself.
@@ -56,7 +53,7 @@ def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Flags:
     corners : (f, 3)
     chart : (f,) numbered from 0
     """
-    faulty: Flags = uv_cross(positions[corners]) <= 0
+    faulty: Mask = uv_cross(positions[corners]) <= 0
     sides, owner = border_edges(corners)
     for k in range(int(chart.max()) + 1):
         own = np.flatnonzero(chart[owner] == k)
@@ -64,7 +61,7 @@ def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Flags:
     return faulty
 
 
-def crossing_edges(edges: Doubles) -> Flags:
+def crossing_edges(edges: Doubles) -> Mask:
     """Return the mask (k,) of edges (k, 2, 2) that cross others, other than at their ends."""
     found = np.zeros(len(edges), dtype=bool)
     for k in range(0, len(edges), _BLOCK):
@@ -72,19 +69,11 @@ def crossing_edges(edges: Doubles) -> Flags:
     return found
 
 
-def _pairs_cross(some: Doubles, edges: Doubles) -> Flags:
+def _pairs_cross(some: Doubles, edges: Doubles) -> Mask:
     a, b = some[:, None, 0], some[:, None, 1]
     c, d = edges[None, :, 0], edges[None, :, 1]
-    straddle = _signed_area(a, b, c) * _signed_area(a, b, d) < 0
-    crossing: Flags = straddle & (_signed_area(c, d, a) * _signed_area(c, d, b) < 0)
-    return crossing
-
-
-def _signed_area(a: Doubles, b: Doubles, p: Doubles) -> Doubles:
-    """Return twice the area of the triangles a, b, p, positive where p is to the left of ab."""
-    ab, ap = b - a, p - a
-    area: Doubles = ab[..., 0] * ap[..., 1] - ab[..., 1] * ap[..., 0]
-    return area
+    straddle = cross_2d(b - a, c - a) * cross_2d(b - a, d - a) < 0
+    return np.asarray(straddle & (cross_2d(d - c, a - c) * cross_2d(d - c, b - c) < 0))
 
 
 class FlatCharts(NamedTuple):
@@ -101,7 +90,7 @@ class FlatCharts(NamedTuple):
     point: Index
     uv_mm: Doubles
     chart: Index
-    faulty: Flags
+    faulty: Mask
 
 
 class Triangles(NamedTuple):
@@ -118,7 +107,7 @@ class Triangles(NamedTuple):
         piece = vertex_components(corners, len(point))[corners[:, 0]]
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
-    def subset(self, chosen: Flags) -> Triangles:
+    def subset(self, chosen: Mask) -> Triangles:
         """Return the chosen triangles."""
         return Triangles(self.positions, self.triangles[chosen])
 

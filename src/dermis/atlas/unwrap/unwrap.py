@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from dermis.atlas.raster import expand_runs
 from dermis.atlas.unwrap.charts import grow_charts, smooth_charts
 from dermis.atlas.unwrap.seams import FlatCharts, Triangles, border_edges, flatten_charts
+from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.geometry import cross_2d, expand_runs, triangle_areas
 from dermis.mesh.mesh import Mesh, build_mesh
-
-Index = NDArray[np.int64]
-Doubles = NDArray[np.float64]
 
 _GRID = 512  # columns and rows of cells on the map
 _MAX_PLACEMENTS = 1000  # of charts, in all orders together
@@ -47,7 +44,8 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     corner = np.array([edges.min(axis=(0, 1)) for edges in outlines])
     shifted = [edges - low for edges, low in zip(outlines, corner, strict=True)]
     size = np.array([edges.max(axis=(0, 1)) for edges in shifted])
-    bound = _GRID / np.sqrt(max(sum(_area(edges) for edges in shifted), (size**2).max()))
+    area = sum(float(cross_2d(edges[:, 0], edges[:, 1]).sum() / 2) for edges in shifted)
+    bound = _GRID / np.sqrt(max(area, (size**2).max()))
     best, cells = 0.0, None
     for order in _orders(size):
         low, high = best, bound
@@ -63,11 +61,6 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     if cells is None:
         refuse("charts", "fewer charts", f"got {len(outlines)}", "Cut the mesh into larger charts")
     return best / _GRID, (cells - best * corner) / _GRID
-
-
-def _area(edges: Doubles) -> float:
-    (x0, y0), (x1, y1) = edges[:, 0].T, edges[:, 1].T
-    return float((x0 * y1 - x1 * y0).sum() / 2)
 
 
 def _orders(size: Doubles) -> Iterator[Index]:
@@ -137,11 +130,7 @@ class UvLayout:
 
 
 def unwrap(
-    positions: Doubles,
-    triangles: Index,
-    chart: Index,
-    upright: ArrayLike = UPRIGHT,
-    padding: float = PADDING,
+    positions: Doubles, triangles: Index, chart: Index, upright: ArrayLike = UPRIGHT, padding: float = PADDING
 ) -> UvLayout:
     """Unwrap a mesh into a uv layout in which no triangle is mirrored and none overlaps another.
 

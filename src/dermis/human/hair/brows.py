@@ -46,9 +46,8 @@ class SurfacePoints(NamedTuple):
         length : (n,) of the step on the skin [mm]
         """
         u, v = self.along_x, self.along_y
-        xx, xy, yy, x, y = (
-            _row_dots(a, b) for a, b in ((u, u), (u, v), (v, v), (u, directions), (v, directions))
-        )
+        pairs = (u, u), (u, v), (v, v), (u, directions), (v, directions)
+        xx, xy, yy, x, y = (_row_dots(a, b) for a, b in pairs)
         dx, dy = yy * x - xy * y, xx * y - xy * x
         scale = length / np.sqrt(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy)
         return scale * dx, scale * dy
@@ -81,9 +80,8 @@ class BrowSurface:
         tangents = np.gradient(node_mm.reshape(2, *shape, 3), _CELL_MM, axis=(1, 2))
         self._last = np.array(shape) - 1
         plane = (node_mm * normal).sum(axis=1, keepdims=True)
-        self._node = np.concatenate(
-            [node_mm, normal, *(one.reshape(-1, 3) for one in tangents), plane], axis=1
-        )
+        slopes = [tangent.reshape(-1, 3) for tangent in tangents]
+        self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
     def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
         """Return the skin at points (n,) of the front plane [mm]; outside the grid that at its border.
@@ -113,9 +111,9 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
     ahead, behind = np.minimum(u + 0.02, 1.0), np.maximum(u - 0.02, 0.0)
     along = np.stack([np.interp(ahead, _ALONG, c) - np.interp(behind, _ALONG, c) for c in (_X, _Y)])
     along /= np.linalg.norm(along, axis=0)
-    off = v * np.interp(u, _ALONG, _HALF_HEIGHT)
-    x = np.interp(u, _ALONG, _X) - along[1] * off + rng.normal(0, 0.4, len(u))
-    y = np.interp(u, _ALONG, _Y) + along[0] * off + rng.normal(0, 0.3, len(u))
+    offset = v * np.interp(u, _ALONG, _HALF_HEIGHT)
+    x = np.interp(u, _ALONG, _X) - along[1] * offset + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _ALONG, _Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
     return u, v, x, y
 
 

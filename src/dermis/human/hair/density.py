@@ -25,9 +25,7 @@ _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
 _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
-_HAIRLINE_WAVES = np.array(
-    [[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]]
-)  # wave vectors of the ragged hairline [rad/mm]
+_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of its edge [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # below the hairline, for quads that may have hair
 _HAIR_MARGIN_MM, _BROW_MARGIN_MM = 25.0, 8.0  # around hairy quads, for skin that hair may touch
@@ -46,28 +44,28 @@ class HairDensity(NamedTuple):
     candidates: NDArray[np.bool_]
 
 
-def sample_roots(
-    control_mesh: Mesh, hair_density: HairDensity, per_cm2: float, rng: np.random.Generator
-) -> Roots:
+def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
     """Return random, evenly distributed roots, ordered by quad; none on ears, lips and in the mouth.
 
-    control_mesh : the person's mesh before subdivision
+    mesh : the person's mesh before subdivision
     per_cm2 : density where the relative density is 1 [1/cm2]
     """
-    quad = _hairy_quads(control_mesh)
-    corner_points = quad_corners(control_mesh, quad)
-    counts = np.floor(per_cm2 * quad_areas_cm2(control_mesh, quad) + rng.random(len(quad))).astype(np.int64)
+    quad = _hairy_quads(mesh)
+    corner_points = quad_corners(mesh, quad)
+    counts = np.floor(per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
     starts, chance = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
-    near = hair_density.candidates[corner_points].any(axis=1)
-    which = np.repeat(np.flatnonzero(near), counts[near])
+    near = density.candidates[corner_points].any(axis=1)
+    quad_index = np.repeat(np.flatnonzero(near), counts[near])
     ends = np.cumsum(counts)[near]
-    number = np.arange(len(which)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
-    step = number - (np.cumsum(counts) - counts)[which]
-    place = starts.take(which, axis=0) + step[:, None] * _SEQUENCE_STEPS
-    place -= np.floor(place)
-    values = average_points().T.take(corner_points.T.take(which, axis=1), axis=1)
-    kept = np.flatnonzero(chance.take(number) < hair_density.relative(interpolate_quads(place, values).T))
-    return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
+    number = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
+    step = number - (np.cumsum(counts) - counts)[quad_index]
+    position = starts.take(quad_index, axis=0) + step[:, None] * _SEQUENCE_STEPS
+    position -= np.floor(position)
+    values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
+    relative = density.relative(interpolate_quads(position, values).T)
+    accepted = np.flatnonzero(chance.take(number) < relative)
+    rooted = quad.take(quad_index.take(accepted)).astype(np.int32)
+    return Roots(rooted, position.take(accepted, axis=0).astype(np.float32))
 
 
 def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
@@ -137,12 +135,12 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
 
 def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
     """Return the sum (n,) of a quantity over Gaussian zones, see zones.csv."""
-    column, found = _amount_column(name), np.zeros(len(points))
+    column, total = _amount_column(name), np.zeros(len(points))
     mirrored = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
         distance2 = sum(((mirrored[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
-        found += zone[column] * np.exp(-distance2)
-    return found
+        total += zone[column] * np.exp(-distance2)
+    return total
 
 
 @cache
@@ -154,8 +152,9 @@ def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
     corner_points = quad_corners(mesh, _hairy_quads(mesh))
     near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
     hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
-    points = corner_points[hairy[corner_points].any(axis=1)], quad_corners(mesh, root_finder.brow_grid_roots.quad)
-    for subset, reach in zip(points, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
+    brow_points = quad_corners(mesh, root_finder.brow_grid_roots.quad)
+    subsets = corner_points[hairy[corner_points].any(axis=1)], brow_points
+    for subset, reach in zip(subsets, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
         tree = cKDTree(root_finder.points_mm[np.unique(subset)])
         near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach
     return np.flatnonzero(near)

@@ -166,11 +166,11 @@ def grow_hair(
     point, near = compact_vertices(around)
     root_mm = surface.points_mm[point]
     base_mm, normals = surface.skin.project(root_mm)
-    offsets = _trace_guides(
-        surface.skin, root_mm, base_mm, normals, comb(average_points()[point, :3], normals), knots
-    )
+    guides = comb(average_points()[point, :3], normals)
+    offsets = _trace_guides(surface.skin, root_mm, base_mm, normals, guides, knots)
     t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.frame_vectors[2]
-    found = _vary_directions(_interpolate_guides(quad_weights(roots.position), near, offsets), normal, variation, rng)
+    found = _interpolate_guides(quad_weights(roots.position), near, offsets)
+    found = _vary_directions(found, normal, variation, rng)
     _form_tufts(found, hair.positions_mm, t, variation.tuft_strength, rng)
     tips = found[-1]
     size = np.asarray(variation.frizz * np.sqrt(dot_columns(tips, tips)), np.float32)
@@ -210,9 +210,8 @@ def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets
 
     first = np.arange(0, weight.size + 1, weight.shape[1])
     entries = weight.ravel().astype(np.float32), guide_index.ravel(), first
-    found = csr_array(entries, (len(weight), len(offsets))) @ offsets.reshape(len(offsets), -1).astype(
-        np.float32
-    )
+    weights = csr_array(entries, (len(weight), len(offsets)))
+    found = weights @ offsets.reshape(len(offsets), -1).astype(np.float32)
     return np.ascontiguousarray(found.T).reshape(*offsets.shape[1:], len(weight))
 
 
@@ -349,9 +348,7 @@ def _hair_group(
     radius[:, -1] *= np.float32(_TIP_RADIUS_FACTOR)
     steps = np.diff(offsets, axis=0)
     length = np.sqrt(dot_columns(steps, steps)).sum(axis=0, dtype=np.float64)
-    area = float(
-        np.mean(2.0 * radius.mean(axis=1) * length)
-    )  # of one strand from the side; halved below, as hair is inclined
+    area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # from the side; halved below for inclined hair
     local = np.empty((n, knots, 3), np.float32)
     for c in range(3):
         local[..., c] = dot_columns(offsets, hair.frame_vectors[c]).T

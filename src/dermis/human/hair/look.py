@@ -97,11 +97,10 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
     curl = demographics.weighted_mean(_CURL)
     tight = curl > _CROPPED_CURL
+    short_mm = _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex
     return HairLook(
         style="cropped" if tight else "short",
-        length_mm=_CROPPED_LENGTH_MM
-        if tight
-        else _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex,
+        length_mm=_CROPPED_LENGTH_MM if tight else short_mm,
         density=0.9 - 0.25 * old,
         curl=curl,
         fade=0.55 + 0.3 * demographics.sex,
@@ -121,21 +120,13 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     man = demographics.sex > 0.5
     bare, cropped = (0.12, 0.5) if man else (0.03, 0.25)
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
-    style: Style = (
-        "none"
-        if style_chance < bare
-        else "cropped"
-        if style_chance < cropped or typical.curl > _CROPPED_CURL
-        else "short"
-    )
-    typical_mm = (
-        _CROPPED_LENGTH_MM
-        if style == "cropped"
-        else typical.length_mm
-        if typical.style == "short"
-        else _SHORT_LENGTH_MM
-    )
-    length = typical_mm * float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
+    style: Style = "short"
+    length = typical.length_mm if typical.style == "short" else _SHORT_LENGTH_MM
+    if style_chance < bare:
+        style = "none"
+    elif style_chance < cropped or typical.curl > _CROPPED_CURL:
+        style, length = "cropped", _CROPPED_LENGTH_MM
+    length *= float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))
     return replace(
         typical,

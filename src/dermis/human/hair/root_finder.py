@@ -87,9 +87,9 @@ class RootFinder:
         foremost[query_index[order]] = order  # the last assignment is the foremost triangle
         hit = foremost >= 0
         triangle, weights = triangle[foremost], np.stack([u[foremost], v[foremost], w[foremost]], axis=-1)
-        place = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[triangle], axis=0))
+        position = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[triangle], axis=0))
         quad = np.where(hit, front.quad[triangle], 0)
-        return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), hit
+        return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
@@ -113,8 +113,8 @@ class RootFinder:
         frame = frame[k]
         low = (1 - t)[:, None] * frame[:, 0] + t[:, None] * frame[:, 1]
         high = (1 - t)[:, None] * frame[:, 2] + t[:, None] * frame[:, 3]
-        place = (1 - across)[:, None] * low + across[:, None] * high
-        return Roots(quad[k].astype(np.int32), place.astype(np.float32))
+        position = (1 - across)[:, None] * low + across[:, None] * high
+        return Roots(quad[k].astype(np.int32), position.astype(np.float32))
 
     def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
         points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
@@ -143,12 +143,12 @@ class RootFinder:
         corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALVES[half], axis=1)]
         (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_bounding_box(corner)
         ac = ab + ac
-        seen = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
-        seen &= ((high >= _GRID_LOW) & (low <= _GRID_HIGH)).all(axis=1)
-        quad, half, corner = quad[seen], half[seen], corner[seen]
+        visible = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
+        visible &= ((high >= _GRID_LOW) & (low <= _GRID_HIGH)).all(axis=1)
+        quad, half, corner = quad[visible], half[visible], corner[visible]
         shape = np.ceil((_GRID_HIGH - _GRID_LOW) / _CELL_MM).astype(np.int64)
-        first, last = (np.clip(np.floor((bound[seen] - _GRID_LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
-                       for bound in (low, high))  # fmt: skip
+        grid = (np.floor((bound[visible] - _GRID_LOW) / _CELL_MM).astype(np.int64) for bound in (low, high))
+        first, last = (np.clip(cell, 0, shape - 1) for cell in grid)
         cells: dict[tuple[int, int], list[int]] = {}
         for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
             for x in range(x0, x1 + 1):
@@ -174,8 +174,8 @@ def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
 def eye_centres(mesh: Mesh) -> Doubles:
     """Return the centres (2, 3) of the left and the right eye [mm]."""
     names = [one.name for one in mesh.materials]
-    found = []
+    centres = []
     for name in ("left eye", "right eye"):
-        places = mesh.positions[np.unique(mesh.triangles[mesh.material == names.index(name)])]
-        found.append(0.5 * (places.min(axis=0) + places.max(axis=0)).astype(np.float64))
-    return np.array(found)
+        points = mesh.positions[np.unique(mesh.triangles[mesh.material == names.index(name)])]
+        centres.append(0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64))
+    return np.array(centres)

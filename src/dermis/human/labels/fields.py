@@ -61,7 +61,7 @@ def label_fields() -> Doubles:
     lips, mouth, lids = distances
     left = points[:, 0] > 0
     above = points[:, 1] - np.interp(np.abs(points[:, 0]), *SEAM_MM.T)
-    found = {
+    fields = {
         "mouth_interior": -mouth,
         "upper_lip": np.minimum(lips, above),
         "lower_lip": np.minimum(lips, -above),
@@ -69,9 +69,9 @@ def label_fields() -> Doubles:
         "neck": neck_distance_mm(points),
     }
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
-        found[f"left_{name}"] = np.where(left, values, _OUTSIDE_MM)
-        found[f"right_{name}"] = np.where(left, _OUTSIDE_MM, values)
-    return np.stack([found[name] for name in HUMAN_FIELDS])
+        fields[f"left_{name}"] = np.where(left, values, _OUTSIDE_MM)
+        fields[f"right_{name}"] = np.where(left, _OUTSIDE_MM, values)
+    return np.stack([fields[name] for name in HUMAN_FIELDS])
 
 
 def dense_fields() -> tuple[Doubles, Doubles]:
@@ -104,9 +104,8 @@ def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
     lids = np.isin(around, lid_rings()).any(axis=1)
-    right, left, lashes, hair, beard = map(
-        class_number, ("right_brow", "left_brow", "lashes", "hair", "beard")
-    )
+    names = "right_brow", "left_brow", "lashes", "hair", "beard"
+    right, left, lashes, hair, beard = map(class_number, names)
     fine = np.where(lids, lashes, np.where(middle[:, 0] > 0, left, right))
     coarse = np.where(height_above_hairline(middle) > _HAIRLINE_MARGIN_MM, hair, beard)
     return fine.astype(np.uint8), coarse.astype(np.uint8)
@@ -119,9 +118,8 @@ def _ear_field() -> Doubles:
     within = np.zeros(len(around))
     within[part_quads()["ears"]] = 1.0
     count = len(average_head().positions_mm)
-    ears, quads = (
-        np.bincount(around.ravel(), np.repeat(each, 4), count) for each in (within, np.ones(len(around)))
-    )
+    counted = within, np.ones(len(around))
+    ears, quads = (np.bincount(around.ravel(), np.repeat(each, 4), count) for each in counted)
     return np.asarray(ears / np.maximum(quads, 1.0) - 0.5)
 
 
@@ -188,15 +186,15 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     if head.eyes is None:
         return {}
     mesh, points = head.mesh, head.mesh.points_mm
-    found = {}
+    fields = {}
     frames = head.eyes.frames(head.control, head.control.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDES), strict=False):
-        own = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
-        local = points[own] @ frame[:3, :3].T + frame[:3, 3]
+        eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
+        local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
         inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_MM)
-        found[f"{side}_iris"] = np.full(len(points), _OUTSIDE_MM)
-        found[f"{side}_iris"][own] = inside
-    return found
+        fields[f"{side}_iris"] = np.full(len(points), _OUTSIDE_MM)
+        fields[f"{side}_iris"][eyeball_points] = inside
+    return fields
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
@@ -214,9 +212,9 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     if head.strands is None:
         fields = {name: values for name, values in fields.items() if not name.endswith("brow")}
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
-    off = np.ones(count, bool)
-    off[mesh.point[mesh.triangles[kinds[mesh.material]]]] = False
-    return {name: np.where(off, _OUTSIDE_MM, values) for name, values in fields.items()}
+    outside = np.ones(count, bool)
+    outside[mesh.point[mesh.triangles[kinds[mesh.material]]]] = False
+    return {name: np.where(outside, _OUTSIDE_MM, values) for name, values in fields.items()}
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:

@@ -92,9 +92,8 @@ def _region_map(
     y, x = np.nonzero(atlas.coverage)
     height, width = own_maps.shape
     values = own_maps[y * height // SIZE, x * width // SIZE].astype(np.float64)
-    local_mean = np.maximum(
-        gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0], _MIN_LOCAL_MEAN * values.mean()
-    )
+    local_mean = gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0]
+    local_mean = np.maximum(local_mean, _MIN_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, SIZE), max(width, SIZE)
     detail = np.minimum(_resized(own_maps, shape) / _resized(_picture(atlas, local_mean), shape), _MAX_DETAIL)
@@ -131,15 +130,15 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
 
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
     side = max(_CELL_MM, float(extent.max()) / _MAX_CELLS)
-    place = (points - low) / side + 1
+    position = (points - low) / side + 1
     shape = tuple(int(length) + 4 for length in extent / side)
-    cell = np.ravel_multi_index(tuple(np.rint(place).astype(int).T), shape)
+    cell = np.ravel_multi_index(tuple(np.rint(position).astype(int).T), shape)
     count = np.bincount(cell, minlength=int(np.prod(shape)))
 
     def blur(quantity: Doubles) -> Doubles:
         grid = np.divide(quantity, count, out=np.zeros(len(count)), where=count > 0).reshape(shape)
         smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_TRUNCATE)
-        return np.asarray(map_coordinates(smooth, place.T, order=1))
+        return np.asarray(map_coordinates(smooth, position.T, order=1))
 
     weight = blur(count.astype(np.float64))
     sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in values.T]
@@ -164,7 +163,7 @@ def with_default_regions(head: Head) -> Head:
         return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
 
     try:
-        found = cached_arrays(sources, f"regions {_CACHE_VERSION} {SIZE} {head.name}", missing, make)
+        arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {SIZE} {head.name}", missing, make)
     except DermisError:  # another head with a known name
         return head
-    return replace(head, maps=replace(head.maps, **found))
+    return replace(head, maps=replace(head.maps, **arrays))

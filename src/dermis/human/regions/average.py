@@ -50,9 +50,9 @@ def average_skin() -> DenseSkin:
     head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
     mesh = head.mesh
     quad_index = control_quads(head, np.arange(len(mesh.triangles)))
-    seen = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])
-    places = mesh.positions[mesh.triangles[seen]].astype(np.float64).mean(axis=1)
-    return DenseSkin(quad_index[seen], cKDTree(places))
+    is_outer = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])
+    centroids = mesh.positions[mesh.triangles[is_outer]].astype(np.float64).mean(axis=1)
+    return DenseSkin(quad_index[is_outer], cKDTree(centroids))
 
 
 def landmark_indices() -> dict[str, int]:
@@ -63,13 +63,13 @@ def landmark_indices() -> dict[str, int]:
 def human_landmarks(head: Head) -> dict[str, Doubles]:
     """Return the positions (3,) of all landmarks of a parametric human [mm]."""
     positions_mm = head.positions_mm.astype(np.float64)
-    found = {name: positions_mm[point] for name, point in landmark_indices().items()}
+    landmarks = {name: positions_mm[point] for name, point in landmark_indices().items()}
     mesh = head.mesh
     for name in _EYE_LANDMARKS:
         material = [one.name for one in mesh.materials].index(name)
         corners = np.unique(mesh.triangles[mesh.material == material])
-        found[name] = mesh.positions[corners].astype(np.float64).mean(axis=0)
-    return found
+        landmarks[name] = mesh.positions[corners].astype(np.float64).mean(axis=0)
+    return landmarks
 
 
 def is_human(head: Head) -> bool:
@@ -118,7 +118,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
 @cache
 def part_quads() -> Mapping[str, NDArray[np.int64]]:
     """Return the quads of lips, ears and the inside of the mouth."""
-    found: dict[str, list[NDArray[np.int64]]] = {}
+    runs_by_part: dict[str, list[NDArray[np.int64]]] = {}
     for row in read_rows(__package__, "parts"):
-        found.setdefault(row["part"], []).append(np.arange(int(row["first"]), int(row["last"]) + 1))
-    return {part: np.concatenate(runs) for part, runs in found.items()}
+        runs_by_part.setdefault(row["part"], []).append(np.arange(int(row["first"]), int(row["last"]) + 1))
+    return {part: np.concatenate(runs) for part, runs in runs_by_part.items()}

@@ -82,12 +82,12 @@ def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Double
 def _parse_landmarks(text: str, name: str) -> Landmarks:
     expected = "rows of landmark,x,y,z"
     with parsing(name, expected, KeyError, TypeError, csv.Error):
-        found = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
-    if not found:
+        landmarks = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
+    if not landmarks:
         refuse(name, expected, "there are none", "Add them")
-    for landmark, position in found.items():
+    for landmark, position in landmarks.items():
         checked_array(f"{name}: {landmark}", position, (3,), -_MAX_COORDINATE_MM, _MAX_COORDINATE_MM, "mm")
-    return {landmark: (x, y, z) for landmark, (x, y, z) in found.items()}
+    return {landmark: (x, y, z) for landmark, (x, y, z) in landmarks.items()}
 
 
 def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> None:
@@ -102,9 +102,8 @@ def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> No
         distance = float(np.linalg.norm(skin - position, axis=1).min())
         if not distance < _MAX_SKIN_DISTANCE_MM:
             actual = f"{name!r} is {distance:.0f} mm off the nearest corner of the mesh"
-            refuse(
-                culprit, "points on the skin, in mm from the head's centre", actual, "Correct its position"
-            )
+            expected = "points on the skin, in mm from the head's centre"
+            refuse(culprit, expected, actual, "Correct its position")
     points_mm = np.array(list(landmarks.values()))
     singular_values = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)
     if singular_values[-1] / np.sqrt(len(points_mm)) < _MIN_DEPTH_MM:

@@ -115,8 +115,8 @@ def load_region_table(name: str | Path) -> RegionTable:
     Raises DermisError for missing and unknown regions and for invalid numbers.
     """
     if str(name) == DEFAULT_TABLE:
-        own = resources.files(__package__).joinpath("default.toml").read_text("utf-8")
-        return _table(tomllib.loads(own), Path(DEFAULT_TABLE))
+        text = resources.files(__package__).joinpath("default.toml").read_text("utf-8")
+        return _table(tomllib.loads(text), Path(DEFAULT_TABLE))
     return _table(read_toml(name, "default, or regions in TOML"), Path(name))
 
 

@@ -71,9 +71,8 @@ def zone_table(recession: float = 0.0) -> Floats:
     for row in rows:
         if row["zone"] == _CROWN:
             row["hair"] = str(recession * float(row["hair"]))
-    centres, radii, amounts = (
-        float_columns(rows, names) for names in ("x y z", "rx ry rz", " ".join(ZONE_AMOUNTS))
-    )
+    columns = "x y z", "rx ry rz", " ".join(ZONE_AMOUNTS)
+    centres, radii, amounts = (float_columns(rows, names) for names in columns)
     none = np.zeros((len(rows), 1))
     return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
 
@@ -116,13 +115,10 @@ def fold_curves() -> Folds:
         rows = list(group)
         curve = _spline_points(float_columns(rows, "x y z"))
         knots.append(np.column_stack([curve, np.linspace(0.0, 1.0, len(curve))]))
-        table_sizes = [float(rows[0][name]) for name in ("width", "young", "old")]
+        dimensions = [float(rows[0][name]) for name in ("width", "young", "old")]
         movement = rows[0]["movement"]
-        curves.append(
-            np.array(
-                [*_bounding_sphere(curve), *table_sizes, 1 + MOVEMENTS.index(movement) if movement else 0]
-            )
-        )
+        number = 1 + MOVEMENTS.index(movement) if movement else 0
+        curves.append(np.array([*_bounding_sphere(curve), *dimensions, number]))
     first = np.cumsum([0, *map(len, knots)]).astype(np.uint32)
     return Folds(np.concatenate(knots).astype(np.float32), np.stack(curves).astype(np.float32), first)
 
@@ -144,8 +140,8 @@ def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return samples of the smooth curve through the knots."""
     from scipy.interpolate import CubicSpline
 
-    place = np.arange(len(knots))
-    return np.asarray(CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _sample_count(len(knots)))))
+    index = np.arange(len(knots))
+    return np.asarray(CubicSpline(index, knots)(np.linspace(0, len(knots) - 1, _sample_count(len(knots)))))
 
 
 def _bounding_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:

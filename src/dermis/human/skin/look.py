@@ -124,11 +124,10 @@ class Demographics(NamedTuple):
 def typical_skin(demographics: Demographics) -> SkinLook:
     """Return the typical skin by ancestry, age and sex."""
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    log_melanin = {name: math.log(fraction) for name, fraction in _MELANIN.items()}
     lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD - _AGE_SPOTS_FROM)
     return SkinLook(
-        melanin=math.exp(
-            demographics.weighted_mean({name: math.log(share) for name, share in _MELANIN.items()})
-        ),
+        melanin=math.exp(demographics.weighted_mean(log_melanin)),
         eumelanin=demographics.weighted_mean(_EUMELANIN),
         blood=0.009,
         freckles=demographics.weighted_mean(_FRECKLES),
@@ -143,10 +142,8 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eyes: brown, lighter with more European ancestry."""
-    return EyeLook(
-        eumelanin=demographics.weighted_mean(_IRIS),
-        redness=0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG),
-    )
+    redness = 0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG)
+    return EyeLook(eumelanin=demographics.weighted_mean(_IRIS), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:

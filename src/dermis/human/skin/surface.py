@@ -124,5 +124,5 @@ def _log_mm_per_uv(uv: Floats, points_mm: Floats, triangles: NDArray[np.int32]) 
 def _touches_border(triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
     key = (sides[..., 0] * (int(triangles.max()) + 1) + sides[..., 1]).ravel()
-    _, which, count = np.unique(key, return_inverse=True, return_counts=True)
-    return np.asarray((count[which] == 1).reshape(-1, 3).any(axis=1))
+    _, side_index, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray((count[side_index] == 1).reshape(-1, 3).any(axis=1))

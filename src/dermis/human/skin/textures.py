@@ -127,10 +127,10 @@ def noise_table() -> NDArray[np.float32]:
     """
     rows = list(_octave_rows())
     table = np.zeros((len(rows), 16), np.float32)
-    for row, (matrix, finest_mm, gain, seed, *which) in zip(table, rows, strict=True):
+    for row, (matrix, finest_mm, gain, seed, *indices) in zip(table, rows, strict=True):
         row[:12].reshape(3, 4)[:, :3] = matrix
         row[3], row[7] = finest_mm, gain
-        row[11:15] = np.array([seed, *which], np.uint32).view(np.float32)
+        row[11:15] = np.array([seed, *indices], np.uint32).view(np.float32)
     return table
 
 
@@ -141,11 +141,8 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
         space, region = NOISE_SPACES.index(noise.space), NOISE_REGIONS.index(noise.region)
         for _ in range(noise.octaves):
             yield matrix, finest if noise.antialiased else 0.0, gain, seed, noise_index, space, region
-            matrix, gain, finest = (
-                matrix @ _OCTAVE_ROTATION / _OCTAVE_SCALE,
-                gain * noise.gain,
-                finest * _OCTAVE_SCALE,
-            )
+            matrix = matrix @ _OCTAVE_ROTATION / _OCTAVE_SCALE
+            gain, finest = gain * noise.gain, finest * _OCTAVE_SCALE
             seed += 1
 
 

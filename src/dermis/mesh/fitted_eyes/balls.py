@@ -62,9 +62,8 @@ class _Piece:
             return f"deviates from a ball by {deviation:.0%} of its radius, more than {MAX_DEVIATION:.0%}"
         if not low <= radius <= high:
             return f"is a ball of {radius:.1f} mm radius, not of {low:g} to {high:g} mm"
-        return (
-            "" if self.covered_fraction >= _MIN_COVERED else f"is only {self.covered_fraction:.0%} of a ball"
-        )
+        covered = self.covered_fraction
+        return "" if covered >= _MIN_COVERED else f"is only {covered:.0%} of a ball"
 
 
 def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
@@ -119,13 +118,9 @@ def _with_gaze(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) ->
     ahead /= np.linalg.norm(ahead)
     balls = []
     for ball in (left, right):
-        parts = [
-            one
-            for one in pieces
-            if one is ball or _distance_in_radii(positions[one.points], ball).max() < _PART_RADII
-        ]
-        points = np.concatenate([one.points for one in parts])
-        area = np.concatenate([one.area for one in parts])
+        farthest = [0.0 if p is ball else _distance_in_radii(positions[p.points], ball).max() for p in pieces]
+        parts = [piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _PART_RADII]
+        points, area = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "area"))
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
         gaze = centre + _FOCUS_MM * ahead - ball.sphere.centre if axis is None else axis
         balls.append(Ball(ball.sphere, gaze / np.linalg.norm(gaze), axis is not None, points))

@@ -38,18 +38,14 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
     """
     skeleton, bones = _with_eye_bones(rig, eyeballs)
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
-    rotations, targets = list(rig.bone_rotations), rig.targets
+    rotations, targets, followers = list(rig.bone_rotations), rig.targets, list(rig.rigid_followers)
     for eyeball, bone, begin in zip(eyeballs, bones, first, strict=False):
         origin = np.array(skeleton.origin_mm[bone])
         own, shifts = _rigid_targets(rig, eyeball, skeleton.names[bone], origin)
         rotations += own
-        targets = _with_shifts(targets, shifts, begin + np.arange(len(eyeball.points)))
-    followers = [
-        RigidFollowers(
-            one.replaced.astype(np.int32), np.arange(begin, begin + len(one.points), dtype=np.int32)
-        )
-        for one, begin in zip(eyeballs, first, strict=False)
-    ]
+        points = begin + np.arange(len(eyeball.points))
+        targets = _with_shifts(targets, shifts, points)
+        followers.append(RigidFollowers(eyeball.replaced.astype(np.int32), points.astype(np.int32)))
     positions = np.concatenate([rig.positions_mm, *(one.points for one in eyeballs)]).astype(np.float32)
     return replace(
         rig,
@@ -57,7 +53,7 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
         targets=targets,
         skeleton=skeleton,
         bone_rotations=tuple(rotations),
-        rigid_followers=(*rig.rigid_followers, *followers),
+        rigid_followers=tuple(followers),
     )
 
 

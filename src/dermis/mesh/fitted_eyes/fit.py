@@ -68,22 +68,19 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     replaced = _ball_triangles(mesh, control.stencils, balls)
     shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
     points, quads = build_eyeball(_SIDE)
-    positions = [_eyeball_points(ball.sphere, shape) for ball, shape in zip(balls, shapes, strict=True)]
-    eyeballs = [
-        Eyeball(ball.sphere.centre, own, ball.points) for ball, own in zip(balls, positions, strict=True)
-    ]
+    pairs = list(zip(balls, shapes, strict=True))
+    eyeballs = [Eyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs]
     vertex_point = mesh.point if control.vertex_point is None else control.vertex_point
     rig = with_eyeballs(replace(control, vertex_point=vertex_point), eyeballs)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
         rig = replace(rig, stencils=_extended(control.stencils, begin, 2 * count))
-    new_mesh = _replace_eyeballs(mesh, replaced, positions, quads)
-    apex, back, side = (
-        np.array([begin + k, begin + count + k], np.int32) for k in eyeball.axis_points(_SIDE)
-    )
+    new_mesh = _replace_eyeballs(mesh, replaced, [one.points for one in eyeballs], quads)
+    starts = np.array([begin, begin + count], np.int32)
+    apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
     radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
-    gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in zip(balls, shapes, strict=True)])
+    gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in pairs])
     eyes = Eyes(apex, back, side, material, look or EyeLook(), radii, offsets, gaze)
     return replace(head, mesh=new_mesh, rig=rig, eyes=eyes)
 
@@ -112,9 +109,8 @@ def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
             axis = lid.direction(side * outwards, up)
             sunk = lid.sunk_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
-        shapes.append(
-            _Shape(axis, radius, limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk, scale)
-        )
+        offset = limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk
+        shapes.append(_Shape(axis, radius, offset, scale))
     return shapes
 
 
@@ -128,15 +124,13 @@ def _shape_points(shape: _Shape) -> Doubles:
     points, _ = build_eyeball(_SIDE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
-    centre = cornea_centre_mm() - shape.centre_offset_mm
-    limbus = (shape.radius_mm**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # distance along the axis
-    sclera_edge, edge = float(np.arccos(limbus / shape.radius_mm)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
+    centre, radius = cornea_centre_mm() - shape.centre_offset_mm, shape.radius_mm
+    limbus = (radius**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # distance along the axis
+    sclera_edge, edge = float(np.arccos(limbus / radius)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
     on_cornea = float(np.arccos((limbus - centre) / CORNEA_MM)) * angle / edge
     on_sclera = sclera_edge + (angle - edge) * (np.pi - sclera_edge) / (np.pi - edge)
-    across = np.where(angle < edge, CORNEA_MM * np.sin(on_cornea), shape.radius_mm * np.sin(on_sclera))
-    along = np.where(
-        angle < edge, centre + CORNEA_MM * np.cos(on_cornea), shape.radius_mm * np.cos(on_sclera)
-    )
+    across = np.where(angle < edge, CORNEA_MM * np.sin(on_cornea), radius * np.sin(on_sclera))
+    along = np.where(angle < edge, centre + CORNEA_MM * np.cos(on_cornea), radius * np.cos(on_sclera))
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), along], axis=1)
 
 
@@ -159,21 +153,18 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
     remains[np.concatenate(balls)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
-    colours = [mesh.materials[mesh.material[ball[0]]].colour for ball in balls]
-    new_materials = [
-        Material(name, "opaque", colour, eye=True) for name, colour in zip(_NAMES, colours, strict=True)
-    ]
-    new = _eyeball_meshes(positions, quads, tuple(new_materials))
+    replaced = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
+    pairs = zip(_NAMES, replaced, strict=True)
+    new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
+    new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
     new_index[remains] = np.arange(np.count_nonzero(remains))
     old_quads = new_index[mesh.quads][(new_index[mesh.quads] >= 0).all(axis=1)]
     faces = np.count_nonzero(remains)
-    vertex_arrays = {
-        name: np.concatenate([getattr(mesh, name)[vertex], getattr(new, name)])
-        for name in ("positions", "normals", "uv")
-    }
     return Mesh(
-        **vertex_arrays,
+        positions=np.concatenate([mesh.positions[vertex], new.positions]),
+        normals=np.concatenate([mesh.normals[vertex], new.normals]),
+        uv=np.concatenate([mesh.uv[vertex], new.uv]),
         point=np.concatenate([mesh.point[vertex], int(mesh.point.max()) + 1 + new.point]).astype(np.int32),
         triangles=np.concatenate([triangles.reshape(-1, 3), len(vertex) + new.triangles]).astype(np.int32),
         material=np.concatenate([material.reshape(-1), len(used) + new.material]).astype(np.int32),

@@ -10,6 +10,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Index
 from dermis.mesh.eyeball import CORNEA_MM, limbus_plane_mm
 from dermis.mesh.fitted_eyes.balls import Sphere
+from dermis.mesh.geometry import cross_2d, expand_runs
 
 _RAYS, _EXTENT = 49, 0.9
 """Rays along each side of the square before the eye, and half its side in radii of the ball."""
@@ -53,10 +54,9 @@ class Lids:
         triangle, ray = self._candidate_pairs(corners)
         a, b, c = np.moveaxis(corners[triangle], 1, 0)
         b, c, p = b - a, c - a, self.ray_positions[ray] - a[:, :2]
-        area = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
+        area = cross_2d(b, c)
         area = np.where(np.abs(area) < 1e-9, np.inf, area)
-        u = (p[:, 0] * c[:, 1] - p[:, 1] * c[:, 0]) / area
-        v = (b[:, 0] * p[:, 1] - b[:, 1] * p[:, 0]) / area
+        u, v = cross_2d(p, c) / area, cross_2d(b, p) / area
         depth = a[:, 2] + u * b[:, 2] + v * c[:, 2]
         front = np.full(_RAYS**2, -np.inf)
         inside = (u >= 0) & (v >= 0) & (u + v <= 1)
@@ -70,9 +70,7 @@ class Lids:
         first = np.maximum(np.ceil(cell.min(axis=1)), 0).astype(np.int64)
         last = np.minimum(np.floor(cell.max(axis=1)), _RAYS - 1).astype(np.int64)
         size = np.maximum(last - first + 1, 0)
-        count = size.prod(axis=1)
-        triangle = np.repeat(np.arange(len(corners)), count)
-        index = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+        triangle, index = expand_runs(np.zeros_like(size[:, 0]), size.prod(axis=1))
         row, column = np.divmod(index, size[triangle, 0])
         return triangle, (first[triangle, 1] + row) * _RAYS + first[triangle, 0] + column
 
@@ -110,9 +108,7 @@ class Lids:
         centre = scale * (limbus_plane_mm(self.ball.radius / scale) - limbus_plane_mm(CORNEA_MM))
         distance2 = ((self.ray_positions - centre * local[:2]) ** 2).sum(axis=1)
         cornea = centre * local[2] + np.sqrt(np.maximum(radius**2 - distance2, 0.0))
-        covered = (
-            (distance2 < radius**2) & (self.obstacle_front > self.ball_front) & (cornea > self.ball_front)
-        )
+        covered = (distance2 < radius**2) & (np.minimum(self.obstacle_front, cornea) > self.ball_front)
         protrusion = float((cornea - self.obstacle_front)[covered].max(initial=0.0))
         deepest = max(centre + radius - self.ball.radius - _MIN_BULGE_MM, 0.0)
         return float(np.clip(protrusion - _MAX_PROTRUSION_MM, 0.0, deepest))

@@ -19,7 +19,7 @@ from dermis.apps.inverse.fitting.light_basis import BASIS, solve_normal_equation
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, light_tint, solve_fit
-from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, FitPoint, prior_point, tangents
+from dermis.apps.inverse.fitting.unknowns import FitPoint, prior_point, tangents
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
@@ -93,32 +93,32 @@ class InitialGuess:
 
     def _nearest(self, logs: Floats, count: int) -> list[int]:
         """Return the suns with the smallest residual, chosen greedily."""
-        suns_found: list[int] = []
+        selected: list[int] = []
         for _ in range(count):
-            remaining = [k for k in range(len(self.point.suns)) if k not in suns_found]
-            suns_found.append(min(remaining, key=lambda k: self._cost(logs, [*suns_found, k])))
-        return suns_found
+            remaining = [k for k in range(len(self.point.suns)) if k not in selected]
+            selected.append(min(remaining, key=lambda k: self._cost(logs, [*selected, k])))
+        return selected
 
     def _cost(self, logs: Floats, suns: list[int]) -> float:
         """Return the squared residual for other skin values.
 
         Diffuse radiance is scaled by the skin's colour, specular radiance by its strength.
         """
-        chosen = np.array([*range(BASIS), *(BASIS + k for k in suns)])
+        lights = np.array([*range(BASIS), *(BASIS + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
         ratio = self._colour(logs) / self._colour(self.point.logs)
-        gram, right = np.zeros((len(chosen),) * 2), np.zeros(len(chosen))
+        gram, right = np.zeros((len(lights),) * 2), np.zeros(len(lights))
         for c in range(3):
             G, r, s = self._grams[c], self._rights[c], ratio[c]
-            diffuse, specular = np.ix_(chosen, chosen), np.ix_(n + chosen, n + chosen)
-            across = G[np.ix_(chosen, n + chosen)]
+            diffuse, specular = np.ix_(lights, lights), np.ix_(n + lights, n + lights)
+            across = G[np.ix_(lights, n + lights)]
             gram += s**2 * G[diffuse] + s * strength * (across + across.T) + strength**2 * G[specular]
-            right += s * r[chosen] + strength * r[n + chosen]
+            right += s * r[lights] + strength * r[n + lights]
         return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
     def _colour(self, logs: Floats) -> Floats:
-        shares = np.exp(logs[: len(SKIN_UNKNOWNS)])
-        return np.asarray(self._table.lookup(shares[:1], shares[1:2])[0], np.float64)
+        melanin, blood = np.exp(logs[:1]), np.exp(logs[1:2])
+        return np.asarray(self._table.lookup(melanin, blood)[0], np.float64)
 
 
 def fit(
@@ -205,14 +205,7 @@ def fit(
     subject = fit_subject(head, camera)
     if landmarks is not None:
         subject = align_to_landmarks(subject, landmarks, photograph.size)
-    settings = Settings(
-        size=small.size,
-        atlas=atlas,
-        shadow_size=SHADOW_SIZE,
-        samples=4,
-        strands=False,
-        technique="texture-space",
-    )
+    settings = Settings(size=small.size, atlas=atlas, shadow_size=SHADOW_SIZE, samples=4, strands=False)
     with TemporaryDirectory() as folder:
         frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         candidate = _find_skin(frames, small)
@@ -246,8 +239,10 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     frames.find_mask(candidate, photo.unclipped)
     frames.mask &= photo.linear.max(axis=2) > 0.0
     if frames.mask.sum() < _MIN_PIXELS:
-        actual = f"{int(frames.mask.sum())} pixels of it are neither clipped nor black"
-        refuse("photo", "skin where the head is", actual, "Check camera and exposure, or take a larger side")
+        actual = f"only {int(frames.mask.sum())} of its pixels are neither clipped nor black"
+        refuse(
+            "photo", "skin at the head's position", actual, "Check camera and exposure, or take a larger side"
+        )
     return candidate
 
 
@@ -268,5 +263,5 @@ def _checked_white(white: WhitePoint) -> Floats:
             actual = f"got {format_value(white)}"
             refuse("white", '"specular" or red, green and blue', actual, "Write white=(1, 1, 1)")
         return np.ones(3)
-    suns_found = checked_array("white", white, (3,), 0.01, 100.0)
-    return np.asarray(suns_found / suns_found[1], np.float64)
+    colour = checked_array("white", white, (3,), 0.01, 100.0)
+    return np.asarray(colour / colour[1], np.float64)

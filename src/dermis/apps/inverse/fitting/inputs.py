@@ -66,14 +66,14 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     image = read_image(source) if isinstance(source, str | Path | EmbeddedPicture) else np.asarray(source)
     name = source if isinstance(source, str | Path | EmbeddedPicture) else "photo"
     if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _MIN_SIDE:
-        expected = f"a picture (h, w, 3) in colour of {_MIN_SIDE} pixels a side at least"
+        expected = f"a colour picture (h, w, 3) of at least {_MIN_SIDE} pixels a side"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
     image = image[..., :3]
     if image.dtype.kind == "f":
         if not np.isfinite(image).all() or image.min() < 0.0 or image.max() <= 0.0:
-            refuse(name, "light, from 0", "some is negative, infinite or no number", "Export it again")
+            refuse(name, "radiance of 0 or more", "some is negative or not finite", "Export it again")
         return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
     levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
     max_level = np.iinfo(levels.dtype).max
@@ -161,5 +161,5 @@ def _without_light(scene: Scene) -> Scene:
         fixed_pigments |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
     if scene.skin.pigments is not None:
         fixed_pigments |= scene.skin.pigments.overrides()
-    held = {"profile": SPECTRAL, "pigments": Pigments(**fixed_pigments)}
-    return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | held)))
+    fixed = {"profile": SPECTRAL, "pigments": Pigments(**fixed_pigments)}
+    return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | fixed)))

@@ -33,6 +33,7 @@ _TARGET_SD = 0.15
 _TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
 _TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
 _ITERATIONS = 2
+_IDENTITY_STEP = 0.2  # of finite differences, in standard deviations of the prior
 _DISTANCE_MM = 1100.0
 _FRAME_MM = 300.0
 
@@ -47,20 +48,19 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
     """
     name, pixels_by_name = read_landmarks(landmarks, size)
     person, head = subject.person, subject.scene.head
-    shape = _LandmarkModel.for_head(person, head, name, pixels_by_name)
-    pixels = np.array([pixels_by_name[one] for one in shape.names])
-    log_focal = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
-    solution = np.concatenate([np.zeros(6), [log_focal], np.zeros(shape.count)])
+    model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
+    pixels = np.array([pixels_by_name[one] for one in model.names])
+    solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.count)])
     solution[:3], solution[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
     for _ in range(_ITERATIONS if person else 1):
-        solution = _solve(shape, pixels, size, solution)
+        solution = _solve(model, pixels, size, solution)
         if person is not None:
-            person = shape.person(solution[7:])
-            shape = _LandmarkModel.for_head(person, head, name, pixels_by_name)
+            person = model.person(solution[7:])
+            model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
             solution[7:] = 0.0
     if person is not None:
         subject = fit_subject(person)
-        solution = _solve(replace(shape, derivatives=shape.derivatives[:0]), pixels, size, solution[:7])
+        solution = _solve(replace(model, derivatives=model.derivatives[:0]), pixels, size, solution[:7])
     return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(solution, size)))
 
 
@@ -94,14 +94,13 @@ class _LandmarkModel:
         centre = np.array(person.head(subdivide=0).centre_mm)
         targets = (one for one in human_targets() if one.startswith(_TARGET_FOLDERS))
         details = tuple(one for one in targets if one.endswith(_TARGET_SUFFIXES))
-        partial = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
 
-        def places_of(other: Human) -> Floats:
+        def positions_of(other: Human) -> Floats:
             return np.asarray(_interpolate(points, indices, other.positions_mm.astype(np.float64)) - centre)
 
-        base, count = places_of(person), len(_MACRO_NAMES) + len(details)
-        derivatives = np.stack([_derivative(partial, places_of, base, k, count) for k in range(count)])
-        return replace(partial, positions=base, derivatives=derivatives)
+        model = cls(names, positions_of(person), np.zeros((0, 0, 3)), person, details)
+        unknowns = range(len(_MACRO_NAMES) + len(details))
+        return replace(model, derivatives=np.stack([_derivative(model, positions_of, k) for k in unknowns]))
 
     @property
     def count(self) -> int:
@@ -121,17 +120,20 @@ class _LandmarkModel:
         return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
 
 
-def _derivative(
-    shape: _LandmarkModel, places_of: Callable[[Human], Floats], base: Floats, k: int, count: int
-) -> Floats:
+def _derivative(model: _LandmarkModel, positions_of: Callable[[Human], Floats], k: int) -> Floats:
     """Return the derivative (n, 3) by one unknown of the identity, in the direction away from its limit."""
-    step = np.zeros(count)
-    step[k] = 0.2
-    change = places_of(shape.person(step)) - base
-    if not change.any():
-        step[k] = -0.2
-        change = places_of(shape.person(step)) - base
-    return np.asarray(change / step[k])
+    for step in _IDENTITY_STEP, -_IDENTITY_STEP:
+        identity = np.zeros(len(_MACRO_NAMES) + len(model.details))
+        identity[k] = step
+        change = positions_of(model.person(identity)) - model.positions
+        if change.any():
+            break
+    return np.asarray(change / step)
+
+
+def _log_focal(size: tuple[int, int]) -> float:
+    """Return the logarithm of a portrait's focal length [pixel], the mean of its prior."""
+    return float(np.log(size[1] * _DISTANCE_MM / _FRAME_MM))
 
 
 def _prior_sd(name: str) -> float:
@@ -146,18 +148,18 @@ def _interpolate(points: LandmarkPoints, indices: NDArray[np.int64], positions: 
     return np.asarray(np.einsum("nk,nkc->nc", points.weight[indices], positions[points.point[indices]]))
 
 
-def _solve(shape: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
+def _solve(model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
     """Return rotation, translation, logarithm of the focal length and identity by least squares."""
     from scipy.optimize import least_squares
 
-    prior_median = np.log(size[1] * _DISTANCE_MM / _FRAME_MM)
+    prior_median = _log_focal(size)
 
     def residuals(x: Floats) -> Floats:
-        positions = shape.positions + np.einsum("u,unc->nc", x[7:], shape.derivatives)
+        positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)
         error = (_project(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
         return np.concatenate([error.ravel(), [(x[6] - prior_median) / _FOCAL_SD], x[7:]])
 
-    scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(shape.count)])
+    scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.count)])
     return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
@@ -194,18 +196,18 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
     """
     text = read_text(path, _EXPECTED)
     if Path(path).suffix.lower() == ".json":
-        name, solution = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
+        name, pixels = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
     else:
         with parsing(path, _EXPECTED, KeyError, TypeError, csv.Error):
             rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
-        solution = {str(one): np.array([x, y]) for one, x, y in rows}
-        name = _BY_COUNT.get(len(solution), "")
-    if len(solution) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in solution.values()):
-        refuse(path, f"{_MIN_LANDMARKS} landmarks at least", f"got {len(solution)}", "Correct the file")
+        pixels = {str(one): np.array([x, y]) for one, x, y in rows}
+        name = _BY_COUNT.get(len(pixels), "")
+    if len(pixels) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in pixels.values()):
+        refuse(path, f"at least {_MIN_LANDMARKS} landmarks", f"got {len(pixels)}", "Correct the file")
     if name not in SETS:
         expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
-        refuse(path, expected, f"got {len(solution)}", "Give all of a set")
-    return name, solution
+        refuse(path, expected, f"got {len(pixels)}", "Give all landmarks of a set")
+    return name, pixels
 
 
 def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:

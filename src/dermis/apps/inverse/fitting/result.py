@@ -84,15 +84,10 @@ class FitResult:
         systematic errors of the renderer.
         """
         uncertainty, sd = self.uncertainty, self.uncertainty.sd
-        skin = {
-            one.name: {
-                "value": self.values[one.name],
-                "relative_sd": sd[one.name],
-                "usual": one.prior_median,
-                "believed_relative_sd": one.prior_sd,
-            }
-            for one in SKIN_UNKNOWNS
-        }
+        skin = {}
+        for one in SKIN_UNKNOWNS:
+            prior = {"usual": one.prior_median, "believed_relative_sd": one.prior_sd}
+            skin[one.name] = {"value": self.values[one.name], "relative_sd": sd[one.name], **prior}
         suns = []
         for k, (direction, strength) in enumerate(self.suns):
             sd_degrees = np.degrees([sd[f"sun {k + 1} {name}"] for name in ("across", "along")])
@@ -119,21 +114,20 @@ class FitResult:
         """Return descriptions of priors and given values."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
-        sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of where the search began"
+        sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of the initial guess"
         white = f"neutral within {100 * WHITE_SD:.0f} %"
         if "white red" not in self.uncertainty.sd:
             white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
-        held = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
-        skin_priors = [
-            f"{one.name}: around {one.prior_median:g} within a factor of {np.exp(one.prior_sd):.2g}"
-            for one in SKIN_UNKNOWNS
-        ]
+        fixed = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
         return [
-            *skin_priors,
+            *(
+                f"{u.name}: {u.prior_median:g} within a factor of {np.exp(u.prior_sd):.2g}"
+                for u in SKIN_UNKNOWNS
+            ),
             *([sun] if self.suns else []),
             f"colour of the light: {white}",
             f"exposure: given, {self.exposure:g}; the strength of the light is free",
-            f"held: {held}",
+            f"fixed: {fixed}",
         ]
 
 
@@ -144,8 +138,8 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
     """
     person, table = result.subject.person, result.subject.table
     if person is None and not table:
-        actual = "it came as a head that only its maker knows"
-        refuse("head", "a person by name, or a Human, for a file to name", actual, "Fit the Human itself")
+        actual = "got a head without a name or file"
+        refuse("head", "a Human or a head with a name, for scene.toml", actual, "Fit the Human itself")
     written = []
     radiance = panorama(result.strengths[:BASIS])
     if radiance.max() > 0.0:
@@ -181,7 +175,7 @@ def fitted_scene(result: FitResult, folder: Path) -> Scene:
 def pictures(result: FitResult) -> dict[str, Floats]:
     """Return linear pictures: photograph, fit, and their difference on grey within the mask."""
     peak = max(float(np.percentile(result.photo[result.mask], 99.5)), 1e-9)
-    sd_degrees = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)
+    difference = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)
     pictures_by_name = {"photo": result.photo / max(peak, 1.0), "fit": result.picture / max(peak, 1.0)}
     pictures_by_name = {name: np.clip(image, 0.0, 1.0) for name, image in pictures_by_name.items()}
-    return pictures_by_name | {"difference": np.clip(_NO_DIFFERENCE + sd_degrees, 0.0, 1.0) ** 2.2}
+    return pictures_by_name | {"difference": np.clip(_NO_DIFFERENCE + difference, 0.0, 1.0) ** 2.2}

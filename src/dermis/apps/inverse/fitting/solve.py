@@ -232,12 +232,8 @@ def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -
         if abs(correlation[a, b]) > _MIN_CORRELATION and names[a][:5] != names[b][:5]
     )
     singular_values = np.linalg.svd(J * prior_sd, compute_uv=False)
-    return Uncertainty(
-        dict(zip(names, map(float, sd), strict=False)),
-        undetermined,
-        correlated,
-        tuple(map(float, singular_values)),
-    )
+    sd_by_name = dict(zip(names, map(float, sd), strict=False))
+    return Uncertainty(sd_by_name, undetermined, correlated, tuple(map(float, singular_values)))
 
 
 def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:

@@ -105,9 +105,8 @@ def recolour(
     change = shader.record("Change", factors=factors, added=added)
     output = np.empty(residual.shape, np.float32)
     for rows in row_strips(*estimate.shape[:2]):
-        inputs = [
-            texture_from_array(device, _rgba(one[rows]), _FORMAT, "maps") for one in (estimate, residual)
-        ]
+        maps = (_rgba(one[rows]) for one in (estimate, residual))
+        inputs = [texture_from_array(device, one, _FORMAT, "maps") for one in maps]
         size = inputs[0].size[:2]
         texture = make_texture(device, size, _FORMAT)
         bound: MutableBindings = {"model": _model_record(shader, model, 1.0, 0), "table": table}

@@ -67,10 +67,9 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
     middle = nodes[(_NODES // 2) * _NODES + _NODES // 2]
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
     profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_CORNERS, strict=True)]
-    over_map = _interpolate_map(weights[:, 1:].reshape(_NODES, _NODES, 2), axes, unmixed)
-    return ProfileMixture(
-        shared_gaussians(profiles), over_map, _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
-    )
+    weight_map = _interpolate_map(weights[:, 1:].reshape(_NODES, _NODES, 2), axes, unmixed)
+    errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
+    return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
 
 
 def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:

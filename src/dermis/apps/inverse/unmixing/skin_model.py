@@ -61,10 +61,9 @@ class SkinModel:
         next_k = min(1, third_count - 1)
         corners = [(k + (d & next_k), i + (e >> 1), j + (e & 1)) for d in (0, 1) for e in range(4)]
         c = np.array([self.log_colours[corner] for corner in corners])
-        near, across, both = c[0::2], c[1::2], v[:, None]
-        rows = near + both * (across - near)  # by third unknown and melanin
-        along_q = across - near
-        u, w = u[:, None], w[:, None]
+        u, v, w = u[:, None], v[:, None], w[:, None]
+        along_q = c[1::2] - c[0::2]
+        rows = c[0::2] + v * along_q  # by third unknown and melanin
         layers = rows[0::2] + u * (rows[1::2] - rows[0::2])
         by_p = _lerp(rows[1::2] - rows[0::2], w) * (nodes - 1)
         by_q = _lerp(along_q[0::2] + u * (along_q[1::2] - along_q[0::2]), w) * (nodes - 1)
@@ -83,9 +82,9 @@ class SkinModel:
 
 def _cell(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
     """Return the node below each position in [0, 1], and the position between it and the next node."""
-    node_position = np.clip(fraction, 0.0, 1.0) * (nodes - 1)
-    before = np.clip(node_position.astype(np.int64), 0, max(nodes - 2, 0))
-    return before, node_position - before
+    position = np.clip(fraction, 0.0, 1.0) * (nodes - 1)
+    node = np.clip(position.astype(np.int64), 0, max(nodes - 2, 0))
+    return node, position - node
 
 
 def _lerp(pair: Floats, fraction: Floats) -> Floats:

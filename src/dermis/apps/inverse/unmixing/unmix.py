@@ -77,13 +77,9 @@ class PigmentChange:
 
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
         """Return factors and constants for melanin, blood and the third unknown, by medians of the maps."""
-        factors, added = zip(
-            self.melanin.scale_and_offset(melanin),
-            self.blood.scale_and_offset(blood),
-            (1.0, 0.0),
-            strict=True,
-        )
-        return np.array(factors), np.array(added)
+        pairs = self.melanin.scale_and_offset(melanin), self.blood.scale_and_offset(blood), (1.0, 0.0)
+        factors, added = np.array(pairs).T
+        return factors, added
 
 
 def parse_fraction_change(option: str, text: str) -> FractionChange:
@@ -148,9 +144,9 @@ class UnmixResult:
         if skin.any():
             above = {f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _DELTA_E_LIMITS}
             result["delta_e"] = _percentiles(delta_e[skin]) | above
-            for name, share in fractions.items():
+            for name, fraction in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
-                result[name] = _percentiles(share[skin]) | sd
+                result[name] = _percentiles(fraction[skin]) | sd
         return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
@@ -168,19 +164,19 @@ class UnmixResult:
         target = skin_model(change.applied_to(self.skin), "none") if fixed else self.model
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
         third = prior_mean if fixed or self.third is None else self.third
-        made = np.stack([self.melanin, self.blood, third], axis=-1)
+        estimate = np.stack([self.melanin, self.blood, third], axis=-1)
         factors, added = change.scales_and_offsets(self._median(self.melanin), self._median(self.blood))
-        return recolour(device, target, made, self.residual, factors, added)
+        return recolour(device, target, estimate, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
         """Return the mask (h, w) of texels whose colour is near one of the model's."""
         logs = np.log(np.maximum(self.residual, _BLACK_LEVEL))
         return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
-    def _median(self, share: Pixels) -> float:
+    def _median(self, fraction: Pixels) -> float:
         """Return the median over the skin."""
         skin = self.skin_texels()
-        return float(np.median(share[skin] if skin.any() else share))
+        return float(np.median(fraction[skin] if skin.any() else fraction))
 
 
 def _percentiles(values: Floats) -> dict[str, float]:
@@ -252,10 +248,10 @@ def unmix(
     def run_on_device(device: Device) -> UnmixResult:
         light = estimate_shading(device, colours, skin, noise) if shading else None
         unshaded = colours if light is None else colours / light[..., None]
-        made, sd, residual = Unmixer(device, model, noise).unmix(unshaded, progress)
-        result = made[..., 2] if third == "oxygen" else None
-        maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
-        return UnmixResult(*maps, residual, result, light, skin, model, {adapter: lazy_device})
+        estimate, sd, residual = Unmixer(device, model, noise).unmix(unshaded, progress)
+        oxygen = estimate[..., 2] if third == "oxygen" else None
+        maps = (estimate[..., 0], estimate[..., 1], sd[..., 0], sd[..., 1])
+        return UnmixResult(*maps, residual, oxygen, light, skin, model, {adapter: lazy_device})
 
     lazy_device = LazyDevice(adapter)
     return lazy_device.run(run_on_device)
@@ -268,7 +264,7 @@ def _checked_colours(colours: ArrayLike) -> Pixels:
         advice = "Decode sRGB first, or give the file's name"
         refuse("colours", "floats (h, w, 3), linear Rec. 709", actual, advice)
     if not (np.isfinite(result).all() and result.min() >= 0.0 and result.max() <= 1.0):
-        refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
+        refuse("colours", "reflectances from 0 to 1", "some are outside or not finite", "Scale them")
     return result.astype(np.float32, copy=False)
 
 

@@ -42,8 +42,8 @@ def _albedo_table() -> tuple[Doubles, Doubles]:
 def single_scattering_albedo(colour: ArrayLike) -> Doubles:
     """Return the single-scattering albedo of half-spaces with a given diffuse albedo below the coat [-]."""
     diffuse_albedos, absorption_root = _albedo_table()
-    near_cells = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
-    return np.asarray(1.0 - np.interp(near_cells, diffuse_albedos, absorption_root) ** 2)
+    clipped = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
+    return np.asarray(1.0 - np.interp(clipped, diffuse_albedos, absorption_root) ** 2)
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:

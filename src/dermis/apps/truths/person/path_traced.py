@@ -30,6 +30,7 @@ from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDi
 from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
+Doubles = NDArray[np.float64]
 _CACHE_VERSION = "person 1"  # change when the result for the same person changes
 _SALIVA_ROUGHNESS, _TONGUE_ROUGHNESS = 0.12, 0.25
 _SALIVA_INDEX = 1.4
@@ -38,8 +39,8 @@ _SALIVA_INDEX = 1.4
 def path_trace_person(
     scene: Scene,
     textures: SkinTextures,
-    distance_mm: NDArray[np.float64],
-    colour: NDArray[np.float64],
+    distance_mm: Doubles,
+    colour: Doubles,
     size: tuple[int, int],
     samples: int = 64,
     *,
@@ -80,7 +81,7 @@ def path_trace_person(
 
 
 def person_scene(
-    mi: Mitsuba, scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], size: tuple[int, int]
+    mi: Mitsuba, scene: Scene, person: Person, mean_free_path_mm: Doubles, size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return Mitsuba's scene for the radiance image, and notes on changes to the head."""
     medium = skin_medium(mi, person, scene.camera, mean_free_path_mm)
@@ -97,13 +98,13 @@ def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
     shapes = {}
     mesh = person.mesh
     for k, material in enumerate(mesh.materials):
-        chosen = mesh.triangles[mesh.material == k]
-        if material.kind == "skin" or k in person.eye_materials or not len(chosen):
+        triangles = mesh.triangles[mesh.material == k]
+        if material.kind == "skin" or k in person.eye_materials or not len(triangles):
             continue
-        used, corners = np.unique(chosen, return_inverse=True)
+        used, corners = np.unique(triangles, return_inverse=True)
         bsdf = mi.load_dict(_opaque_bsdf(mi, person, material))
-        place, normals, uv = mesh.positions[used], mesh.normals[used], mesh.uv[used]
-        shapes[f"part_{k}"] = mesh_shape(mi, place, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)
+        positions, normals, uv = mesh.positions[used], mesh.normals[used], mesh.uv[used]
+        shapes[f"part_{k}"] = mesh_shape(mi, positions, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)
     return shapes
 
 
@@ -112,11 +113,8 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
         return {"type": "diffuse", "reflectance": rgb(material.colour)}
     tongue = material.part == "tongue"
     upper, lower = person.textures.teeth
-    colour = (
-        rgb(material.colour)
-        if tongue
-        else mitsuba_texture(mi, upper if material.part == "upper teeth" else lower)
-    )
+    texture = upper if material.part == "upper teeth" else lower
+    colour = rgb(material.colour) if tongue else mitsuba_texture(mi, texture)
     return {
         "type": "roughplastic",
         "distribution": "beckmann",
@@ -128,13 +126,11 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
     """Return the head with radiance 1 and without hair."""
-    glow, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
-    return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=glow)}
+    emitter, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
+    return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
-def person_key(
-    scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float64], trace_settings: str
-) -> str:
+def person_key(scene: Scene, person: Person, mean_free_path_mm: Doubles, trace_settings: str) -> str:
     """Return a hash of everything that the image depends on.
 
     trace_settings : versions and settings of the path tracer

@@ -48,15 +48,13 @@ def skin_shapes(mi: Mitsuba, person: Person, medium: MitsubaObject) -> tuple[Sce
     The two surfaces are those of `mitsuba_scene`.
     """
     solid = closed_skin(person.mesh, person.name)
-    notes = (f"{solid.caps} openings shut, {solid.cap_area:.0f} mm2",) if solid.caps else ()
+    notes = (f"{solid.caps} openings closed, {solid.cap_area:.0f} mm2",) if solid.caps else ()
     gap = interface_gap_mm(mi, solid)
     upper, _ = offset_inwards(solid, -gap, person.name)
     lower, _ = offset_inwards(solid, np.zeros(len(gap)), person.name)
     inside = {"exterior": None, "interior": medium}
-    shapes = {
-        "skin_lower": interface_mesh(mi, lower, inside),
-        "skin": _coated_mesh(mi, person, upper, medium),
-    }
+    shapes = {"skin_lower": interface_mesh(mi, lower, inside)}
+    shapes["skin"] = _coated_mesh(mi, person, upper, medium)
     skin = int(_skin_mask(person).sum())
     if len(solid.triangles) > skin:
         fan = replace(upper, triangles=solid.triangles[skin:])
@@ -160,30 +158,25 @@ def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, Mitsu
         "diffuse_reflectance": mitsuba_texture(mi, textures.white),
     }
     clear = {"type": "dielectric", "int_ior": CORNEA_INDEX, "ext_ior": 1.0}
-    both = {
-        "type": "blendbsdf",
-        "weight": mitsuba_texture(mi, cornea_weight_map()),
-        "white": white,
-        "clear": clear,
-    }
+    weight = mitsuba_texture(mi, cornea_weight_map())
+    eyeball = {"type": "blendbsdf", "weight": weight, "white": white, "clear": clear}
     iris = {"type": "diffuse", "reflectance": mitsuba_texture(mi, textures.iris)}
-    return mi.load_dict(both), mi.load_dict({"type": "twosided", "bsdf": iris})
+    return mi.load_dict(eyeball), mi.load_dict({"type": "twosided", "bsdf": iris})
 
 
 def eye_shapes(mi: Mitsuba, person: Person) -> SceneDict:
     """Return shapes of all eyes of a person, relative to the head's centre."""
-    eyeball_bsdf, iris = eye_bsdfs(mi, person.textures)
+    eyeball_bsdf, iris_bsdf = eye_bsdfs(mi, person.textures)
     positions, triangles, normals, uv = eyeball_mesh()
     disc, fan, _ = iris_disc()
-    on_iris = 0.5 + 0.5 * disc[:, :2] / person.textures.reach_mm
+    iris_uv = 0.5 + 0.5 * disc[:, :2] / person.textures.reach_mm
     shapes = {}
     for k, frame in enumerate(person.eyes):
         to_head = np.linalg.inv(frame)
         eye_normals = normals @ (to_head[:3, :3] / np.cbrt(np.linalg.det(to_head[:3, :3]))).T
-        shapes[f"eye_{k}"] = mesh_shape(
-            mi, _transform_points(to_head, positions), triangles, eye_normals, uv, bsdf=eyeball_bsdf
-        )
-        shapes[f"iris_{k}"] = mesh_shape(mi, _transform_points(to_head, disc), fan, None, on_iris, bsdf=iris)
+        eyeball, iris = (_transform_points(to_head, one) for one in (positions, disc))
+        shapes[f"eye_{k}"] = mesh_shape(mi, eyeball, triangles, eye_normals, uv, bsdf=eyeball_bsdf)
+        shapes[f"iris_{k}"] = mesh_shape(mi, iris, fan, None, iris_uv, bsdf=iris_bsdf)
     return shapes
 
 
@@ -205,9 +198,8 @@ _MIN_RADIUS_MM = 1e-3
 def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDict:
     """Return hair fibres as one shape per group of similar absorption, named `name` and a number."""
     shapes = {}
-    depth = hairs.absorption * hairs.radius_mm.max(
-        axis=1, keepdims=True
-    )  # Mitsuba's unit of length is the radius
+    # Mitsuba's unit of length is the radius.
+    depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
     with tempfile.TemporaryDirectory() as folder:
         for k, group in enumerate(absorption_groups(depth)):
             file = Path(folder) / f"{k}.txt"
@@ -220,16 +212,15 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
                 "scale_tilt": CUTICLE_TILT_DEGREES,
                 "int_ior": KERATIN_INDEX,
             }
-            shapes[f"{name}_{k}"] = mi.load_dict(
-                {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
-            )
+            curves = {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
+            shapes[f"{name}_{k}"] = mi.load_dict(curves)
     return shapes
 
 
 def absorption_groups(depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
     """Return indices of rows (n, 3) in at most `MAX_HAIR_GROUPS` groups by the sum of each row."""
     order = np.argsort(depth.sum(axis=1), kind="stable")
-    return [grid for grid in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(grid)]
+    return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
 
 
 def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> None:

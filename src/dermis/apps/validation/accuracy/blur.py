@@ -15,7 +15,7 @@ import dermis
 from dermis.apps.validation.pages import add_tests_to_path, data_file, print_tables
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas, cached_atlas
-from dermis.frame.features.atlas import passes as stretched
+from dermis.frame.features.atlas import passes as atlas_passes
 from dermis.frame.features.atlas.textures import upload_atlas
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels, choose_halvings, make_levels
@@ -101,12 +101,12 @@ def sheared_row(device: Device, degrees: float) -> str:
     light = np.zeros((SIZE, SIZE), np.float32)
     light[SIZE // 2, SIZE // 2] = 1.0
     y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
-    place = np.stack([x - shear[0] * y, -shear[1] * y]) / 3.0  # v points down
+    position = np.stack([x - shear[0] * y, -shear[1] * y]) / 3.0  # v points down
     target_variance = load_profile("gpu-gems-3").variance_mm2[-1]
     cells = []
     for stretch in ("axes", "full"):
         spot = blurred_levels(device, mesh, light, stretch)[-1].astype(float)
-        covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
+        covariance = np.einsum("iyx,jyx,yx->ij", position, position, spot) / spot.sum()
         cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / target_variance)]
     return f"| {degrees:g}° | {' | '.join(cells)} |"
 
@@ -157,7 +157,7 @@ def blur_light(
     frame = CommandList(device)
     head = Head("", mesh, Maps())
     shape = evaluate_rest_shape(device, shape_tables(device, head), head.positions_mm)
-    stretched.draw_stretch(frame, upload_geometry(device, mesh, atlas, shape), textures)
+    atlas_passes.draw_stretch(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()
     return levels, blur
@@ -167,9 +167,7 @@ def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -
     """Return pyramid level k (n, n), resampled bilinearly to full resolution."""
     halvings = blur.halvings[k]
     layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
-    return (
-        np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)) if halvings else layer
-    )
+    return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
 
 
 def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
@@ -185,48 +183,47 @@ def seam_rows(renderer: Renderer) -> list[str]:
     rows = seam_row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, all_points)
     human_head = dermis.load_head("human")
     rows += seam_row(renderer, "human, neck and back of the head", human_head, HEAD_SIDE, visible_points)
-    rows += seam_row(
-        renderer, "human, eye sockets and inside of the mouth", human_head, HEAD_SIDE, hidden_points
-    )
+    hidden = "human, eye sockets and inside of the mouth"
+    rows += seam_row(renderer, hidden, human_head, HEAD_SIDE, hidden_points)
     human = dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0)
     human = replace(human, maps=Maps())
     rows += seam_row(renderer, "MakeHuman, neck", human, HEAD_SIDE, neck_points)
     return rows + seam_row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, back_points)
 
 
-def all_points(places: Array) -> Flags:
+def all_points(positions: Array) -> Flags:
     """Return the mask of all points (n, 3) [mm from the head's centre]."""
-    return np.ones(len(places), bool)
+    return np.ones(len(positions), bool)
 
 
-def neck_points(places: Array) -> Flags:
+def neck_points(positions: Array) -> Flags:
     """Return the mask of points on the neck and below it."""
-    return np.asarray((places[:, 1] < -90.0) & (places[:, 2] < 60.0))
+    return np.asarray((positions[:, 1] < -90.0) & (positions[:, 2] < 60.0))
 
 
-def back_points(places: Array) -> Flags:
+def back_points(positions: Array) -> Flags:
     """Return the mask of points on the back of the head."""
-    return np.asarray((places[:, 1] > -90.0) & (places[:, 2] < -30.0))
+    return np.asarray((positions[:, 1] > -90.0) & (positions[:, 2] < -30.0))
 
 
-def visible_points(places: Array) -> Flags:
+def visible_points(positions: Array) -> Flags:
     """Return the mask of points on visible seams of the human."""
-    return np.asarray(neck_points(places) | back_points(places))
+    return np.asarray(neck_points(positions) | back_points(positions))
 
 
-def hidden_points(places: Array) -> Flags:
+def hidden_points(positions: Array) -> Flags:
     """Return the mask of points on hidden seams of the human."""
-    return ~visible_points(places)
+    return ~visible_points(positions)
 
 
 def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> list[str]:
     """Return one line of the table, with a column for each seam method."""
-    first_side, second_side = seam_sides(head, where)
+    first, second = seam_sides(head, where)
     cells = []
     for method in SEAM_METHODS:
-        jumps = seam_jumps(renderer, striped_scene(head), method, side, first_side, second_side)
+        jumps = seam_jumps(renderer, striped_scene(head), method, side, first, second)
         cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
-    return [f"| {name} | {len(first_side.triangle)} | {' | '.join(cells)} |"]
+    return [f"| {name} | {len(first.triangle)} | {' | '.join(cells)} |"]
 
 
 def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
@@ -234,33 +231,32 @@ def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
     from atlas_reading import Points, seam_points
 
     mesh = head.mesh
-    first_side, second_side = seam_points(mesh)
-    places = first_side.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    is_kept = where(places) & (np.abs(first_side.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
+    first, second = seam_points(mesh)
+    positions = first.on(mesh.positions[mesh.triangles]) - head.centre_mm
+    is_kept = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
-            is_kept &= mapped[first_side.triangle] & mapped[second_side.triangle]
-    return Points(first_side.triangle[is_kept], first_side.weights[is_kept]), Points(
-        second_side.triangle[is_kept], second_side.weights[is_kept]
-    )
+            is_kept &= mapped[first.triangle] & mapped[second.triangle]
+    first, second = (Points(one.triangle[is_kept], one.weights[is_kept]) for one in (first, second))
+    return first, second
 
 
 def striped_scene(head: Head) -> Scene:
     """Return a scene with sharp stripes of light from front and back, and a little uniform light."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
-    places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
+    positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=WIDTH_MM, shadows=False)
     lights: list[Light] = []
-    for light_direction in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
-        lights += [stripe(direction=light_direction, position=(place, 0, 0)) for place in places]
-        lights.append(DirectionalLight(direction=light_direction, irradiance=(1, 1, 1), shadows=False))
+    for direction in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
+        lights += [stripe(direction=direction, position=(x, 0, 0)) for x in positions]
+        lights.append(DirectionalLight(direction=direction, irradiance=(1, 1, 1), shadows=False))
     skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none", direction="lambertian")
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
 def seam_jumps(
-    renderer: Renderer, scene: Scene, method: str, side: int, first_side: Points, second_side: Points
+    renderer: Renderer, scene: Scene, method: str, side: int, first: Points, second: Points
 ) -> Array:
     """Return the relative change of red light from one side of each seam to the other."""
     from atlas_reading import lit_at
@@ -271,5 +267,5 @@ def seam_jumps(
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
     atlas = cached_atlas(scene.head.topology.mesh, side, SEAM_METHODS[method].layouts[0])
-    a, b = (lit_at(light, atlas, points)[:, 0] for points in (first_side, second_side))
+    a, b = (lit_at(light, atlas, points)[:, 0] for points in (first, second))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

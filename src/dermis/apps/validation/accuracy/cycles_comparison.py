@@ -1,4 +1,4 @@
-"""Highlights and skins beside those of Cycles, with the fraction of light that the surface reflects.
+"""Highlights and skins compared with those of Cycles, with the fraction of light that the surface reflects.
 
 Both need Blender's Python, so docs/accuracy.md shows the last measurement (benchmarks/results).
 """
@@ -62,11 +62,11 @@ class SkinRender(NamedTuple):
     """Picture in linear light, and the fraction of its light that the surface reflects [-]."""
 
     picture: Picture
-    share: float
+    reflected: float
 
 
 def highlights(adapter: str = "auto") -> None:
-    """Measure highlights beside those of Cycles and write benchmarks/results/highlights.json."""
+    """Measure highlights against Cycles and write benchmarks/results/highlights.json."""
     in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
@@ -80,27 +80,28 @@ def looks(adapter: str = "auto") -> None:
     renders = {head: skin_renders(renderer, head) for head in HEADS}
     for view in LOOK_VIEWS:
         for head in HEADS:
-            rows.append({"head": head, "view": view, "shares": [one.share for one in renders[head][view]]})
-            for column, one in zip(COLUMNS, renders[head][view], strict=True):
-                panels[f"{head} {view}, {column}: {100 * one.share:.1f} %"] = one.picture
+            columns = renders[head][view]
+            rows.append({"head": head, "view": view, "shares": [one.reflected for one in columns]})
+            for column, one in zip(COLUMNS, columns, strict=True):
+                panels[f"{head} {view}, {column}: {100 * one.reflected:.1f} %"] = one.picture
     write_results(LOOKS, {"paths": PATHS, "rows": rows})
     PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
 
 
 def tables() -> dict[str, object]:
     """Return the rows of docs/accuracy.md by their names in its template, from the last measurement."""
-    renders, look_rows = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
-    shares = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
+    highlight_rows, look_rows = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
+    cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
         "highlights": "\n".join(
             f"| {row['view']} | {row['model']} | {row['energy']:.3f} | {row['grain']:.2f} "
             f"| {row['grain_of_cycles']:.2f} | {row['correlation']:.3f} |"
-            for row in renders
+            for row in highlight_rows
         ),
         "highlight_paths": PATHS,
         "looks": "\n".join(
-            f"| {row['head']} | {row['view']} | {cells} |"
-            for row, cells in zip(look_rows, shares, strict=True)
+            f"| {row['head']} | {row['view']} | {fractions} |"
+            for row, fractions in zip(look_rows, cells, strict=True)
         ),
         "look_paths": PATHS,
     }
@@ -132,9 +133,9 @@ def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float
     lobes : weight and roughness of each lobe
     """
     picture = np.zeros(settings.size[::-1], np.float32)
-    for share, roughness in lobes:
+    for weight, roughness in lobes:
         (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [PATHS], settings)
-        picture += share * image_pass.image[..., 1]
+        picture += weight * image_pass.image[..., 1]
     return picture
 
 
@@ -145,20 +146,19 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
     scene, rows = Scene(head, [LIGHT], camera), list[HighlightRow]()
     one_lobe, two_lobes = (traced_highlights(scene, settings, lobes) for lobes in (ONE_LOBE, TWO_LOBES))
     for model in MODELS:
-        truth = two_lobes if model == "two-lobe" else one_lobe
-        lit = truth > np.quantile(truth[truth > 0], LIT_QUANTILE)
-        skin = Skin.model_validate(
-            {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
-        )
+        reference = two_lobes if model == "two-lobe" else one_lobe
+        lit = reference > np.quantile(reference[reference > 0], LIT_QUANTILE)
+        values = {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
+        skin = Skin.model_validate(values)
         ours = renderer.draw(Scene(head, [LIGHT], camera, skin), settings).linear()[..., 1]
         rows.append(
             {
                 "view": view,
                 "model": model,
-                "energy": float(ours.sum() / truth.sum()),
+                "energy": float(ours.sum() / reference.sum()),
                 "grain": grain_contrast(ours, lit),
-                "grain_of_cycles": grain_contrast(truth, lit),
-                "correlation": float(np.corrcoef(ours[lit], truth[lit])[0, 1]),
+                "grain_of_cycles": grain_contrast(reference, lit),
+                "correlation": float(np.corrcoef(ours[lit], reference[lit])[0, 1]),
             }
         )
     return rows
@@ -221,5 +221,5 @@ def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRe
         preset_2007 = render_skin(renderer, Scene(one_lobe, camera=camera, skin=Skin.preset("deck-2007")))
         ours = render_skin(renderer, Scene(painted, camera=camera))
         renders[view] = [preset_2007, ours, render_cycles_skin(Scene(mapped, camera=camera), skin)]
-        print_lines(f"{title} {view} {' '.join(f'{one.share:.3f}' for one in renders[view])}")
+        print_lines(f"{title} {view} {' '.join(f'{one.reflected:.3f}' for one in renders[view])}")
     return renders

@@ -14,7 +14,10 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.angular_response import (
     angular_response,
+    critical_cosine,
     directional_reflectance,
+    gauss_legendre,
+    internal_reflectance,
     mean_single_scattering_kernel,
     refracted_cosine,
 )
@@ -71,14 +74,14 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
     The exact radiance below the surface is that of the index-matched half-space with all internal
     reflections.
     """
-    critical = float(np.sqrt(1.0 - 1.0 / ETA**2))
-    trapped, escaping = _gauss_legendre(0.0, critical), _gauss_legendre(critical, 1.0)
+    critical = critical_cosine(ETA)
+    trapped, escaping = (gauss_legendre(*ends, _NODE_COUNT) for ends in ((0.0, critical), (critical, 1.0)))
     mu, weight = (np.concatenate(both) for both in zip(trapped, escaping, strict=True))
-    internal_reflectance, flux = _fresnel(mu, ETA), 2.0 * weight * mu
+    reflectance, flux = internal_reflectance(mu, ETA), 2.0 * weight * mu
     index_matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
-    inside = np.linalg.solve(np.eye(len(mu)) - index_matched * flux * internal_reflectance, index_matched)
+    inside = np.linalg.solve(np.eye(len(mu)) - index_matched * flux * reflectance, index_matched)
     free = slice(_NODE_COUNT, None)  # nodes of directions that leave, of both light and view
-    transmittance, area = (1.0 - internal_reflectance)[free], flux[free] / flux[free].sum()
+    transmittance, area = (1.0 - reflectance)[free], flux[free] / flux[free].sum()
     exact = inside[free, free] * transmittance[:, None] / ETA**2
     above = float(directional_reflectance(1.0, albedo, ETA))
     lambertian = np.outer(transmittance / (area @ transmittance), np.full(_NODE_COUNT, above))
@@ -108,7 +111,7 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
     down = np.full(PHOTONS, float(refracted_cosine(cosine, eta)))
     while len(depth):
         depth = depth - np.log(rng.random(len(depth))) * down
-        leaves = (depth < 0.0) & (rng.random(len(depth)) > _fresnel(np.abs(down), eta))
+        leaves = (depth < 0.0) & (rng.random(len(depth)) > internal_reflectance(np.abs(down), eta))
         reflected += float(weight[leaves].sum())
         down = np.where(depth < 0.0, -down, down)  # reflected internally
         inside = ~leaves
@@ -131,14 +134,6 @@ def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floa
     return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 
-def _fresnel(cosine: Floats, eta: float) -> Floats:
-    """Return the internal Fresnel reflectance of unpolarised light, 1 for total reflection."""
-    outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
-    across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
-    along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
-    return np.asarray(0.5 * (across**2 + along**2))
-
-
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     """Return half-space over Lambertian skin in the studio: median and 99th percentile of pixels."""
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
@@ -150,8 +145,3 @@ def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     visible = lambertian.min(axis=-1) > 0.02
     middle, high = np.percentile(half_space[visible] / lambertian[visible], (50.0, 99.0), axis=0)
     return middle.tolist(), high.tolist()
-
-
-def _gauss_legendre(low: float, high: float) -> tuple[Floats, Floats]:
-    nodes, weights = np.polynomial.legendre.leggauss(_NODE_COUNT)
-    return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights

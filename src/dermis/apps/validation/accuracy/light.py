@@ -38,13 +38,13 @@ def light(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def sample_panorama(layer: Array, directions_out: Array) -> Array:
+def sample_panorama(layer: Array, towards: Array) -> Array:
     """Return (n, 3) values of a panorama (h, w, 3) in n directions, interpolated as by the shader."""
     height, width = layer.shape[:2]
-    x = (0.5 + np.arctan2(directions_out[:, 0], -directions_out[:, 2]) / (2 * np.pi)) * width - 0.5
-    y = np.arccos(np.clip(directions_out[:, 1], -1, 1)) / np.pi * height - 0.5
+    x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
+    y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    total = np.zeros((len(directions_out), 3))
+    total = np.zeros((len(towards), 3))
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
@@ -67,9 +67,9 @@ def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
 
 def irradiance_error(name: str, count: int = 200) -> float:
     """Return the largest relative error of the irradiance over random normals."""
-    directions_out, light, prefiltered = panorama(name)
+    towards, light, prefiltered = panorama(name)
     normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
-    exact = np.array([np.maximum(directions_out @ normal, 0) @ light for normal in normals])
+    exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
     return float(np.abs(sample_panorama(prefiltered.layers[0], normals) / exact - 1).max())
 
 
@@ -79,18 +79,15 @@ def reflection_error(name: str, m: float, angle: float, count: int = 320) -> flo
     angle : of the view from the normal [degrees]
     """
     cosine = float(np.cos(np.radians(angle)))
-    directions_out, light, prefiltered = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
+    towards, light, prefiltered = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
     along = unit(np.cross(normals, rng.normal(size=(count, 3))))
     views = cosine * normals - np.sqrt(1 - cosine**2) * along
-    exact = [
-        lobe_sum(directions_out, light, normal, view, m) for normal, view in zip(normals, views, strict=True)
-    ]
-    mirror_direction, tangent = (
-        2 * cosine * normals - views,
-        cosine * along - np.sqrt(1 - cosine**2) * normals,
-    )
+    pairs = zip(normals, views, strict=True)
+    exact = [lobe_sum(towards, light, normal, view, m) for normal, view in pairs]
+    mirror_direction = 2 * cosine * normals - views
+    tangent = cosine * along - np.sqrt(1 - cosine**2) * normals
     bitangent, sampled = np.cross(normals, along), np.zeros((count, 3))
     for x, y, wide, weight in lobe_parameters(cosine, m):
         direction = unit(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
@@ -99,14 +96,14 @@ def reflection_error(name: str, m: float, angle: float, count: int = 320) -> flo
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
-def lobe_sum(directions_out: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
+def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
     """Return reflected radiance, summed over the texels where the lobe is above 1e-10 of its peak."""
-    n_l, n_v, v_l = directions_out @ normal, float(normal @ view), directions_out @ view
+    n_l, n_v, v_l = towards @ normal, float(normal @ view), towards @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
-    in_reach = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
-    v_h = np.sqrt(0.5 + 0.5 * v_l[in_reach])
-    angles = Cosines(n_l[in_reach], np.full(len(in_reach), n_v), n_h[in_reach], v_h)
-    return np.asarray((kelemen(angles, m) * n_l[in_reach]) @ light[in_reach])
+    near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
+    v_h = np.sqrt(0.5 + 0.5 * v_l[near])
+    angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
+    return np.asarray((kelemen(angles, m) * n_l[near]) @ light[near])
 
 
 def lobe_parameters(cosine: float, m: float) -> Array:
@@ -118,24 +115,23 @@ def lobe_parameters(cosine: float, m: float) -> Array:
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def lobe_radiance(layers: Array, directions_out: Array, m: float) -> Array:
+def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
     """Return the mean radiance under isotropic lobes."""
-    table_position = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
-    low = int(np.clip(table_position, 0, len(ROUGHNESSES) - 2))
-    f = float(np.clip(table_position - low, 0, 1))
-    in_reach, far = (sample_panorama(layers[1 + k], directions_out) for k in (low, low + 1))
-    return np.asarray((1 - f) * in_reach + f * far)
+    level = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(level, 0, len(ROUGHNESSES) - 2))
+    f = float(np.clip(level - low, 0, 1))
+    below, above = (sample_panorama(layers[1 + k], towards) for k in (low, low + 1))
+    return np.asarray((1 - f) * below + f * above)
 
 
-def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
+def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **values: str) -> Array:
     """Return least, mean and largest outgoing over incoming radiance of a white head in uniform light."""
     white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy)
     scene = Scene(white_head, environment=Environment(name="uniform"), skin=skin)
-    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
-    rendered = renderer.draw(scene, settings)
-    prefiltered = rendered.linear_rgba()
-    covered = prefiltered[prefiltered[..., 3] == 1][:, 1]
+    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **values})
+    picture = renderer.draw(scene, settings).linear_rgba()
+    covered = picture[picture[..., 3] == 1][:, 1]
     return np.array([covered.min(), covered.mean(), covered.max()])
 
 
@@ -154,9 +150,8 @@ def furnace_rows(renderer: dermis.Renderer) -> str:
             ("full", "none", "thin"),
             ("full", "baked", "thin"),
         ):
-            least, mean, most = furnace_extremes(
-                renderer, head, energy, occlusion=occlusion, transmission=transmission
-            )
+            values = {"occlusion": occlusion, "transmission": transmission}
+            least, mean, most = furnace_extremes(renderer, head, energy, **values)
             cells = f"{name} | {energy} | {occlusion} | {transmission}"
             rows.append(f"| {cells} | {least:.3f} | {mean:.4f} | {most:.3f} |")
     return "\n".join(rows)
@@ -172,12 +167,10 @@ def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
     points = []
     for index in range(side**2):
         x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
-        table_position = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
-        tangent = target - table_position
-        point_irradiance = radiance * area * (unit(tangent) @ forward) / (tangent @ tangent)
-        points.append(
-            PointLight(position=tuple(table_position), irradiance=tuple(point_irradiance), softness_mm=2.0)
-        )
+        point = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
+        to_target = target - point
+        irradiance = radiance * area * (unit(to_target) @ forward) / (to_target @ to_target)
+        points.append(PointLight(position=tuple(point), irradiance=tuple(irradiance), softness_mm=2.0))
     return points
 
 
@@ -187,12 +180,12 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
-    prefiltered, exact = (
+    picture, exact = (
         renderer.draw(Scene(head, lights=lights), settings).linear()
         for lights in ([light], as_point_lights(light))
     )
     lit = exact.max(axis=-1) > 0
-    error = (prefiltered - exact)[lit]
+    error = (picture - exact)[lit]
     return float(error.mean() / exact[lit].mean()), float(np.sqrt((error**2).mean()) / exact[lit].mean())
 
 
@@ -201,11 +194,11 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
-    rendered_map, reference_map = (
+    ours, reference = (
         bake_occlusion(renderer.device, head, atlas, inputs.bindings, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
-    return float(np.sqrt(np.nanmean((rendered_map - reference_map) ** 2)))
+    return float(np.sqrt(np.nanmean((ours - reference) ** 2)))
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:

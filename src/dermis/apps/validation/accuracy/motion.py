@@ -98,8 +98,8 @@ def picture_error(
     vars(posed_head)["centre_mm"] = rebuilt.centre_mm  # lights and cameras are relative to it
     pose = Pose(weights, positions_mm=person)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
-    truth = renderer.draw(scene, SETTINGS).linear()
-    return float(np.sqrt(((posed - truth) ** 2).mean() / (truth**2).mean()))
+    reference = renderer.draw(scene, SETTINGS).linear()
+    return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -137,7 +137,7 @@ def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose
     for where in (blur.neck_points, blur.back_points):
         sides = blur.seam_sides(shape, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        vars(scene.head)["centre_mm"] = shape.centre_mm  # the bands of light are relative to it
+        vars(scene.head)["centre_mm"] = shape.centre_mm  # the stripes of light are relative to it
         errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"
@@ -163,11 +163,11 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
     scene, fine = Scene(head, environment=Environment(name="uniform")), (_REFERENCE_SIZE, _REFERENCE_SIZE)
     rest = baked_occlusion(renderer, head, head, *fine)
     for name, (pose, shape) in shapes.items():
-        truth, posed = baked_occlusion(renderer, head, shape, *fine), replace(scene, pose=pose)
+        reference, posed = baked_occlusion(renderer, head, shape, *fine), replace(scene, pose=pose)
         maps = [frame_occlusion(renderer, posed, mode) for mode in ("rest", "baked")]
-        errors = [one - truth for one in (*maps, baked_occlusion(renderer, head, shape))]
-        surface = np.isfinite(truth) & np.isfinite(rest)
-        changed = surface & (np.abs(np.where(surface, truth - rest, 0.0)) > _MIN_CHANGE)
+        errors = [one - reference for one in (*maps, baked_occlusion(renderer, head, shape))]
+        surface = np.isfinite(reference) & np.isfinite(rest)
+        changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_CHANGE)
         cells = (f"{rms(error[surface]):.3f} / {rms(error[changed]):.3f}" for error in errors)
         yield f"| {name} | {changed.sum() / surface.sum():.1%} | {' | '.join(cells)} |"
 

@@ -52,15 +52,15 @@ def models_table() -> str:
 
 def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
     photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
-    truth = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
-    assert truth.total_error is not None
-    totals = " ".join(f"{value:.4f}" for value in truth.total)
-    relative_error = float((truth.total_error / truth.total).max())
+    reference = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
+    assert reference.total_error is not None
+    totals = " ".join(f"{value:.4f}" for value in reference.total)
+    relative_error = float((reference.total_error / reference.total).max())
     yield f"| **{name}** | Monte Carlo | {totals} | ± {relative_error:.2%} |"
     layers = tissue.medium.layers
     thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in layers)
     for model, clamp in MODELS:
-        one_layer = len(tissue.medium.layers) == 1
+        one_layer = len(layers) == 1
         if (model.endswith("dipole") and not one_layer) or (model == "multipole" and one_layer):
             continue
         if model == "multipole" and clamp == "none" and not thin:
@@ -68,8 +68,8 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
         profile = tissue.profile(model, clamp)
         source = {"none": ", source as printed", "layer": ", source clamped"}[clamp]
         label = model + (source if model == "multipole" else "")
-        total = _percent(profile.total / truth.total - 1.0)
-        rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+        total = _percent(profile.total / reference.total - 1.0)
+        rings = _percent(ring_error(reference.rings(), profile.ring_energy), sign=False)
         yield f"| | {label} | {total} | {rings} |"
 
 
@@ -79,11 +79,11 @@ def counted_table() -> str:
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
             tissue = Tissue(media()[name].with_eta(eta))
-            truth = monte_carlo_profile(tissue.medium, photons=PHOTONS, seed=1)
+            reference = monte_carlo_profile(tissue.medium, photons=PHOTONS, seed=1)
             for model in ("counted", "layered"):
                 profile = tissue.profile(model)
-                total = " ".join(f"{100 * one:+.2f}" for one in profile.total / truth.total - 1.0)
-                rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+                total = " ".join(f"{100 * one:+.2f}" for one in profile.total / reference.total - 1.0)
+                rings = _percent(ring_error(reference.rings(), profile.ring_energy), sign=False)
                 rows.append(f"| {name}, index {eta:g} | {model} | {total} % | {rings} |")
     return "\n".join(rows)
 
@@ -114,11 +114,8 @@ def pointwise_table() -> str:
         points = profile.points()
         free, conserved = (fit_gaussians(points, 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
-        cells = [
-            _percent(free.error, sign=False),
-            _percent(free.energy_error),
-            _percent(conserved.error, sign=False),
-        ]
+        cells = [_percent(one.error, sign=False) for one in (free, conserved)]
+        cells.insert(1, _percent(free.energy_error))
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
@@ -132,10 +129,10 @@ def transmission_table() -> str:
         for thickness in THICKNESSES_MM:
             slab = truncated_medium(tissue.medium, thickness)
             runs = trace_medium(slab, PHOTONS // 4, seed=2)
-            truth = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
-            truth = truth / (1.0 - runs[0].specular)
+            reference = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
+            reference = reference / (1.0 - runs[0].specular)
             variants = [
-                truth,
+                reference,
                 slab_transmittance(tissue.medium, [thickness])[0],
                 slab_transmittance(tissue.medium, [thickness], "multipole")[0],
                 gaussian_transmittance(gaussian_sum, [thickness])[0],

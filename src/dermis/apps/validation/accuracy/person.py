@@ -1,4 +1,4 @@
-"""Path-traced views of the package's human beside the frame, for docs/path_traced.md.
+"""Path-traced views of the package's human compared with the frame, for docs/path_traced.md.
 
 Paths are cached on disk while they are traced, so an interrupted run continues where it stopped.
 """
@@ -47,8 +47,7 @@ def view_row(pair: PersonComparison) -> str:
 
 def iris_cells(pair: PersonComparison) -> dict[str, str]:
     """Return the errors of the iris in the view of the eye, by name."""
-    estimate = iris_errors(pair, EYE_FRAME_MM)
-    return {name: with_error(getattr(estimate, name)) for name in estimate._fields}
+    return {name: with_error(one) for name, one in iris_errors(pair, EYE_FRAME_MM)._asdict().items()}
 
 
 def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:

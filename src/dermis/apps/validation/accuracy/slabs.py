@@ -63,8 +63,8 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -
     mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
     for k, angle in enumerate(np.radians(DEGREES)):
         beam = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        places, normals, exitance = scattered_light(renderer, mesh, beam, skin, 256)
-        central = np.abs(places[:, :2]).max(axis=1) < 8.0
+        positions, normals, exitance = scattered_light(renderer, mesh, beam, skin, 256)
+        central = np.abs(positions[:, :2]).max(axis=1) < 8.0
         for side in (0, 1):
             facing = central & ((2 * side - 1) * normals[:, 2] > 0.9)
             response[side, k] = exitance[facing].mean(axis=0) / np.cos(angle)
@@ -101,9 +101,9 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in MEDIA:
             medium = media()[name].with_eta(eta)
-            plain = skins_by_direction(medium, folder)["half-space"]
+            half_space = skins_by_direction(medium, folder)["half-space"]
             for g in (0.0, FORWARD_G):
-                skin = plain.model_copy(update={"anisotropy": g})
+                skin = half_space.model_copy(update={"anisotropy": g})
                 for thickness in THICKNESSES_MM:
                     rendered = rendered_response(renderer, skin, thickness)
                     cells = _error_cells(rendered, exact_response(medium, thickness, FORWARD_G))
@@ -135,12 +135,13 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
     return float(np.sqrt((weight * (response - exact) ** 2).sum() / (weight * exact**2).sum()))
 
 
-def _error_cells(response: Array, truth: Array) -> str:
+def _error_cells(response: Array, reference: Array) -> str:
     """Return the error and the ratio of red light by direction, of the far side and of the near one."""
     flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
     for side in (1, 0):
-        error = np.linalg.norm(flux * (response[side] - truth[side])) / np.linalg.norm(flux * truth[side])
-        red = response[side][:, 0] / truth[side][:, 0]
+        ours, exact = response[side], reference[side]
+        error = np.linalg.norm(flux * (ours - exact)) / np.linalg.norm(flux * exact)
+        red = ours[:, 0] / exact[:, 0]
         cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")
     return " | ".join(cells)
 
@@ -154,8 +155,8 @@ def forward_rows() -> str:
         for thickness in THICKNESSES_MM:
             cells = []
             for g in (0.0, FORWARD_G):
-                flesh = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
-                run = trace_slab([flesh], PHOTONS).per_entering
+                slab = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
+                run = trace_slab([slab], PHOTONS).per_entering
                 cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
                 cells.append(f"{run.total_reflectance:.3f}")
             rows.append(f"| {eta:g} | {thickness:g} mm | {' | '.join(cells)} |")

@@ -20,7 +20,7 @@ VIEWS = (np.arange(200) + 0.5) / 200
 ENERGY_MODELS = {
     "none": ENERGY["none"],
     "published": ENERGY["published"],
-    "divided by π, light thrown back inside lost": EnergyModel(1.0, returned=False),
+    "divided by π, internally reflected light lost": EnergyModel(1.0, returned=False),
     "full": ENERGY["full"],
 }
 SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
@@ -35,8 +35,8 @@ def specular() -> None:
 def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
     """Return the directional and the mean albedo (..., 2), interpolated in the table as by the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
-    places = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
-    return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(places))
+    coordinates = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
+    return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(coordinates))
 
 
 def albedo_rows() -> str:
@@ -60,25 +60,25 @@ def peak_error() -> float:
     rows, columns = beckmann_table().shape
     axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
     peak = (2 * RegularGridInterpolator(axes, beckmann_table())(np.stack([m, c], axis=-1))) ** 10
-    truth = beckmann(c, m)
-    seen = truth > 1e-3  # smaller values of the lobe are not visible
-    return float(np.abs(peak[seen] / truth[seen] - 1).max())
+    exact = beckmann(c, m)
+    visible = exact > 1e-3  # smaller values of the lobe are not visible
+    return float(np.abs(peak[visible] / exact[visible] - 1).max())
 
 
-def furnace_cell(law: EnergyModel, m: float, rho_s: float) -> str:
+def furnace_cell(model: EnergyModel, m: float, rho_s: float) -> str:
     """Return least, mean and largest outgoing over incoming light of a white sphere in uniform light."""
     albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEWS, m)
-    entered = law.entering_fraction(mean, rho_s)
-    out = rho_s * exact + entered * law.exitance_factor(albedo, mean, rho_s)
+    entered = model.entering_fraction(mean, rho_s)
+    out = rho_s * exact + entered * model.exitance_factor(albedo, mean, rho_s)
     return f"{out.min():.3f} {(out * VIEWS).sum() / VIEWS.sum():.3f} {out.max():.3f}"
 
 
 def furnace_rows() -> str:
     """Return rows of the furnace for each energy model."""
     return "\n".join(
-        f"| {name} | {' | '.join(furnace_cell(law, m, rho_s) for m, rho_s in SKINS)} |"
-        for name, law in ENERGY_MODELS.items()
+        f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in SKINS)} |"
+        for name, model in ENERGY_MODELS.items()
     )
 
 

@@ -203,8 +203,8 @@ def _direction_rows(
     return lines
 
 
-def errors_by_channel(image: Floats, truth: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
+def errors_by_channel(image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
     """Return the relative RMSE and the energy ratio, each in red, green and blue."""
-    parts = [(image[..., c], truth.image[..., c], mask, truth.variance[..., c]) for c in range(3)]
+    parts = [(image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)]
     measures = (relative_rmse, energy_ratio)
     return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

@@ -76,8 +76,8 @@ def atlas_rows(
     unscattered, rows = render(subject, "none"), []
     for side in ATLASES:
         image, cells = render(subject, "texture-space", atlas=side), [light, str(side)]
-        for truth in (integral, normalised):
-            pair = truth.image, truth.mask
+        for reference in (integral, normalised):
+            pair = reference.image, reference.mask
             error, worst = (relative_rmse(one, *pair).value for one in (image, unscattered))
             cells += [f"{error:.4f}", f"{error / worst:.2f}", f"{energy_ratio(image, *pair).value:.4f}"]
         rows.append(f"| {' | '.join(cells)} |")
@@ -87,9 +87,9 @@ def atlas_rows(
 def zero_width_row(subject: ComparisonSubject, light: str) -> str:
     """Return the error of the reference's sampling: a very narrow profile against the irradiance."""
     narrow_profile = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
-    truth = surface_integral(replace(subject, profile=narrow_profile), 0)
+    reference = surface_integral(replace(subject, profile=narrow_profile), 0)
     incident = render(subject, "none") / subject.profile.albedo
-    pair = (incident, truth.image, truth.mask)
+    pair = (incident, reference.image, reference.mask)
     return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
@@ -118,16 +118,16 @@ def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str
     opaque = render(subject, "texture-space", transmission="none")
     samples, total = irradiance_samples(subject), ((ours - integral.image)[integral.mask] ** 2).sum()
     rows = []
-    for place, names in LANDMARKS_BY_REGION[light].items():
+    for region, names in LANDMARKS_BY_REGION[light].items():
         centre = tuple(np.mean([landmarks[name] for name in names], axis=0))
         heat = surface_heat_around(subject, centre, RADIUS_MM, samples, MIN_VARIANCE_MM2)
         fraction = ((ours - integral.image)[heat.mask] ** 2).sum() / total
         pixels = heat.mask.sum() / integral.mask.sum()
         errors = [
-            relative_rmse(image, truth.image, heat.mask).value
-            for truth, images in ((integral, (none, ours, heat.image)), (heat, (none, opaque)))
+            relative_rmse(image, reference.image, heat.mask).value
+            for reference, images in ((integral, (none, ours, heat.image)), (heat, (none, opaque)))
             for image in images
         ]
         cells = " | ".join(f"{error:.3f}" for error in errors)
-        rows.append(f"| {light} | {place} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
+        rows.append(f"| {light} | {region} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
     return rows

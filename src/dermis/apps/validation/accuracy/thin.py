@@ -25,7 +25,8 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.lights import DirectionalLight
 
 Array = NDArray[np.float64]
-PointFilter = Callable[[Array, Array], NDArray[np.bool_]]  # mask of points from their positions and normals
+Mask = NDArray[np.bool_]
+PointFilter = Callable[[Array, Array], Mask]  # mask of points from their positions and normals
 MATTE = Skin(albedo="profile", rho_s=0.0)
 PROFILE = load_profile("gpu-gems-3")
 BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
@@ -65,8 +66,8 @@ def scattered_light(
 def integrated_light(mesh: Mesh, beam: Array, points: Array, spacing: float) -> Array:
     """Return the light at points by the profile of Euclidean distance, integrated over the surface."""
 
-    def light(places: MeshPoints) -> Array:
-        normals = places.interpolate(mesh, mesh.normals)
+    def light(samples: MeshPoints) -> Array:
+        normals = samples.interpolate(mesh, mesh.normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         return np.repeat(np.maximum(normals @ -beam, 0.0)[:, None], 3, axis=1)
 
@@ -83,17 +84,17 @@ def slab_rows(renderer: dermis.Renderer) -> str:
         slab = wedge(60.0, thickness, thickness)
         points, normals, light = scattered_light(renderer, slab, beam, MATTE, 256, transmission="thin")
         inner = (normals[:, 2] > 0.9) & (np.abs(points[:, :2]).max(axis=1) < 12.0)
-        made, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED, thickness)
-        shown = (" ".join(f"{value:.4f}" for value in light) for light in (made, exact))
-        rows.append(f"| {thickness:g} mm | {' | '.join(shown)} |")
+        rendered, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED, thickness)
+        cells = (" ".join(f"{value:.4f}" for value in one) for one in (rendered, exact))
+        rows.append(f"| {thickness:g} mm | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
 def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> Array:
     """Return the part of the integrated red light whose straight path crosses air."""
 
-    def light(places: MeshPoints) -> Array:
-        cosine = places.interpolate(mesh, mesh.normals) @ -beam
+    def light(points: MeshPoints) -> Array:
+        cosine = points.interpolate(mesh, mesh.normals) @ -beam
         return np.repeat(np.maximum(cosine, 0.0)[:, None], 3, axis=1)
 
     samples = sample_irradiance(mesh, light, 0.5)
@@ -131,8 +132,8 @@ def comparison_cells(
     """
     cells = []
     for transmission in ("none", "thin"):
-        chosen = {"transmission": transmission}
-        points, normals, light = scattered_light(renderer, mesh, beam, MATTE, atlas, **chosen)
+        lit = scattered_light(renderer, mesh, beam, MATTE, atlas, transmission=transmission)
+        points, normals, light = lit
         selected = np.flatnonzero(point_filter(points, normals))
         selected = np.random.default_rng(5).permutation(selected)[:3000]
         exact = integrated_light(mesh, beam, points[selected], spacing)[:, 0]
@@ -151,11 +152,11 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
     for angle in ANGLES:
         mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
 
-        def neighbours(points: Array, normals: Array, half: float = angle / 2) -> NDArray[np.bool_]:
-            dark = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
-            return np.asarray(dark & (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0))
+        def dark(points: Array, normals: Array, half: float = angle / 2) -> Mask:
+            facing = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
+            return np.asarray(facing & (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0))
 
-        cells = comparison_cells(renderer, mesh, np.array([0.0, 0.0, 1.0]), neighbours, 512, 0.7, air=False)
+        cells = comparison_cells(renderer, mesh, np.array([0.0, 0.0, 1.0]), dark, 512, 0.7, air=False)
         rows.append(f"| {angle:g}° | {cells} |")
     return "\n".join(rows)
 
@@ -169,12 +170,10 @@ def ear_rows(renderer: dermis.Renderer) -> str:
         for side, z in (("behind", 1.0), ("the front", -1.0)):
             beam = np.array([0.0, 0.0, z])
 
-            def dark(
-                points: Array, normals: Array, beam: Array = beam, centre: Array = centre
-            ) -> NDArray[np.bool_]:
+            def dark(points: Array, normals: Array, z: float = z, centre: Array = centre) -> Mask:
                 local = points - centre
                 ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
-                return np.asarray(ear & (normals @ beam > 0.3))
+                return np.asarray(ear & (z * normals[:, 2] > 0.3))
 
             cells = comparison_cells(renderer, mesh, beam, dark, ATLAS, 1.5, air=True)
             rows.append(f"| {name} | {side} | {cells} |")
@@ -184,8 +183,5 @@ def ear_rows(renderer: dermis.Renderer) -> str:
 def tables(adapter: str = "auto") -> dict[str, str]:
     """Return the tables by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
-    return {
-        "thin_slabs": slab_rows(renderer),
-        "thin_wedges": wedge_rows(renderer),
-        "thin_ears": ear_rows(renderer),
-    }
+    rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}
+    return {name: make(renderer) for name, make in rows.items()}

@@ -73,13 +73,13 @@ class Preset:
 
     def cases(self) -> list[Case]:
         """Return the base frame, then the others."""
-        found = [self.usual]
+        cases = [self.usual]
         sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
         for name in ("technique", *sizes):
             for value in getattr(self, name):
                 if value != getattr(self.usual, name):
-                    found.append(replace(self.usual, varies=name, **{name: value}))
-        return found
+                    cases.append(replace(self.usual, varies=name, **{name: value}))
+        return cases
 
 
 PRESETS: dict[str, Preset] = {
@@ -122,7 +122,7 @@ def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
     lights = _lights(case.lights)
-    around = Environment(name=case.environment) if case.environment else None
+    environment = Environment(name=case.environment) if case.environment else None
     head = with_test_rig(head, case.targets) if case.targets else head
     scenes = []
     for k in range(count):
@@ -130,12 +130,12 @@ def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]
         moved = [light.model_copy(update={"position": _shifted(light.position, shift)}) for light in lights]
         moved_camera = camera.model_copy(update={"position": _shifted(camera.position, shift)})
         pose = pose_at_moment(head, k) if case.targets else None
-        scenes.append(Scene(head, tuple(moved), moved_camera, skin, around, pose))
+        scenes.append(Scene(head, tuple(moved), moved_camera, skin, environment, pose))
     return scenes
 
 
-def _shifted(place: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
-    return place[0] + shift, place[1], place[2]
+def _shifted(position: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
+    return position[0] + shift, *position[1:]
 
 
 def _lights(count: int) -> list[PointLight]:
@@ -189,8 +189,8 @@ def with_test_rig(head: Head, targets: int) -> Head:
 def pose_at_moment(head: Head, moment: int) -> Pose:
     """Return a pose in which every target and every bone differs from the moment before."""
     weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
-    turn = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
-    bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, turn, strict=True)}
+    angles = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
+    bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, angles, strict=True)}
     return Pose(weights, bones)
 
 
@@ -199,12 +199,12 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
     centres = points[np.linspace(0, len(points) - 1, count).astype(int)]
     nearest = max(1, int(_TARGET_FRACTION * len(points)))
     moved, deltas = [], []
-    for middle in centres:
-        distance = np.linalg.norm(points - middle, axis=1)
-        around = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
-        share = 1.0 - (distance[around] / max(float(distance[around].max()), 1e-9)) ** 2
-        moved.append(around)
-        deltas.append(share[:, None] * np.array([0.0, 0.0, _LIFT_MM / count]))
+    for centre in centres:
+        distance = np.linalg.norm(points - centre, axis=1)
+        indices = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
+        falloff = 1.0 - (distance[indices] / max(float(distance[indices].max()), 1e-9)) ** 2
+        moved.append(indices)
+        deltas.append(falloff[:, None] * np.array([0.0, 0.0, _LIFT_MM / count]))
     first = nearest * np.arange(count + 1)
     names = tuple(f"target {k}" for k in range(count))
     point = np.concatenate(moved).astype(np.int32)
@@ -218,13 +218,12 @@ def _skeleton(points: Doubles) -> Skeleton:
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))
     local[:, 1, 3] = [low, *([step] * (BONE_COUNT - 1))]
     bind[:, 1, 3] = -(low + step * np.arange(BONE_COUNT))
-    place = np.clip((points[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
-    below = place.astype(np.int32)
+    position = np.clip((points[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
+    below = position.astype(np.int32)
     bone, weight = np.zeros((len(points), 4), np.int32), np.zeros((len(points), 4), np.float32)
     bone[:, 0], bone[:, 1] = below, below + 1
-    weight[:, 1] = place - below
+    weight[:, 1] = position - below
     weight[:, 0] = 1.0 - weight[:, 1]
     parent = np.arange(-1, BONE_COUNT - 1, dtype=np.int32)
-    return Skeleton(
-        tuple(f"bone {k}" for k in range(BONE_COUNT)), parent, local, bind, np.eye(4), bone, weight
-    )
+    names = tuple(f"bone {k}" for k in range(BONE_COUNT))
+    return Skeleton(names, parent, local, bind, np.eye(4), bone, weight)

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from dermis.base.errors import DermisError
+from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.features.translucency.resources import Translucency
@@ -74,8 +74,8 @@ def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
         "shade": pixels * samples + shaded + pixels * radiance,
         "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
     }
-    if between := inputs.layouts[0].interreflection:
-        stages["interreflection"] = float(between.buffers.nbytes)
+    if interreflection := inputs.layouts[0].interreflection:
+        stages["interreflection"] = float(interreflection.buffers.nbytes)
     return (stages | _scattering_bytes(traffic, shadow_bytes)) if inputs.blurs else stages
 
 
@@ -159,8 +159,6 @@ def _copy(device: Device, program: ComputeProgram, textures: list[Any]) -> float
     frame.wait()
     times = frame.stage_ms()
     if times is None:
-        raise DermisError(
-            f"{device.adapter.name}: expected timestamps of its passes, but it has none. "
-            "Choose another adapter, such as --adapter cpu."
-        )
+        advice = "Choose another adapter, such as --adapter cpu"
+        refuse(device.adapter.name, "timestamps of its passes", "it has none", advice)
     return times["total"]

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.frame.features.atlas import passes as stretch
+from dermis.frame.features.atlas import passes as atlas_passes
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.diffusion.combine import no_light
 from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
-from dermis.frame.features.translucency import passes as translucency_weights
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import FLOATS, HALVES, program_constants, registry_version, shader_folders
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
@@ -54,27 +53,22 @@ class FragmentPasses(GpuGems3):
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Light the atlas, blur the light and sum the levels."""
-        made = inputs.resources
+        resources = inputs.resources
+        levels = resources.diffusion.levels
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
-            graph.repeat(stretch.draw_stretch, layout.head, layout.atlas)
+            graph.repeat(atlas_passes.draw_stretch, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
-            self._light(graph, layout, inputs.light_constants, made.diffusion.levels.layer(0), blur.scale)
-            self.blur_levels(graph, made.diffusion.levels, layout.atlas, blur)
+            self._light(graph, layout, inputs.light_constants, levels.layer(0), blur.scale)
+            self.blur_levels(graph, levels, layout.atlas, blur)
             thin = layout.translucency
             if thin:
-                translucency_weights.draw_weights(graph, thin)
+                translucency.draw_weights(graph, thin)
                 if thin.uses_tables:
                     translucency.draw_direction_factors(graph, layout, thin, inputs.light_constants)
-            through = translucency.draw(graph, made.diffusion.levels, blur, thin) if thin else None
-            self._add_up(
-                graph,
-                made.diffusion.levels,
-                blur,
-                layout.scattered,
-                through,
-                thin.pairs.lost if thin else None,
-            )
-        return made.scattered
+            transmitted = translucency.draw(graph, levels, blur, thin) if thin else None
+            lost = thin.pairs.lost if thin else None
+            self._sum_levels(graph, levels, blur, layout.scattered, transmitted, lost)
+        return resources.scattered
 
     def blur_program(self, device: Device, constants: Constants) -> RenderProgram:
         """Return the program of the pass along one axis."""
@@ -93,44 +87,41 @@ class FragmentPasses(GpuGems3):
         graph.fill("diffuse", shader, bound, into)
 
     def _light(
-        self, graph: Graph, layout: LitAtlas, constants: Constants, into: TextureOrView, scale: float
+        self, graph: Graph, layout: LitAtlas, constants: Constants, target: TextureOrView, scale: float
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
-        bound = {
-            **layout.bindings,
-            "surfaces": layout.surfaces,
-            "entering": shader.record("Entering", scale=scale),
-        }
-        graph.fill("irradiance", shader, bound, [into])
+        entering = shader.record("Entering", scale=scale)
+        bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
+        graph.fill("irradiance", shader, bound, [target])
 
-    def _add_up(
+    def _sum_levels(
         self,
         graph: Graph,
         levels: PyramidLevels,
         blur: Blur,
-        into: Texture,
-        through: Texture | None,
+        target: Texture,
+        transmitted: Texture | None,
         lost: Texture | None,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
         padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
-        counts = {"count": len(blur.weight), "through": through is not None}
+        counts = {"count": len(blur.weight), "through": transmitted is not None}
         bound: MutableBindings = {
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
-            "transmitted": no_light(graph.device) if through is None else through,
+            "transmitted": no_light(graph.device) if transmitted is None else transmitted,
             "lost": no_light(graph.device) if lost is None else lost,
         }
-        graph.fill("combine", shader, bound, [into])
+        graph.fill("combine", shader, bound, [target])
 
 
 def _fragment_program(device: Device, name: str, constants: Constants, targets: list[str]) -> RenderProgram:
     def make() -> RenderProgram:
         path, folders = _FOLDER / name, shader_folders()
-        chosen = program_constants(device, path, folders, constants)
-        return RenderProgram(device, path, folders, chosen, targets=targets)
+        all_constants = program_constants(device, path, folders, constants)
+        return RenderProgram(device, path, folders, all_constants, targets=targets)
 
     return cached_program(device, (name, registry_version()), constants, make)
 

@@ -20,8 +20,6 @@ from dermis.specular.models import MODELS
 _REPEATS = 5
 _WARMUP_S = 0.5  # because an idle GPU has a reduced clock rate
 _SHADER = Path(__file__).with_suffix(".wgsl")
-
-
 _SIDE, _LIGHTS = 1024, 64  # points along each side, and lights per point
 _SIDE_ON_CPU, _LIGHTS_ON_CPU = 256, 16
 
@@ -35,9 +33,8 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     side, lights = (_SIDE_ON_CPU, _LIGHTS_ON_CPU) if on_cpu else (_SIDE, _LIGHTS)
     skins = [Skin.model_validate({"specular": m, "fresnel": f}) for m in MODELS for f in FRESNEL]
     overrides = [{"IDLE": 1}, *(dict(surface_constants(skin)) for skin in skins)]
-    programs = [
-        ComputeProgram(device, _SHADER, shader_folders(), {"LIGHTS": lights, **one}) for one in overrides
-    ]
+    constants = ({"LIGHTS": lights, **one} for one in overrides)
+    programs = [ComputeProgram(device, _SHADER, shader_folders(), one) for one in constants]
     bound = {
         "skin": programs[-1].record("Skin", f0=SKIN_F0, eta=SKIN_ETA),
         "beckmann_table": texture_from_array(device, beckmann_table(), "r32float"),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, Case, case_scenes, case_settings
 from dermis.apps.validation.benchmarks.floor import frame_traffic, stage_bytes
-from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES
 from dermis.frame.renderer import Renderer
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import gpu_failures
@@ -41,10 +41,8 @@ class FrameCounts:
         """Return fewer frames where these would take longer than `seconds` at `frame_ms` each."""
         frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
         fraction = min(1.0, 1e3 * seconds / (frame_ms * frames))
-        counts_by_name = asdict(self).items()
-        return FrameCounts(
-            **{name: min(count, max(1, int(fraction * count))) for name, count in counts_by_name}
-        )
+        counts = asdict(self).items()
+        return FrameCounts(**{name: min(count, max(1, int(fraction * count))) for name, count in counts})
 
 
 CPU_FRAME_COUNTS = FrameCounts(warmup=0, between=0, timed=3, sequence=3)
@@ -90,7 +88,7 @@ def measure_case(
 
     Raises DermisError for frames that the device cannot hold.
     """
-    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
         return _measure_case(renderer, case, head, folder, rate, counts)
 
 
@@ -148,8 +146,8 @@ def stage_ms(
         for timing in timings:
             sequence_ms(renderer, scenes, counts.between, settings)
             times[timing].append(renderer.draw(next(scenes), settings, timed=timing).gpu_ms or {})
-    found = {stage: statistics.median(one[stage] for one in times[True]) for stage in times[True][0]}
-    return found | {"total": statistics.median(one["total"] for one in times[timings[-1]])}
+    stages = {stage: statistics.median(one[stage] for one in times[True]) for stage in times[True][0]}
+    return stages | {"total": statistics.median(one["total"] for one in times[timings[-1]])}
 
 
 def _host_times_ms(

@@ -52,7 +52,7 @@ def _row_json(row: BenchmarkRow) -> JsonObject:
 
 
 _PUBLISHED_COLUMNS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENT_TECHNIQUE: "2007, fragments [ms]"}
-_CASE_COLUMNS = ("image", "atlas", "Gaussians", "lights", "around", "targets", "triangles", "technique")
+_CASE_COLUMNS = ("image", "atlas", "Gaussians", "lights", "environment", "targets", "triangles", "technique")
 _TIME_COLUMNS = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
 COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
@@ -79,16 +79,14 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     if benchmark.base_row is None:
         return []
     base_row = benchmark.base_row
-    other_times = {
-        title: row.gpu_ms for name, title in _PUBLISHED_COLUMNS.items() if (row := benchmark.row_of(name))
-    }
+    other_rows = {title: benchmark.row_of(name) for name, title in _PUBLISHED_COLUMNS.items()}
+    other_times = {title: row.gpu_ms for title, row in other_rows.items() if row}
     table = [("stage", "device [ms]", "floor [ms]", "ratio", *other_times)]
     for stage, ms in base_row.gpu_ms.items():
         floor = base_row.floor_ms.get(stage)
         floor_cells = (three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
-        other_cells = (
-            three_digits(times[stage]) if stage in times else "-" for times in other_times.values()
-        )
+        others = (times.get(stage) for times in other_times.values())
+        other_cells = ("-" if time is None else three_digits(time) for time in others)
         table.append((stage, three_digits(ms), *floor_cells, *other_cells))
     return table
 
@@ -96,14 +94,14 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
 def published_text(benchmark: Benchmark) -> str:
     """Return a sentence with the relative time of the passes of GPU Gems 3, if they were measured."""
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
-    found = {form: benchmark.ratio(name) for name, form in names.items()}
-    parts = [f"{ratio:.2f} times as long {form}" for form, ratio in found.items() if ratio is not None]
+    ratios = {form: benchmark.ratio(name) for name, form in names.items()}
+    parts = [f"{ratio:.2f} times as long {form}" for form, ratio in ratios.items() if ratio is not None]
     return f"With the passes of 2007 it takes {' and '.join(parts)}." if parts else ""
 
 
 def skipped_lines(benchmark: Benchmark) -> list[str]:
     """Return lines about cases that could not be measured, with reasons."""
-    return [f"left out: {_case_text(one.case)}: {one.reason}" for one in benchmark.skipped]
+    return [f"skipped: {_case_text(one.case)}: {one.reason}" for one in benchmark.skipped]
 
 
 def _case_text(case: Case) -> str:
@@ -181,7 +179,7 @@ def scaling(benchmark: Benchmark) -> str:
         axes.set(xlabel=label, xscale="log", yscale="log")
         _set_ticks(axes.xaxis, x)
         _set_ticks(axes.yaxis, None)
-    panels[0].set_ylabel("ms a frame")
+    panels[0].set_ylabel("ms per frame")
     panels[0].legend(frameon=False, labelcolor=_TEXT, fontsize=8)
     return _svg(figure)
 

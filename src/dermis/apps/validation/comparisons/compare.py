@@ -144,9 +144,9 @@ def check_names(against: str, light: str, region: str, medium: str) -> None:
         "region": (region, REGIONS),
         "medium": (medium, media()),
     }
-    for option, (chosen, known) in choices.items():
-        if chosen not in known:
-            refuse(f"--{option}", f"one of {', '.join(known)}", f"got {chosen!r}", "Choose one of them")
+    for option, (name, known) in choices.items():
+        if name not in known:
+            refuse(f"--{option}", f"one of {', '.join(known)}", f"got {name!r}", "Choose one of them")
 
 
 def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 _FULL_COVERAGE = 0.999  # of a pixel
 _WHITE_PERCENTILE = 98.0
 
@@ -47,7 +48,7 @@ class PersonComparison:
     ours: Floats
     reference: Floats
     variance: Floats
-    mask: NDArray[np.bool_]
+    mask: Mask
     relrmse: Estimate
     energy: Estimate
     energy_by_channel: tuple[Estimate, ...]
@@ -129,22 +130,11 @@ def trace_view(
     assert colour is not None  # painted maps always have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
-    return path_trace_person(
-        scene,
-        textures,
-        distance,
-        colour,
-        size,
-        samples,
-        variant=variant,
-        use_cache=use_cache,
-        progress=progress,
-    )
+    options: dict[str, Any] = {"variant": variant, "use_cache": use_cache, "progress": progress}
+    return path_trace_person(scene, textures, distance, colour, size, samples, **options)
 
 
-def comparison_of(
-    name: str, ours: Floats, reference: PathTraced, mask: NDArray[np.bool_]
-) -> PersonComparison:
+def comparison_of(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
     """Return both pictures with the errors of ours."""
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
@@ -260,7 +250,6 @@ def as_softbox(light: Light) -> Light:
     return RectangleLight(**shared, width_mm=_SOFTBOX_MM, height_mm=_SOFTBOX_MM)
 
 
-Mask = NDArray[np.bool_]
 _PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
 _IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
 _HIGHLIGHT_FACTOR = 1.6  # brightness of highlights over the median of the ring

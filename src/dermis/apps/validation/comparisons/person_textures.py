@@ -41,7 +41,7 @@ def person_textures(renderer: Renderer, scene: Scene, side: int = 2048) -> SkinT
     """
     head = scene.head
     if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
-        refuse(head.name, "a head of the parametric human with painted skin", "it is none", "Load human")
+        refuse(head.name, "a parametric human with painted skin", "it is another head", "Load human")
     return renderer.reopening_device.run(partial(_paint_textures, renderer, scene, head.maps.look, side))
 
 

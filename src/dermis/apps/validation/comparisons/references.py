@@ -77,7 +77,7 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
     lit, profile = irradiance_samples(subject), subject.profile
     exitance = _integrated(hit_positions(subject, seen), lit, profile.weight, profile.variance_mm2)
-    return _image_of_points(seen, exitance, started, f"{len(lit.positions):,} samples of irradiance")
+    return _image_of_points(seen, exitance, started, f"{len(lit.positions):,} irradiance samples")
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -123,8 +123,8 @@ def surface_heat_around(
     mask = seen.mask.copy()
     mask[seen.mask] = inside
     compared = SurfacePoints(mask, seen.triangle[inside], seen.barycentric[inside])
-    note = f"{radius_mm:g} mm around the middle; "
-    note += f"{narrow.sum()} Gaussians under {min_mm2:g} mm2 by straight lines"
+    note = f"{radius_mm:g} mm around the middle; {narrow.sum()} Gaussians under {min_mm2:g} mm2 "
+    note += "by Euclidean distance"
     return replace(_image_of_points(compared, exitance, started, note), has_translucency=False)
 
 
@@ -146,7 +146,7 @@ def path_traced_reference(subject: ComparisonSubject, samples: int) -> Reference
     from dermis.apps.truths.path_traced import path_trace
 
     traced = path_trace(subject.scene, subject.medium, samples, subject.settings)
-    return replace(_reference_image(traced, f"{traced.samples} paths a pixel"), direction="half-space")
+    return replace(_reference_image(traced, f"{traced.samples} paths per pixel"), direction="half-space")
 
 
 def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -157,7 +157,7 @@ def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage
     from dermis.apps.truths.cycles import cycles_render
 
     traced = cycles_render(subject.scene, subject.medium, samples, subject.settings)
-    return _reference_image(traced, f"{traced.samples} paths a pixel, random walk")
+    return _reference_image(traced, f"{traced.samples} paths per pixel, random walk")
 
 
 REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {

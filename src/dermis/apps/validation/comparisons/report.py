@@ -17,7 +17,7 @@ from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
 
 Floats = NDArray[np.float64]
-_COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms a frame")
+_COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame")
 
 
 def write_report(path: Path, comparison: Comparison) -> None:
@@ -26,7 +26,7 @@ def write_report(path: Path, comparison: Comparison) -> None:
     Raises DermisError when it cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
-    reference = _figure("the truth", comparison.tone_mapped(comparison.reference.image))
+    reference = _figure("reference", comparison.tone_mapped(comparison.reference.image))
     figures = [_figures(comparison, row) for row in comparison.rows]
     page = text.substitute(
         title=html.escape(comparison.title),
@@ -38,8 +38,8 @@ def write_report(path: Path, comparison: Comparison) -> None:
         keys=" ".join(comparison_sources(comparison.against, comparison.images)),
         figures="\n".join([reference, *figures]),
     )
-    with atomic_file(path) as trial:
-        trial.write_text(page, encoding="utf-8")
+    with atomic_file(path) as file:
+        file.write_text(page, encoding="utf-8")
 
 
 def cells(row: ComparisonRow) -> tuple[str, ...]:
@@ -66,9 +66,8 @@ def _table(rows: tuple[ComparisonRow, ...]) -> str:
 
 def _figures(comparison: Comparison, row: ComparisonRow) -> str:
     image, reference = comparison.images[row.technique], comparison.reference
-    difference = signed_difference(
-        np.maximum(comparison.exposure * image, 0.0), np.maximum(comparison.exposure * reference.image, 0.0)
-    )
+    ours, exact = (np.maximum(comparison.exposure * one, 0.0) for one in (image, reference.image))
+    difference = signed_difference(ours, exact)
     difference = np.where(reference.mask[..., None], difference, MID_GREY)
     pictures = {row.technique: comparison.tone_mapped(image), f"{row.technique}: difference": difference}
     return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())

@@ -9,10 +9,10 @@ COMMANDS = {
     f"{HERE}.page:page": "Write the tables of docs/engines.md between their marks.",
     f"{HERE}.babylon:babylon": "Measure edges of light in Babylon.js; needs Chromium and DERMIS_BABYLON.",
     f"{HERE}.blender:blender": "Measure edges, heads and a picture in Cycles; needs two Pythons with bpy.",
-    f"{HERE}.gltf:gltf": "Compute what glTF's draft of scattering can say of skins.",
-    f"{HERE}.heads:heads": "Draw one head in all programs that are here, beside ours.",
+    f"{HERE}.gltf:gltf": "Compute errors of skins in glTF's draft of volume scattering.",
+    f"{HERE}.heads:heads": "Render one head in all installed programs and compare it with ours.",
     f"{HERE}.mitsuba:mitsuba": "Measure edges of light in Mitsuba.",
-    f"{HERE}.openpbr:openpbr": "Compute what OpenPBR, MaterialX's profile and pbrt make of skins.",
+    f"{HERE}.openpbr:openpbr": "Compute errors of skins in OpenPBR, MaterialX's profile and pbrt.",
 }
 
 if __name__ == "__main__":

@@ -145,9 +145,8 @@ def exported_skin(page: Page, name: str) -> JsonObject:
     responses = edge_responses(page, colour, metres, d_mm)
     x = np.array(responses["x_mm"])
     difference = np.array(responses["edge"]) - subject.curve.edge_response(x)
-    return responses | {
-        "measured_less_profile": _max_by_channel(difference, np.abs(x)[:, None] <= 6.0 * d_mm)
-    }
+    error = _max_by_channel(difference, np.abs(x)[:, None] <= 6.0 * d_mm)
+    return responses | {"measured_less_profile": error}
 
 
 COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}

@@ -82,20 +82,12 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
     """Return measured, predicted and true edge responses of one skin."""
     subject, target = load_subject(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
-    shown = target.predicted_curve(rows, subject, version)
+    predicted_curve = target.predicted_curve(rows, subject, version)
     naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
     samples = SAMPLES_BY_METHOD.get(method, DEFAULT_SAMPLES)
-    passes = [
-        {
-            "channel": c,
-            "width_m": 12e-3 * d[c],
-            "size": [BINS * BIN_COLUMNS, ROWS],
-            "samples": samples,
-            "seed": k,
-        }
-        for k in range(SEEDS)
-        for c in range(3)
-    ]
+    shared = {"size": [BINS * BIN_COLUMNS, ROWS], "samples": samples}
+    channels = [(k, c) for k in range(SEEDS) for c in range(3)]
+    passes = [{"channel": c, "width_m": 12e-3 * d[c], "seed": k, **shared} for k, c in channels]
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name)
         target.write(subject, rows, folder, version)
@@ -104,7 +96,7 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
     means = columns.reshape(SEEDS, 3, BINS, BIN_COLUMNS).mean(axis=-1)
-    predicted, true = (binned_response(curve, d) for curve in (shown, subject.curve))
+    predicted, true = (binned_response(curve, d) for curve in (predicted_curve, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
@@ -121,7 +113,7 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
         "energy": (np.pi * radiance / subject.curve.energy).round(4).tolist(),
         "typed_in": curve_error(subject.curve, naive).edge.round(4).tolist(),
-        "predicted_energy": (shown.energy / subject.curve.energy).round(4).tolist(),
+        "predicted_energy": (predicted_curve.energy / subject.curve.energy).round(4).tolist(),
     }
 
 
@@ -148,13 +140,12 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture of our head beside those of Cycles, with hair."""
+    """Write a picture that compares our head with those of Cycles, with hair."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     columns = [render_ours(subject, PICTURE_SIDE)]
     for version, python in pythons.items():
-        columns += render_cycles(
-            subject, METHODS_BY_VERSION[version][0], version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1
-        )
-    shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
-    levels = encode_srgb(np.clip(np.concatenate(shown, axis=1), 0.0, 1.0))
+        method = METHODS_BY_VERSION[version][0]
+        columns += render_cycles(subject, method, version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
+    over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
+    levels = encode_srgb(np.clip(np.concatenate(over_grey, axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

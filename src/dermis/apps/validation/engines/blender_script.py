@@ -56,10 +56,11 @@ def main(folder: Path) -> None:
     (folder / "done.json").write_text(json.dumps(report), encoding="utf-8")
 
 
-def set_channel(shader: Any, described: dict[str, Any], channel: int) -> None:
+def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
     """Give all three channels the colour and the radius of one, so that all paths contribute to it."""
-    shader.inputs["Base Color"].default_value = (*[described["colour"][channel]] * 3, 1.0)
-    shader.inputs["Subsurface Radius"].default_value = [described["inputs"]["Subsurface Radius"][channel]] * 3
+    shader.inputs["Base Color"].default_value = (*[description["colour"][channel]] * 3, 1.0)
+    radius = description["inputs"]["Subsurface Radius"][channel]
+    shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
 def rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
@@ -81,9 +82,7 @@ def black_material() -> Any:
     return material
 
 
-def column_radiance(
-    skin: Any, camera: Any, path: Path, width_m: float, size: list[int], **parameters: int
-) -> Any:
+def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: Any, **parameters: int) -> Any:
     """Return the mean radiance of each column of a picture of this width, across the edge of the light."""
     camera.ortho_scale = width_m
     scene = bpy.context.scene

@@ -1,4 +1,4 @@
-"""Predicted errors of skins in glTF's draft of volume scattering, with other readings of its parameters."""
+"""Predicted errors of skins in glTF's draft of volume scattering, by interpretation of its parameters."""
 
 from __future__ import annotations
 

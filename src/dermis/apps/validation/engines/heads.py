@@ -1,6 +1,6 @@
 """One exported head with its camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
 
-Hair is left out, because each program draws it differently. Lights are parallel, as on Babylon's page.
+Hair is omitted, because each program draws it differently. Lights are parallel, as on Babylon's page.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LIGHTS = (
 )
 LIT_THRESHOLD = 0.25  # of the mean light; darker pixels are in shadow
 HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
-HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is left out
+HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is excluded
 Floats = NDArray[np.float64]
 
 
@@ -57,15 +57,15 @@ def heads() -> None:
     hairless = replace(subject.head, hair=None, strands=None)
     subject = replace(subject, scene=replace(subject.scene, head=hairless, lights=LIGHTS))
     ours = render_ours(subject, SIDE)
-    shown, rows = [ours], []
+    columns, rows = [ours], []
     for name, draw in available_renderers(subject, ours).items():
         pictures = np.stack(draw())
         result = {"program": name, **compare_pictures(ours, pictures)}
         print_lines(str(result))
-        shown.append(pictures.mean(axis=0))
+        columns.append(pictures.mean(axis=0))
         rows.append(result)
         write_results(FIGURES, {"heads": rows}, 4)
-    levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in shown], axis=1), 0.0, 1.0))
+    levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in columns], axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
 
 
@@ -92,8 +92,8 @@ def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
-        frames = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
-    light = decode_srgb(np.asarray(frames) / 255.0)
+        canvas = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
+    light = decode_srgb(np.asarray(canvas) / 255.0)
     return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
 
 

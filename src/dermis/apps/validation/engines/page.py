@@ -78,14 +78,8 @@ def mitsuba_table() -> str:
 
 def babylon_table() -> str:
     """Return the table of edges in Babylon.js."""
-    heads = (
-        "profile",
-        "d [mm]",
-        "nearest lobe, measured [mm]",
-        "measured less its samples' prediction",
-        "less true lobes",
-        "less the skin's profile",
-    )
+    errors = "measured less its samples' prediction", "less true lobes", "less the skin's profile"
+    heads = "profile", "d [mm]", "nearest lobe, measured [mm]", *errors
     differences = (f"measured_less_{name}" for name in ("predicted", "lobes", "profile"))
     names = ("expected_d_mm", "fitted_d_mm", *differences)
     skins = read_results(RESULTS / "engines_babylon.json")["skins"]

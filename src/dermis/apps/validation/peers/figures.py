@@ -164,7 +164,7 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
         rows.append(RendererRow(CYCLES_NAMES[method], setting, seconds, core_seconds, noise, *error, *energy))
     error = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance)
     energy = energy_ratio(mean.image, reference.image, mask, reference.variance)
-    return [*rows, RendererRow(CYCLES_NAMES[method], "noise taken off", None, None, 0.0, *error, *energy)]
+    return [*rows, RendererRow(CYCLES_NAMES[method], "noise subtracted", None, None, 0.0, *error, *energy)]
 
 
 def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow, mask: Mask) -> JsonObject:
@@ -200,4 +200,4 @@ def _corrected_error(renders: PeerRenders, name: str, mask: Mask) -> float:
 
 
 def _samples_text(samples: int) -> str:
-    return f"{samples} paths a pixel"
+    return f"{samples} paths per pixel"

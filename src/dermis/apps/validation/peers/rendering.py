@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.apps.truths.cycles import CyclesPass, Method, cycles_passes
 from dermis.apps.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
-from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES as AS_FRAGMENTS
+from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES
 from dermis.apps.validation.comparisons.scenes import default_region, medium_scene
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
@@ -125,7 +125,7 @@ def render_peers(
         on_progress(SAMPLES_PER_PASS * _STEPS["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
-    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS), scene_context as (scene, _):
+    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEEDS:
             for method in METHODS:
                 _add_frames(ours, renderer, scene, plan)
@@ -156,9 +156,8 @@ def _cycles_passes(
 def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
     """Add frames with warm caches that recompute everything."""
     for name, variant in (VARIANTS | GPU_GEMS_3_VARIANTS).items():
-        settings = Settings.model_validate(
-            {"size": (plan.side, plan.side), "technique": variant.technique, "atlas": variant.atlas}
-        )
+        values = {"technique": variant.technique, "atlas": variant.atlas}
+        settings = Settings.model_validate(values | {"size": (plan.side, plan.side)})
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
         drawn = renderer.draw(variant_scene, settings, force=True)

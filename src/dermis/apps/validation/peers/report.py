@@ -18,7 +18,7 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, write_results
 from dermis.apps.validation.peers.figures import scene_results
-from dermis.apps.validation.peers.rendering import METHODS, PeerPlan, PeerRenders, render_peers
+from dermis.apps.validation.peers.rendering import PeerPlan, PeerRenders, render_peers
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
@@ -72,7 +72,7 @@ def peers(
 
 
 def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
-    """Return the whole report, ready for JSON; without Cycles its rows are left out.
+    """Return the whole report, ready for JSON; without Cycles its rows are missing.
 
     Raises DermisError for unknown lights, and without Mitsuba, which renders the reference.
     """
@@ -83,7 +83,7 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
     try:
         blender_python()
     except DermisError as fault:
-        note(f"Cycles is left out. {fault}")
+        note(f"Cycles is skipped. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
     scenes: list[PeerRenders] = []
     with progress_bar("measuring") as bar:
@@ -110,13 +110,11 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
 
 def versions(scenes: list[PeerRenders]) -> dict[str, str]:
     """Return the versions of Python and of everything that renders."""
-    times = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
-    passes = [
-        turns[0][0] for one in scenes for method in METHODS for turns in [one.cycles.get(method)] if turns
-    ]
+    numbers = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
+    passes = [turns[0][0] for one in scenes for turns in one.cycles.values() if turns]
     if passes:
-        times["Blender"] = passes[0].version
-    return times | {"Python": platform.python_version()}
+        numbers["Blender"] = passes[0].version
+    return numbers | {"Python": platform.python_version()}
 
 
 def cpu_model() -> str:
@@ -131,9 +129,8 @@ def cpu_model() -> str:
 
 def scenes_text(report: JsonObject) -> str:
     """Return a Markdown section for each light."""
-    return "\n\n".join(
-        f"## {scene['light'].capitalize()}\n\n{scene_text(scene)}" for scene in report["scenes"]
-    )
+    sections = (f"## {one['light'].capitalize()}\n\n{scene_text(one)}" for one in report["scenes"])
+    return "\n\n".join(sections)
 
 
 def scene_text(scene: JsonObject) -> str:
@@ -147,22 +144,15 @@ def machine_text(report: JsonObject) -> str:
     """Return the date, the machine and the versions of a measurement, in one line."""
     versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
     side = report["plan"]["side"]
-    machine_description = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
-    return f"{report['date']}, {side}x{side}, {machine_description}; {versions}"
+    machine = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
+    return f"{report['date']}, {side}x{side}, {machine}; {versions}"
 
 
 def _table_line(row: JsonObject) -> str:
     seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
     noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
-    cells = (
-        row["renderer"],
-        row["setting"],
-        seconds,
-        noise,
-        _value(row, "relrmse"),
-        _value(row, "energy_ratio"),
-    )
-    return f"| {' | '.join(cells)} |"
+    cells = row["renderer"], row["setting"], seconds, noise
+    return f"| {' | '.join((*cells, _value(row, 'relrmse'), _value(row, 'energy_ratio')))} |"
 
 
 def _value(row: JsonObject, name: str) -> str:
@@ -172,34 +162,31 @@ def _value(row: JsonObject, name: str) -> str:
 def _sentences(scene: JsonObject) -> list[str]:
     sentences = [_random_walk_sentence(setting, times) for setting, times in scene.get("as_near", {}).items()]
     corrected = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
-    sentences.append(f"Ours, each channel scaled to the truth's energy: {corrected}.")
+    sentences.append(f"Ours, each channel scaled to the reference's energy: {corrected}.")
     sentences += [
         f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
-        f"{ratio['core_ratio']:.2f} times by the cores' time."
+        f"{ratio['core_ratio']:.2f} times in CPU time."
         for name, ratio in scene.get("published", {}).items()
     ]
     if "burley_against_random_walk" in scene:
         sentences.append(_burley_sentence(scene))
-    return sentences + [f"Left out: {name}. {why}" for name, why in scene["left_out"].items()]
+    return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene["left_out"].items()]
 
 
 def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
-    clean_cost = f"to 5 % noise {_time_text(times['clean'])}"
+    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_time_text(times['clean'])}"
     if "same_error" not in times:
-        return (
-            f"{setting}: Cycles' random walk never comes as near, for its own bias is greater; {clean_cost}."
-        )
+        return f"{walk} never has as small an error, because its bias is larger; {clean}."
     same = times["same_error"]
     reached = "reached" if same["ratio"] >= TARGET_RATIO else "not reached"
-    sentence = f"{setting}: Cycles' random walk comes as near in {_time_text(same)}"
-    return f"{sentence}, goal {TARGET_RATIO:.0f} {reached}; {clean_cost}."
+    return f"{walk} has the same error after {_time_text(same)}, goal {TARGET_RATIO:.0f} {reached}; {clean}."
 
 
 def _time_text(times: dict[str, float]) -> str:
     """Return time and paths, and the ratios of elapsed and CPU time to our frame."""
     elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
-    cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths a pixel)"
-    return f"{cost}: {elapsed} times our frame, {cpu} by the cores' time"
+    cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"
+    return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"
 
 
 def _ratio_text(ratio: float) -> str:
@@ -209,16 +196,12 @@ def _ratio_text(ratio: float) -> str:
 def _burley_sentence(scene: JsonObject) -> str:
     """Return the error of Burley's profile against the random walk, and ours against path tracing."""
     burley_error, error = scene["burley_against_random_walk"]
-    ours = {
-        row["setting"]: row["relrmse"]
-        for row in scene["rows"]
-        if row["setting"] in scene["ours_energy_put_right"]
-    }
-    verdicts = "; ".join(
-        f"{name} {times:.4f}, {'reached' if times <= burley_error else 'not reached'}"
-        for name, times in ours.items()
-    )
+    verdicts = []
+    for row in scene["rows"]:
+        if row["setting"] in scene["ours_energy_put_right"]:
+            reached = "reached" if row["relrmse"] <= burley_error else "not reached"
+            verdicts.append(f"{row['setting']} {row['relrmse']:.4f}, {reached}")
     return (
-        f"Burley's profile is {burley_error:.4f} ± {error:.4f} from the random walk; "
-        f"ours shall be no farther from path tracing: {verdicts}."
+        f"The error of Burley's profile against the random walk is {burley_error:.4f} ± {error:.4f}; "
+        f"the goal is that ours against path tracing is no larger: {'; '.join(verdicts)}."
     )

@@ -19,7 +19,7 @@ def draw(
     graph: Recorder,
     levels: PyramidLevels,
     blur: Blur,
-    into: TextureOrView,
+    target: TextureOrView,
     transmitted: Texture | None = None,
     lost: Texture | None = None,
 ) -> None:
@@ -57,11 +57,11 @@ def draw(
             "transmitted": no_light(device) if added is None else added,
             "lost": no_light(device) if lost is None else lost,
             "linear": device.sampler(mag_filter="linear", min_filter="linear"),
-            "stored": levels.scratch_view(mip) if mip else into,
+            "stored": levels.scratch_view(mip) if mip else target,
         }
         graph.compute("combine", shader, bindings, (levels.size >> mip,) * 2, TILE)
 
 
 def no_light(device: Device) -> Texture:
     """Return a placeholder of 1 x 1 texels for a texture of light that the shader does not read."""
-    return device.cached("nothing", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
+    return device.cached("no light", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))

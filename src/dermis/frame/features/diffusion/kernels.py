@@ -93,12 +93,12 @@ def _add_intermediate_levels(
     chain = list(profile_mm2)
     min_cost = chain_cost(chain, texels_per_mm, max_halvings)
     for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # of a texel [mm]
-        between = _HALVING_MARGIN * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_DEVIATION * side) ** 2
-        if between >= profile_mm2[-1]:
+        level_mm2 = _HALVING_MARGIN * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_DEVIATION * side) ** 2
+        if level_mm2 >= profile_mm2[-1]:
             continue
-        if any(between < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * between for v in chain):
+        if any(level_mm2 < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * level_mm2 for v in chain):
             continue
-        candidate = sorted({*chain, between})
+        candidate = sorted({*chain, level_mm2})
         cost = chain_cost(candidate, texels_per_mm, max_halvings)
         if cost < (1.0 - _MIN_SAVING) * min_cost:
             chain, min_cost = candidate, cost

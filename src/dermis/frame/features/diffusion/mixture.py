@@ -28,7 +28,7 @@ class Mixture:
     """Textures for skin whose profile is mixed by a map from a first profile and one or two others.
 
     uv_weights : texture of the blend weights of the other profiles over uv
-    entering : pyramid for the light that enters skin of each other profile
+    entering : pyramids for the light that enters skin of each other profile
     atlas_weights : textures of these blend weights over the atlas, one for each layout
     sums : texture array: the first layer is the light by the first profile alone; two layers for each other
         profile hold what it changes, by the blend weights where light leaves and where it enters
@@ -78,7 +78,7 @@ def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Textur
 def load_blend_weights(name: str) -> NDArray[np.float32]:
     """Return the (h, w, 2) blend weights of an image file, which is read again only when it has changed.
 
-    Raises DermisError for a missing file and for what is no such image.
+    Raises DermisError for a file that is missing or not such an image.
     """
     path = checked_path(name, "a map of profiles")
     try:
@@ -125,12 +125,12 @@ def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, inde
     graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE)
 
 
-def draw(graph: Recorder, mixture: Mixture, index: int, into: Texture) -> None:
+def draw(graph: Recorder, mixture: Mixture, index: int, target: Texture) -> None:
     """Mix the sums of blurred light, and store the packed blend weights in the alpha channel.
 
     index : number of the layout
     """
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
     weights = mixture.atlas_weights[index]
-    bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": into}
-    graph.compute("profiles", shader, bindings, into.size[:2], TILE)
+    bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": target}
+    graph.compute("profiles", shader, bindings, target.size[:2], TILE)

@@ -99,7 +99,7 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def strand_capacity(head: Head) -> StrandCapacity:
-    """Return the capacity for the strands of a head, rounded up so that it suits most other heads too."""
+    """Return the capacity for the strands of a head, rounded up to suffice for most other heads too."""
     fine, coarse = map(strand_counts, (head.strands, head.hair))
     knots, step = fine.all_knots() + coarse.all_knots(), _KNOT_STEP if coarse.hairs else _FINE_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_STEP), _round_up(knots, step))

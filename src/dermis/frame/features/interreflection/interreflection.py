@@ -23,7 +23,7 @@ _TEAM = 16  # invocations of a patch or a cell
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the numbers that shaders of this feature are generated with."""
+    """Return the constants of the shaders of interreflection by their `//#fill` names."""
     return {"linked_side": SIDE, "linked_samples": SAMPLES}
 
 
@@ -78,8 +78,8 @@ def make_interreflection(
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a convex one.
 
-    albedo : (3,) of the profile
-    has_occlusion : whether a map tells how much of the sky each point sees
+    albedo : (3,) albedo of the profile
+    has_occlusion : whether there is a map of the visible fraction of the sky
     light_key : cache key of the light, for callers that draw several scenes in turn
     owner : name of the atlas layout in the memo
     """

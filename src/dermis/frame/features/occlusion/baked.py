@@ -42,7 +42,7 @@ def bake_occlusion(
     Depth maps are drawn from directions all around; each point counts those in which it is visible. The first
     `side` rows are texels of the atlas, the other rows hold the vertices.
 
-    bindings : resources of the lighting, those of the surface aside
+    bindings : resources of the lighting without those of the surface
     texels : texture of the texels of the atlas
     side : texels of the result along each side of the atlas
     """
@@ -94,12 +94,12 @@ def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 def occlusion_map(device: Device, head: Head, atlas: Atlas, bindings: Bindings, texels: Texture) -> Texture:
     """Return the texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
-    bindings : resources of the lighting, those of lights aside
+    bindings : resources of the lighting without those of lights
     texels : texture of the texels of the atlas
     """
     side = min(atlas.size, _MAX_SIDE)
 
-    @logged_step("finding how much of the sky each place sees")
+    @logged_step("computing the ambient occlusion")
     def bake() -> NDArray[np.uint16]:
         baked = bake_occlusion(device, head, atlas, bindings, texels, side)
         integers: NDArray[np.uint16] = np.rint(65535.0 * fill_gaps(baked, side)).astype(np.uint16)

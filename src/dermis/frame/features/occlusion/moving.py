@@ -181,7 +181,7 @@ def draw(
 ) -> None:
     """Update the occlusion maps of all layouts for the current shape.
 
-    record : of the views, see `sky_record`
+    record : record of the views, see `sky_record`
     """
     _draw_vertices(graph, sky, views, record, maps[0][0].head)
     for layout, occlusion in maps:

@@ -130,7 +130,7 @@ def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
     return texture
 
 
-def measure_thickness(graph: Recorder, translucency: Translucency, into: Texture) -> None:
+def measure_thickness(graph: Recorder, translucency: Translucency, target: Texture) -> None:
     """Declare the pass that writes the current thickness to a texture of `make_thickness_map`."""
     pairs, shader = translucency.pairs, program(graph.device, "outputs/thickness_map.wgsl")
     count, cells = pairs.receivers[1], pairs.cells
@@ -141,13 +141,13 @@ def measure_thickness(graph: Recorder, translucency: Translucency, into: Texture
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,
         "source_points": translucency.source_points,
-        "thickness_map": into,
+        "thickness_map": target,
     }
     graph.dispatch("outputs", shader, bindings, workgroup_grid(count))
 
 
 def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
-    """Return the resources of shading with all light, whichever part of it the picture shows."""
+    """Return the resources of shading with factor 1 for all components of the light."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}

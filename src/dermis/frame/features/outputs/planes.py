@@ -36,11 +36,11 @@ class Planes:
 
     @property
     def constants(self) -> Constants:
-        """Return the pipeline constants that tell the first channel of each output."""
+        """Return the pipeline constants that give the first channel of each output."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
     def first_channel(self, name: str) -> Constants:
-        """Return the pipeline constant that tells the first channel of one output."""
+        """Return the pipeline constant that gives the first channel of one output."""
         return ((f"{name.upper()}_FIRST", self._first_channels()[name]),)
 
     def byte_range(self, name: str) -> tuple[int, int]:

@@ -48,7 +48,7 @@ class Readback:
         """Wait for the picture and return it, (h, w, channels); can be called once."""
         return self._image(self.fetched.array())
 
-    def all(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
+    def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
         """Wait for the picture, its outputs by name and landmarks, and return them; replaces `image`."""
         raw, start, arrays = self.fetched.array(), _WORD * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
@@ -116,7 +116,7 @@ def _check_size(device: Device, size: int, limit: int, pixels: int, what: str = 
 
 
 def _packed_buffer(device: Device, picture: Picture, words: int) -> Buffer:
-    """Return the buffer of the packed picture, which the picture keeps."""
+    """Return the buffer for the packed picture, stored with the picture for the next readback."""
     if words not in picture.packed:
         picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")
     return picture.packed[words]

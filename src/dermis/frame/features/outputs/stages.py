@@ -120,11 +120,11 @@ def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
 
 
 def _members(stage: str) -> list[Member]:
-    return [Member(one.name, one.shader, _words(one)) for one in OUTPUTS.values() if one.stage == stage]
+    return [Member(one.name, one.shader, _wgsl_type(one)) for one in OUTPUTS.values() if one.stage == stage]
 
 
-def _words(output: Output) -> tuple[tuple[str, str], ...]:
-    """Return the WGSL type of an output, and its value where nothing is seen."""
+def _wgsl_type(output: Output) -> tuple[tuple[str, str], ...]:
+    """Return the WGSL type of an output, and its value in pixels without a surface."""
     kind = output.wgsl_type if output.channels == 1 else f"vec{output.channels}f"
     nothing = output.background if kind == "f32" else int(output.background)
     return ("type", kind), ("nothing", f"{kind}({nothing})")

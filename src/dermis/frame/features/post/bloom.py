@@ -43,9 +43,9 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: 
 
 
 def _step(
-    graph: Recorder, widen: int, own: Texture, smaller: Texture, into: Texture, *factors: float
+    graph: Recorder, widen: int, own: Texture, smaller: Texture, target: Texture, *factors: float
 ) -> None:
     shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widen),))
     record = shader.record("Bloom", own=factors[0], wider=factors[1])
-    bindings: Bindings = {"bloom": record, "picture": own, "smaller": smaller, "result": into}
-    graph.compute("bloom", shader, bindings, into.size[:2])
+    bindings: Bindings = {"bloom": record, "picture": own, "smaller": smaller, "result": target}
+    graph.compute("bloom", shader, bindings, target.size[:2])

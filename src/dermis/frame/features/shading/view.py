@@ -41,7 +41,7 @@ class Pinhole(NamedTuple):
 
     eye : position [mm]
     axes : unit vectors to the right, up and forward
-    window : what the picture shows of a plane in front of the eye
+    window : rectangle of the picture on a plane in front of the eye
     """
 
     eye: Triple

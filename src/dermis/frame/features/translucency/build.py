@@ -146,8 +146,8 @@ def make_pair_buffers(device: Device, cells: Cells, table: PairTable) -> PairBuf
         pairs=table.pairs,
         count=int(table.first[-1]),
         receiver_ranges=device.buffer(_receiver_ranges(cells, table), "STORAGE"),
-        transmitted=mark_scratch(device, _dark_map(device, cells.receiver_mask)),
-        lost=_dark_map(device, cells.receiver_mask),
+        transmitted=mark_scratch(device, _zero_light(device, cells.receiver_mask)),
+        lost=_zero_light(device, cells.receiver_mask),
     )
 
 
@@ -163,7 +163,7 @@ def _receiver_ranges(cells: Cells, table: PairTable) -> NDArray[np.uint32]:
     return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _dark_map(device: Device, surface: NDArray[np.bool_]) -> Texture:
+def _zero_light(device: Device, surface: NDArray[np.bool_]) -> Texture:
     """Return a texture of no light, with alpha 1 where there is surface."""
     light = np.zeros((*surface.shape, 4), np.float32)
     light[..., 3] = surface

@@ -62,7 +62,7 @@ def draw(
 ) -> Texture:
     """Sum the light that each receiver gets from its sources, and return the texture of it.
 
-    constants : of translucency.wgsl, in place of those that suit the device
+    constants : pipeline constants that replace the defaults of translucency.wgsl
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
@@ -111,22 +111,22 @@ def sum_pairs(
     graph: Recorder,
     thin: Translucency,
     source_light: Buffer,
-    into: Texture,
+    target: Texture,
     constants: Constants = (),
     stage: str = "translucency",
 ) -> None:
     """Sum the light of the sources at each receiver, weighted by the pairs.
 
     source_light : buffer of the light of each source
-    into : texture of the coarse atlas
-    constants : of translucency.wgsl, in place of those that suit the device
+    target : texture of the coarse atlas
+    constants : pipeline constants that replace the defaults of translucency.wgsl
     """
     device, pairs = graph.device, thin.pairs
     bindings: Bindings = {
         "receivers": pairs.receiver_ranges,
         "weights": thin.weights,
         "source_light": source_light,
-        "transmitted": into,
+        "transmitted": target,
     }
     team = dict((_SINGLE if device.adapter.kind == "CPU" else _TEAMS) + constants)
     shader = program(device, "translucency/translucency.wgsl", tuple(team.items()))

@@ -43,8 +43,8 @@ class Translucency:
     source_light : buffer of the light at the sources
     unit_light : buffer of light 1 at all sources
     direction_factors : buffer of the factor of each source's light in deep slabs, by its directions
-    weight_bindings, loss_bindings : what translucency_weights.wgsl reads of the profile: for the transmitted
-        light, and for the light that is not returned because of it
+    weight_bindings, loss_bindings : resources of the profile for translucency_weights.wgsl: for the
+        transmitted light, and for the light that is not returned because of it
     gaussian_count : number of Gaussians of the profile
     uses_tables : whether transmittance is read from tables by thickness
     source_level : index of the blurred level whose light enters, 0 for the first one

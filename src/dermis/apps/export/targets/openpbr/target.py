@@ -7,6 +7,7 @@ independent of its phase function. The parameters are fitted to the profile of s
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class OpenPbr(Target):
 
     name = "openpbr"
     title = "OpenPBR (MaterialX 1.39)"
-    suffixes = (".mtlx", "")
+    suffixes: ClassVar[tuple[str, ...]] = (".mtlx", "")
     versions = ("1.1.1",)
     variants = tuple(_SHADERS)
     needs_maps = True

@@ -169,7 +169,7 @@ def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
     return numbers, position
 
 
-def draw_candidates(
+def compute_positions(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
     """Return the buffers of the positions of receivers and sources, by their names in the shaders.
@@ -187,7 +187,7 @@ def draw_candidates(
     return {"receiver_points": receiver_points, "source_points": source_points}
 
 
-def upload_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
+def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
     """Upload the ranges that hits.wgsl reads; return the buffers, and the number of words of all hits."""
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
@@ -257,11 +257,11 @@ def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable |
     passes = SearchPasses(device, cells)
     tile_pairs = find_tile_pairs(passes, surface, cells)
     candidates = candidate_cells(cells, tile_pairs)
-    ranges, words = upload_ranges(passes, candidates)
+    ranges, words = upload_hit_ranges(passes, candidates)
     count = len(candidates.receiver)
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
-    points = draw_candidates(passes, surface, cells, candidates)
+    points = compute_positions(passes, surface, cells, candidates)
     hits, counts = make_buffer(device, words), make_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
     passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
