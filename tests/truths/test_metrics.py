@@ -40,7 +40,7 @@ def test_only_the_mask_counts() -> None:
 
 
 def scene() -> tuple[Floats, Floats, Floats]:
-    """A truth, a picture of it that errs by 8 % or so, and the deviation of one sample of the truth."""
+    """Return a truth, a picture of it with an error of 8 %, and the deviation of one sample of it."""
     y, x = np.mgrid[:24, :24] / 24.0
     truth = 0.2 + np.sin(3.0 * x) ** 2 + 0.3 * y
     return truth, truth * (1.0 + 0.08 * np.cos(9.0 * y)) + 0.03, 0.8 * truth

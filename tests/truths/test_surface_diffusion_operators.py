@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def skewed_plane(cells: int) -> tuple[Floats, NDArray[np.int64]]:
-    """A square grid joined by triangles that lean over three cells: each has an angle of 153 degrees."""
+    """Return a square grid of triangles that lean over three cells, with angles of 153 degrees."""
     row, column = (index.ravel() for index in np.mgrid[: cells + 1, : cells + 1])
     positions = np.column_stack((column, row, 0 * row)).astype(np.float64)
     r, c = (index.ravel() for index in np.mgrid[:cells, : cells - 3])
