@@ -40,7 +40,7 @@ class Camera(FrozenModel):
     --------
     >>> import dermis
     >>> camera = dermis.Camera(position=(0, 0, 1100), frame_mm=340)
-    >>> camera.to_opencv((512, 512)).K[1, 1].round(1)
+    >>> round(float(camera.to_opencv((512, 512)).K[1, 1]), 1)
     1656.5
     """
 
