@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
+from surface_areas import vertex_areas
 
 from dermis.apps.truths.surface_diffusion import (
     STEPS_PER_LEVEL,
@@ -14,7 +15,6 @@ from dermis.apps.truths.surface_diffusion import (
     max_edge_mm,
     patch_margin_mm,
     resolved_levels,
-    vertex_areas,
     welded_surface,
 )
 from dermis.base.errors import DermisError
@@ -202,4 +202,4 @@ def test_unfit_surface_is_refused() -> None:
     positions, triangles = rough_plane(6.0, 10)
     for bad in ((positions[:-1], triangles), (positions[:, :2], triangles), (positions * np.nan, triangles)):
         with pytest.raises(DermisError, match="finite positions"):
-            vertex_areas(*bad)
+            longest_edge_mm(*bad)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_areas import vertex_areas
 
 from dermis.apps.truths.surface_diffusion import (
     delaunay,
     intrinsic_triangulation,
     mass_and_stiffness,
-    vertex_areas,
     welded_surface,
 )
 from dermis.mesh.primitives import plane

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_areas import vertex_areas
 
 from dermis.apps.truths.surface_diffusion import (
     diffuse_on_surface,
     longest_edge_mm,
     max_edge_mm,
     patch_margin_mm,
-    vertex_areas,
     welded_surface,
 )
 from dermis.apps.truths.surface_patch import Patch, refine_patch

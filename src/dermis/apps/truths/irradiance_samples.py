@@ -106,8 +106,7 @@ class _Subdivision:
 
 
 def _interpolate(corners: NDArray[np.floating], barycentric: Floats) -> Floats:
-    interpolated: Floats = np.einsum("nc,nck->nk", barycentric, corners.astype(np.float64))
-    return interpolated
+    return np.asarray(np.einsum("nc,nck->nk", barycentric, corners.astype(np.float64)))
 
 
 def _skin_triangles(mesh: Mesh) -> _Subdivision:

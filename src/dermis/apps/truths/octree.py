@@ -115,8 +115,7 @@ def _bounding_radius(corners: Floats, centre: Floats, first: Index, end: Index) 
     """Return the distance from each node's centre to the farthest corner of its bounding box [mm]."""
     low = _reduce_nodes(np.minimum, corners.min(axis=1), first, end)
     high = _reduce_nodes(np.maximum, corners.max(axis=1), first, end)
-    radius: Floats = np.linalg.norm(np.maximum(centre - low, high - centre), axis=1)
-    return radius
+    return np.asarray(np.linalg.norm(np.maximum(centre - low, high - centre), axis=1))
 
 
 def _point_approximation(
@@ -196,8 +195,7 @@ def _point_flux(flux: Floats, first_moments: list[Floats], axis_lengths: Floats,
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), axes)
     lengths = axis_lengths[:, None]
     ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
-    point_flux: Floats = (flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3
-    return point_flux
+    return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3)
 
 
 def _reduce_nodes(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
@@ -205,5 +203,4 @@ def _reduce_nodes(operation: np.ufunc, values: Floats, first: Index, end: Index)
     # `reduceat` reduces between consecutive indices, so every other result belongs to a node; it also needs a
     # row after the last one.
     padded = np.concatenate((values, values[-1:]))
-    contained: Floats = operation.reduceat(padded, np.column_stack((first, end)).ravel(), axis=0)[::2]
-    return contained
+    return np.asarray(operation.reduceat(padded, np.column_stack((first, end)).ravel(), axis=0)[::2])

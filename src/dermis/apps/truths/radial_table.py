@@ -134,12 +134,10 @@ def _error_density(curvature: Floats, r: Floats) -> Floats:
     ideal /= _plane_integral(ideal[:, None], r)[0]
     falloff_mm = r[-1] / 4
     far_density = 1 / (np.pi * falloff_mm**2 * (1 + (r / falloff_mm) ** 2) ** 2)
-    error_density: Floats = (1 - _FAR_ERROR_FRACTION) * ideal + _FAR_ERROR_FRACTION * far_density
-    return error_density
+    return np.asarray((1 - _FAR_ERROR_FRACTION) * ideal + _FAR_ERROR_FRACTION * far_density)
 
 
 def _plane_integral(values: Floats, r: Floats) -> Floats:
     """Return the integral of 2 pi r values dr, for each column of values (rows, k)."""
     rings = np.pi * np.diff(r**2)[:, None]
-    integral: Floats = (0.5 * (values[1:] + values[:-1]) * rings).sum(axis=0)
-    return integral
+    return np.asarray((0.5 * (values[1:] + values[:-1]) * rings).sum(axis=0))

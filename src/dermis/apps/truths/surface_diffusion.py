@@ -70,14 +70,6 @@ def welded_surface(mesh: Mesh) -> tuple[Floats, Index]:
     return mesh.points_mm, mesh.point[mesh.triangles].astype(np.int64)
 
 
-def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
-    """Return the area of each vertex (n,) [mm2]; diffusion preserves the sum of values times areas."""
-    vertices, corners = _checked_surface(positions, triangles)
-    surface = delaunay(intrinsic_triangulation(vertices, corners))
-    thirds = np.repeat(surface.areas() / 3, 3)
-    return sum_by_index(surface.corners.ravel(), thirds[:, None], len(vertices))[:, 0]
-
-
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
     """Return the length of the longest edge [mm]."""
     vertices, corners = _checked_surface(positions, triangles)
@@ -190,15 +182,13 @@ class Triangulation:
         """Return areas (f,) [mm2] by Kahan's form of Heron's formula, which is safe for slivers."""
         c, b, a = np.sort(self.length[self.side], axis=1).T
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
-        areas: Floats = np.sqrt(np.maximum(product, 0)) / 4
-        return areas
+        return np.asarray(np.sqrt(np.maximum(product, 0)) / 4)
 
     def cotangents(self) -> Floats:
         """Return the cotangent of the angle opposite each side (f, 3)."""
         square = self.length[self.side] ** 2
         law_of_cosines = square.sum(axis=1, keepdims=True) - 2 * square
-        cotangents: Floats = law_of_cosines / (4 * self.areas()[:, None])
-        return cotangents
+        return np.asarray(law_of_cosines / (4 * self.areas()[:, None]))
 
 
 def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulation:
@@ -242,8 +232,7 @@ def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
     along = np.bincount(side.ravel()[forward], minlength=count)
-    shared: NDArray[np.bool_] = (uses == 2) & (along == 1)
-    return shared
+    return np.asarray((uses == 2) & (along == 1))
 
 
 def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) -> Index:
@@ -261,8 +250,7 @@ def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) 
     side_index = side_index[side_rank.ravel()[side_index] < len(illegal)]
     edge = side.ravel()[side_index]
     mutual = side_index[np.bincount(edge, minlength=len(illegal))[edge] == 2]
-    pairs: Index = mutual[np.argsort(side.ravel()[mutual], kind="stable")].reshape(-1, 2).T
-    return pairs
+    return np.asarray(mutual[np.argsort(side.ravel()[mutual], kind="stable")].reshape(-1, 2).T)
 
 
 def _flip_edges(flipped: Triangulation, pairs: Index) -> None:

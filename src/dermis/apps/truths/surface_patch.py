@@ -37,8 +37,7 @@ class Patch:
 
     def contains(self, positions: Floats) -> NDArray[np.bool_]:
         """Return the mask (m,) of positions (m, 3) [mm] within the radius around the centre."""
-        inside: NDArray[np.bool_] = np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm
-        return inside
+        return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:
         """Return a coarse triangle (n,) for each vertex and its barycentric weights there (n, 3)."""
