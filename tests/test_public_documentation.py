@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import inspect
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ ENTRIES = {one.__name__: one for one in (Target, Kind, Technique, Output, Model)
 def sections(thing: Any) -> set[str]:
     """Return the titles of the numpydoc sections of a docstring."""
     lines = (inspect.getdoc(thing) or "").splitlines()
-    return {a for a, b in zip(lines, lines[1:], strict=False) if b and set(b) == {"-"}}
+    return {a for a, b in pairwise(lines) if b and set(b) == {"-"}}
 
 
 @pytest.mark.parametrize("name", sorted(PUBLIC | ENTRIES))

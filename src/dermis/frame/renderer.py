@@ -96,8 +96,10 @@ class Renderer:
     Examples
     --------
     >>> import dermis
+    >>> renderer = dermis.Renderer("cpu")
+    >>> renderer.device.adapter.kind
+    'CPU'
     >>> scene = dermis.Scene(dermis.Human().head(subdivide=0))
-    >>> renderer = dermis.Renderer("cpu")  # doctest: +SKIP
     >>> renderer.draw(scene, dermis.Settings(size=64)).srgb8().shape  # doctest: +SKIP
     (64, 64, 3)
     """
