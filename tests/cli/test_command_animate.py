@@ -86,7 +86,7 @@ def test_whole_frames_are_not_drawn_again(animate: Run) -> None:
     assert _report(animate(*words, "--anew"))["drawn"] == 4
     assert _report(animate(*words, "--exposure", "2"))["drawn"] == 4
     ended = animate(*words[:-1], "--exposure", "2")
-    assert ended.stdout.startswith("f/%d.png  4 frames (4 were there) at 10/s")
+    assert ended.stdout.startswith("f/%d.png  4 frames (4 reused) at 10/s")
 
 
 def test_an_interruption_leaves_whole_frames_and_no_movie(
@@ -166,7 +166,7 @@ def test_one_of_several_clips(animate: Run) -> None:
 REFUSED = {
     "no such clip": ("two.glb --clip wave", "two.glb", "got 'wave'"),
     "which clip": ("two.glb", "two.glb", "it has talk, nod"),
-    "no motion": ("head.obj", "--motion", "head.obj has no clips"),
+    "no motion": ("head.obj", "--motion", "head.obj cannot contain clips"),
     "no such motion": ("face.glb --motion nothing.csv", "nothing.csv", "no such file"),
     "no name in common": ("face.glb --motion other.csv", "other.csv", "it has browDown"),
     "to before from": ("face.glb --from 2 --to 1", "--to", "got 1 s"),

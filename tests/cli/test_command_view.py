@@ -133,7 +133,7 @@ def test_a_scene_keeps_its_pose_and_a_motion_comes_with_it(
     assert ended.code == 0
     (state, _, _), more = seen[0]
     assert dict(state.scene.pose.weights) == {"jawOpen": 0.5}
-    assert more["motion"].clip(state.scene.head).duration_s == pytest.approx(0.2)
+    assert more["motion"].load_clip(state.scene.head).duration_s == pytest.approx(0.2)
 
 
 def test_a_motion_without_a_name_of_the_heads_is_refused(run: Run, folder: Path) -> None:

@@ -67,7 +67,7 @@ def test_rows_are_against_what_it_rendered(compare: Run, folder: Path) -> None:
         (None, "there is no file"),
         ("echo \"ModuleNotFoundError: No module named 'bpy'\" >&2; exit 1", "No module named 'bpy'"),
         ("kill -11 $$", "signal 11 ended it"),
-        ('echo "no JSON" > "$3"/done.json', "it left something else"),
+        ('echo "no JSON" > "$3"/done.json', "its files are unusable"),
     ],
 )
 def test_failures_are_told_and_leave_nothing(

@@ -60,7 +60,7 @@ def test_pngs_hold_steps(render: Run, folder: Path) -> None:
     render("head.obj", "--outputs", "depth,normal_camera,uv", "-o", "a.png", "--outputs-format", "npy")
     for name in ("depth", "normal_camera", "uv"):
         true, levels = np.load(folder / f"a.{name}.npy"), read_image(folder / f"a.{name}.png")
-        step, zero = OUTPUTS[name].levels or (0, 0)
+        step, zero = OUTPUTS[name].quantisation or (0, 0)
         assert levels.dtype == np.uint16
         told = (levels.astype(float) - zero) * step
         assert np.abs(told[..., : np.atleast_3d(true).shape[2]] - np.atleast_3d(true)).max() <= 0.51 * step
@@ -101,7 +101,7 @@ def test_numbers_of_any_channels_are_encoded() -> None:
         (["--outputs", "depth,deep"], r"output: expected one of depth, position, .* but got 'deep'"),
         (["--outputs", ""], "output: expected one of depth"),
         (["--outputs", "triangle", "--outputs-format", "png"], "output triangle: expected exr or npy"),
-        (["--outputs-format", "png"], "--outputs-format: expected --outputs with it"),
+        (["--outputs-format", "png"], "--outputs-format: expected the option --outputs"),
     ],
 )
 def test_what_cannot_be_is_refused_before_any_work(

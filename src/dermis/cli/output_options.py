@@ -48,7 +48,7 @@ class FrameOutputs:
         self, typed: str | None, file_format: Literal["exr", "png", "npy"] | None, image: Path
     ) -> None:
         if file_format and typed is None:
-            refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs NAME,...")
+            refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs")
         self.image = image
         self.names = check_outputs(_names(typed)) if typed is not None else ()
         self.together = image.suffix.lower() == ".exr" and file_format in (None, "exr")

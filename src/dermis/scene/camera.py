@@ -34,7 +34,7 @@ class Window(NamedTuple):
 
 
 class Camera(FrozenModel):
-    """Pinhole camera.
+    """Pinhole camera at a position, which looks at a target.
 
     Examples
     --------
