@@ -85,13 +85,9 @@ class Output:
 _FLOAT: Kind = "float32"
 _SIGNED = 1 << 15  # level of the value 0 of signed outputs
 _LENGTH, _SIGNED_LENGTH, _THICKNESS = Quantisation(0.1), Quantisation(0.1, _SIGNED), Quantisation(0.001)
-_FRACTION, _UNIT, _MOTION = (
-    Quantisation(1 / 65535),
-    Quantisation(1 / 32767, _SIGNED),
-    Quantisation(1 / 64, _SIGNED),
-)
-_RADIANCE = Quantisation(1 / 4096)
-_GEOMETRY_OUTPUTS = (
+_FRACTION, _UNIT = Quantisation(1 / 65535), Quantisation(1 / 32767, _SIGNED)
+_MOTION, _RADIANCE = Quantisation(1 / 64, _SIGNED), Quantisation(1 / 4096)
+_OUTPUTS = (
     Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis", 0.0, _LENGTH),
     Output("position", "geometry", "XYZ", _FLOAT, "mm", "position in world space", 0.0, _SIGNED_LENGTH),
     Output("normal", "surface", "XYZ", _FLOAT, "", "normal with relief, in world space", 0.0, _UNIT),
@@ -99,16 +95,9 @@ _GEOMETRY_OUTPUTS = (
     Output("normal_camera", "surface", "XYZ", _FLOAT, "", "normal with relief, in camera space", 0.0, _UNIT),
     Output("uv", "geometry", "UV", _FLOAT, "", "texture coordinates", 0.0, _FRACTION),
     Output("triangle", "geometry", "I", "int32", "", "index of the mesh triangle", -1.0),
-    Output(
-        "barycentric", "geometry", "ABC", _FLOAT, "", "barycentric weights of the corners", 0.0, _FRACTION
-    ),
+    Output("barycentric", "geometry", "ABC", _FLOAT, "", "weights of the triangle's corners", 0.0, _FRACTION),
     Output("motion", "motion", "XY", _FLOAT, "pixel", "displacement since the previous scene", 0.0, _MOTION),
-    Output(
-        "alpha", "alpha", "A", _FLOAT, "", "fraction of the pixel that head and hair cover", 0.0, _FRACTION
-    ),
-)
-
-_LIGHT_OUTPUTS = (
+    Output("alpha", "alpha", "A", _FLOAT, "", "coverage of the pixel by head and hair", 0.0, _FRACTION),
     Output("albedo", "light", "RGB", _FLOAT, "", "diffuse reflectance", 0.0, _FRACTION),
     Output("irradiance", "light", "RGB", _FLOAT, "", "irradiance before scattering", 0.0, _RADIANCE),
     Output("diffuse", "light", "RGB", _FLOAT, "", "radiance scattered below the surface", 0.0, _RADIANCE),
@@ -118,16 +107,11 @@ _LIGHT_OUTPUTS = (
     Output("melanin", "pigments", "A", _FLOAT, "", "melanosome fraction of the epidermis", 0.0, _FRACTION),
     Output("blood", "pigments", "A", _FLOAT, "", "blood fraction of the dermis", 0.0, _FRACTION),
     Output("thickness", "thickness", "A", _FLOAT, "mm", "thickness of the tissue below", 0.0, _THICKNESS),
-)
-
-_LABEL_OUTPUTS = (
     Output("label", "label", "I", "uint8", "", "class of the surface, see docs/labels.md"),
     Output("label_face_synthetics", "label", "I", "uint8", "", "class as in FaceSynthetics"),
 )
 
-OUTPUTS: Registry[Output] = Registry(
-    "output", {one.name: one for one in (*_GEOMETRY_OUTPUTS, *_LIGHT_OUTPUTS, *_LABEL_OUTPUTS)}
-)
+OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _OUTPUTS})
 """Outputs by the names that `Renderer.draw` and `dermis render --outputs` accept."""
 
 
@@ -137,9 +121,8 @@ def check_outputs(names: Iterable[str]) -> tuple[str, ...]:
     Raises DermisError for a name that is not registered.
     """
     if isinstance(names, str) or not isinstance(names, Iterable):
-        refuse(
-            "outputs", "a list of names", f"got {format_value(names)}", 'Write outputs=("depth", "normal")'
-        )
+        actual = f"got {format_value(names)}"
+        refuse("outputs", "a list of names", actual, 'Write outputs=("depth", "normal")')
     unique = tuple(dict.fromkeys(names))
     for name in unique:
         OUTPUTS[name]
