@@ -19,11 +19,11 @@ from dermis.specular.models import MODELS
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"
 HEAD = """\
-# quantity: round lobes whose weighted sum stands for a surface's, by its roughness m and the view's cosine:
-#   angle from the normal in the plane of view, away from the eye, angle beside that plane, roughness,
-#   and share of the light
+# quantity: isotropic lobes whose weighted sum approximates a specular lobe, by its roughness m and the cosine
+#   of the view: angle from the normal in the plane of incidence, away from the viewer, angle from that plane
+#   ("beside"), roughness and weight
 # unit: angles in radians; all others dimensionless
-# source: tools/mirror_lobes.py, least squares over the harmonics of skies
+# source: tools/mirror_lobes.py, least squares over the spherical harmonics of environments
 # licence: Apache-2.0
 """
 

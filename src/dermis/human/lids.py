@@ -22,11 +22,11 @@ EYE_OFFSET_MM = 2.2
 """Forward offset of the anatomical from the published eyeball, for equal positions of the cornea [mm]."""
 CONTROL_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
-_SKIN_REACH_MM = 15.0  # of the skin around the lids that follows them
+_SKIN_REACH_MM = 15.0  # distance up to which skin follows the lids
 _FALLOFF_MM = 1.0  # blend distance between the lid points that skin follows
 _MIN_HEIGHT_MM = -1.5  # relative to the eyeball; deeper points are never visible
 _LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # fractions of the radius, see `_compress_radius`
-_CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # of wall, edge, crest and skin
+_CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # minimum distances of wall, edge, crest and skin from the eye
 _EDGE_HEIGHT_MM = 0.2  # the smooth surface lies slightly inside its control points
 _ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 """Contact of each row of lid_rings.csv with the eyeball, 0 to 1; none around the caruncle."""

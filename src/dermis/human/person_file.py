@@ -26,7 +26,7 @@ from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 _STRETCH_ATLAS_SIDE = 1024
-"""Side of the atlas that tells how long texels are, which changes little from one to the next."""
+"""Largest side of the atlas for the lengths of texels, which vary slowly [texel]."""
 
 
 def person_numbers(person: Human) -> dict[str, Any]:
@@ -67,10 +67,10 @@ def _build(path: Path, kind: type[T], numbers: Any) -> T:
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):
         actual = f"got {format_value(numbers)}"
-        refuse(path, f"numbers of {', '.join(known)}", actual, "Correct it there")
+        refuse(path, f"numbers of {', '.join(known)}", actual, "Correct the file")
     for name in numbers:
         if name not in known:
-            refuse(path, f"names of {', '.join(known)}", f"got {format_value(name)}", "Correct it there")
+            refuse(path, f"names of {', '.join(known)}", f"got {format_value(name)}", "Correct the file")
     try:
         return kind(**numbers)
     except DermisError as fault:

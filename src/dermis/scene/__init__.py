@@ -25,7 +25,7 @@ _HOMES = {
     "skin": ("Skin",),
 }
 
-__all__ = [  # besides those of dermis.scene.lights
+__all__ = [  # in addition to those of dermis.scene.lights
     "Camera",
     "Environment",
     "Scene",

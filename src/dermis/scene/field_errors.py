@@ -84,7 +84,7 @@ def python_numbers(value: Any, text: bool = False) -> Any:
 
     text : whether text is a valid value
     """
-    import numpy as np  # loading it takes longer than all of --help
+    import numpy as np  # importing it takes longer than printing help
 
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
@@ -128,7 +128,7 @@ def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
     if len(one["loc"]) == 1 and (words := field_keywords(model, str(one["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
     actual = format_value(one["input"])
-    if not one["loc"] and isinstance(one["input"], dict):  # values that do not go together
+    if not one["loc"] and isinstance(one["input"], dict):  # inconsistent values of several fields
         values = ", ".join(f"{name} {format_value(value)}" for name, value in one["input"].items())
         actual = shorten(values, _MAX_TABLE_LENGTH)
     return f"expected {expected}, but got {actual}"

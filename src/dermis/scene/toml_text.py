@@ -32,4 +32,4 @@ def value_text(value: Any) -> str:
         return f"{{{', '.join(f'{key_text(key)} = {value_text(one)}' for key, one in value.items())}}}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return f"[{', '.join(map(value_text, value))}]"
-    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON leaves as it is
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON does not escape it

@@ -16,7 +16,7 @@ from dermis.human.hair.skin_surface import tangent_component
 _CELL_MM = 2.5
 _GRID_LOW, _GRID_HIGH = (1.0, -2.0), (64.0, 40.0)  # grid around the left brow and the tips of its hairs [mm]
 KNOTS = 9
-_MAX_HAIRS = 760  # hairs of the bushiest brow
+_MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
 _ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])

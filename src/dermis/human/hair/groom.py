@@ -20,7 +20,7 @@ from dermis.mesh.strands import Roots, Strands, to_frames
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
-_HAIRS_PER_COLOUR = 5  # hairs of head and beard whose colours are averaged in one strand
+_HAIRS_PER_COLOUR = 5  # number of hairs whose colours are averaged in one strand
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
 
 

@@ -26,13 +26,13 @@ from dermis.mesh.strands import Roots, quad_corners, quad_weights
 # Artist's values on the average person [mm].
 _WHORL_CENTRE = np.array([9.0, 86.0, -131.0])
 _WHORL_MM = 24.0  # radius of the spiral
-_PARTING_X = 31.0  # of the parting of short hair
+_PARTING_X = 31.0  # position of the parting of short hair
 _PARTING_WIDTH_MM = 9.0
-_LEVEL_TILT = 0.15  # of the levels of equal length, higher in front
-_CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # of root and tip [rad]
+_LEVEL_TILT = 0.15  # slope of the levels of equal length, higher in front
+_CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # angles of root and tip to the skin [rad]
 _SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # at the sides, and its increase on top
 _TUFT_MM = 2.2  # size of the cells in which tips form tufts
-_MIN_HEIGHT_MM = 0.35  # above the skin
+_MIN_HEIGHT_MM = 0.35  # minimum height above the skin
 _HEAD_RADIUS_MM = 85.0
 _EPSILON = np.float32(1e-9)
 MAX_PER_CM2 = 200.0
@@ -40,7 +40,7 @@ MAX_PER_CM2 = 200.0
 BEARD_PER_CM2 = 60.0
 """Density of beards [1/cm2]."""
 _HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
-_TIP_RADIUS_FACTOR = 0.6  # of the radius
+_TIP_RADIUS_FACTOR = 0.6  # radius at the tip
 _STRAIGHT_KNOTS, _CURVED_KNOTS, _COILED_KNOTS = 5, 7, 9
 _COIL_CURL = 0.5  # curl above which hair coils
 _LONG_BEARD_MM = 8.0

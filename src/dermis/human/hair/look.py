@@ -21,13 +21,13 @@ RANGES = {
     "pheomelanin": (0.0, 10.0),
     "seed": (0, 2**32 - 1),
 }
-"""Least and greatest values of fields that do not go from 0 to 1."""
+"""Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
 _CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
-_CROPPED_CURL = 0.6  # curl from which on hair is cropped
+_CROPPED_CURL = 0.6  # curl above which hair is cropped
 _CROPPED_LENGTH_MM, _SHORT_LENGTH_MM, _SHORT_MALE_LENGTH_MM = 6.0, 32.0, 27.0
 _MAX_BEARD_MM = 14.0
-_DARK_EUMELANIN = 3.0  # eumelanin from which on shaved hair shows as much as it can
+_DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
 
 
 @dataclass(frozen=True)

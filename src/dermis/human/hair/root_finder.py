@@ -18,10 +18,13 @@ from dermis.mesh.strands import Roots, quad_corners
 Index = NDArray[np.int64]
 SIDES = 1.0, -1.0
 """Sign of x on the left and on the right side."""
-_QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
-_MIN_WEIGHT = -1e-9  # least share of a corner
-_CELL_MM = 2.0  # of the grid that triangles are listed in
-_GRID_LOW, _GRID_HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # around the brows [mm]
+_QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
+_MIN_WEIGHT = -1e-9  # tolerance of barycentric weights
+_CELL_MM = 2.0  # cells of the grid of triangle lists
+_GRID_LOW, _GRID_HIGH = (
+    np.array([-70.0, -20.0]),
+    np.array([70.0, 50.0]),
+)  # bounds of that grid, around the brows [mm]
 _HALVES = np.array([[0, 1, 2], [2, 3, 0]])
 
 
@@ -128,7 +131,9 @@ class RootFinder:
             quad = int(both[distances[both].argmax()])
             i, j = (int(np.flatnonzero(around[quad] == p)[0]) for p in (a, b))
             quads.append(quad)
-            frames.append(_QUAD_CORNERS[[i, j, (2 * i - j) % 4, (2 * j - i) % 4]])  # beside a, beside b
+            frames.append(
+                _QUAD_CORNERS[[i, j, (2 * i - j) % 4, (2 * j - i) % 4]]
+            )  # a, b, and the corners opposite to them
         return _LidEdge(lengths_mm, np.array(quads), np.array(frames))
 
     @cached_property

@@ -43,7 +43,7 @@ HUMAN_FIELDS = (
 SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
 """Polyline where the lips meet: distance from the middle and height [mm]."""
 _OUTSIDE_MM = -1.0
-_MIN_BROW_Z = -30.0  # of brows
+_MIN_BROW_Z = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height above the hairline that separates hair of the head from the beard
 _LEVELS = 2
 SIDES = "right", "left"
