@@ -155,7 +155,7 @@ FLAT = np.diag([1.0, 1, 0, 1])
         (Pose(bones={"head": np.eye(4)[:, :3]}), r"bones\.head: expected three angles"),
         (Pose(bones={"head": np.where(np.eye(4) > 0, NAN, 0)}), r"bones\.head: expected three angles"),
         (Pose(bones={"neck": np.eye(4), "head": FLAT}), r"bones\.head: .* can be inverted"),
-        (Pose(positions_mm=np.zeros((5, 3))), r"positions_mm: .* array of \(3000, 3\), but \(5, 3\)"),
+        (Pose(positions_mm=np.zeros((5, 3))), r"positions_mm: .* array of \(3000, 3\), but got \(5, 3\)"),
         (Pose(positions_mm="here"), r"positions_mm: expected an array"),
         (Pose(positions_mm=np.full((3000, 3), NAN)), r"3000 are NaN, infinite or farther, first 0"),
     ],
