@@ -72,7 +72,7 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """Return the same with indices into sorted points, which must include all of these."""
+        """Return the lid points as indices into sorted points, which must contain them."""
         names = "rings", "point", "contact"
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 

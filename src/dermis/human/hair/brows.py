@@ -71,7 +71,7 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 class BrowSurface:
     """Skin of a person around the brows.
 
-    node_mm, normal : (2 nodes, 3) grid points of the left and the right brow projected onto the person, see
+    node_mm, normal : (2 nodes, 3) grid points of the left and the right brow projected onto the person by
         `SkinSurface.project`; x is positive outwards on both sides
     """
 
@@ -84,7 +84,7 @@ class BrowSurface:
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
     def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
-        """Return the skin at points (n,) of the front plane [mm]; outside the grid that at its border.
+        """Return the skin at points (n,) of the front plane [mm]; points off the grid use its border.
 
         side : 1 for the left brow
         """
