@@ -70,6 +70,6 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
 
 @cache
 def _source_hash(folder: Path) -> str:
-    """Return a hash of all Python files in a folder, from which loops may use functions and constants."""
+    """Return a hash of all Python files in a folder, whose functions and constants compiled loops may use."""
     texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

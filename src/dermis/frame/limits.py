@@ -81,7 +81,7 @@ def suggest_settings(request: FrameRequest, budget: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory of a frame by option, without the head and its maps [bytes]."""
+    """Return the memory that a frame needs for each size option, without the head and its maps [bytes]."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes

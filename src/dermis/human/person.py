@@ -1,4 +1,4 @@
-"""People of the parametric human, from numbers or sampled at random."""
+"""Parametric people, by given parameters or sampled at random."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ def model_docstring(model: type[BaseModel]) -> str:
 
 
 def accepted_values(model: type[BaseModel], field: str) -> str:
-    """Return the words that a field accepts and its bounds as text, if they are informative."""
+    """Return the accepted words and the bounds of a field as text; empty for fields without either."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
     if low is not None and high is not None and high < _DISPLAYED_BOUND:

@@ -73,10 +73,11 @@ class EnergyModel:
         return np.maximum(0.0, 1.0 - self.loss * rho_s * np.asarray(albedo, float))
 
     def exitance_factor(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
-        """Return the factor of uniform diffuse radiance in a direction [-].
+        """Return the factor by which the surface scales diffuse radiance that leaves in a direction [-].
 
         albedo : directional albedo of the lobe
         mean : mean albedo, cosine-weighted
+        rho_s : specular strength
         """
         lost = self.loss * rho_s * np.asarray(mean, float) if self.returned else 0.0
         return np.asarray(self.entering_fraction(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))

@@ -56,7 +56,7 @@ class Studio:
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """Return (h, w, 3) sRGB bytes of a scene.
 
-        scale : factor of the panel's side
+        scale : factor by which the side of the panel is multiplied
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()

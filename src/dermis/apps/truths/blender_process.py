@@ -18,11 +18,11 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """Task of Blender, for messages.
+    """Description of a task of Blender, for error messages.
 
-    renderer : program that is named as the culprit
-    goal : "to ..."
-    advice : what to do when it fails
+    renderer : program named in the message
+    goal : infinitive such as "to render the head"
+    advice : what to do when the task fails
     """
 
     renderer: str

@@ -64,7 +64,7 @@ class Cells:
 
     @property
     def radius_mm(self) -> float:
-        """Return the largest distance of a translucent pair."""
+        """Return the largest distance between the two cells of a translucent pair [mm]."""
         return _PAIR_RADIUS * self.max_sigma_mm
 
     @property

@@ -132,7 +132,7 @@ class Sphere(NamedTuple):
 
     centre : (3,) [mm]
     radius : [mm]
-    deviation : largest distance of most points from it, as a fraction of the radius [-]
+    deviation : 85th percentile by area of the distance to the sphere, as a fraction of the radius [-]
     """
 
     centre: Doubles

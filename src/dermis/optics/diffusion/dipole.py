@@ -35,7 +35,7 @@ def flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
 
 
 def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
-    """Return R(r) per power that enters, (n, c) [1/mm2].
+    """Return the diffusion profile R(r) per power that enters the medium, (n, c) [1/mm2].
 
     Source: [JensenBuhler2002] eq. 5.
     """

@@ -179,16 +179,16 @@ def seam_rows(renderer: Renderer) -> list[str]:
     """Return rows of relative jumps of scattered light across seams: mean and 95th percentile [%]."""
     from cut_meshes import cut_sphere
 
-    ball = cut_sphere(30.0, 20)
-    rows = seam_row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, all_points)
-    human_head = dermis.load_head("human")
-    rows += seam_row(renderer, "human, neck and back of the head", human_head, HEAD_SIDE, visible_points)
-    hidden = "human, eye sockets and inside of the mouth"
-    rows += seam_row(renderer, hidden, human_head, HEAD_SIDE, hidden_points)
-    human = dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0)
-    human = replace(human, maps=Maps())
-    rows += seam_row(renderer, "MakeHuman, neck", human, HEAD_SIDE, neck_points)
-    return rows + seam_row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, back_points)
+    human = dermis.load_head("human")
+    makehuman = replace(dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0), maps=Maps())
+    rows = (
+        ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_SIDE, all_points),
+        ("human, neck and back of the head", human, HEAD_SIDE, visible_points),
+        ("human, eye sockets and inside of the mouth", human, HEAD_SIDE, hidden_points),
+        ("MakeHuman, neck", makehuman, HEAD_SIDE, neck_points),
+        ("MakeHuman, back of the head", makehuman, HEAD_SIDE, back_points),
+    )
+    return [seam_row(renderer, *row) for row in rows]
 
 
 def all_points(positions: Array) -> Flags:
@@ -216,14 +216,14 @@ def hidden_points(positions: Array) -> Flags:
     return ~visible_points(positions)
 
 
-def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> list[str]:
+def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> str:
     """Return one line of the table, with a column for each seam method."""
     first, second = seam_sides(head, where)
     cells = []
     for method in SEAM_METHODS:
         jumps = seam_jumps(renderer, striped_scene(head), method, side, first, second)
         cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
-    return [f"| {name} | {len(first.triangle)} | {' | '.join(cells)} |"]
+    return f"| {name} | {len(first.triangle)} | {' | '.join(cells)} |"
 
 
 def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
@@ -233,12 +233,12 @@ def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
     mesh = head.mesh
     first, second = seam_points(mesh)
     positions = first.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    is_kept = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
+    selected = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
-            is_kept &= mapped[first.triangle] & mapped[second.triangle]
-    first, second = (Points(one.triangle[is_kept], one.weights[is_kept]) for one in (first, second))
+            selected &= mapped[first.triangle] & mapped[second.triangle]
+    first, second = (Points(one.triangle[selected], one.weights[selected]) for one in (first, second))
     return first, second
 
 

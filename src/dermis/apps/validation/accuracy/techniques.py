@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,6 +65,15 @@ def techniques(adapter: str = "auto") -> None:
     fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
 
 
+def _compare(
+    head: Head, against: str, techniques: Sequence[str], light: str, adapter: str, **options: Any
+) -> Comparison:
+    """Return a comparison, by default with the light's own region and number of samples."""
+    defaults: dict[str, Any] = {"region": default_region(light), "samples": SAMPLES_BY_LIGHT[light]}
+    defaults["settings"] = SETTINGS
+    return compare(head, against, techniques, light=light, adapter=adapter, **(defaults | options))
+
+
 def table_line(first: str, row: ComparisonRow) -> str:
     """Return a line of a table."""
     return f"| {first} | " + " | ".join(cells(row)) + " |"
@@ -75,20 +87,11 @@ def table(
     model : scattering model of the medium's profile
     """
     rows, comparison = [TABLE_HEADER], {}
-    for light, samples in SAMPLES_BY_LIGHT.items():
+    for light in SAMPLES_BY_LIGHT:
         region = "ear" if against == "heat" else default_region(light)
         techniques = ("none", "gpu-gems-3", "texture-space") if against == "heat" else TECHNIQUES.names
-        comparison[light] = compare(
-            head,
-            against,
-            techniques,
-            light=light,
-            region=region,
-            medium=medium,
-            settings=SETTINGS,
-            model=model,
-            samples=samples,
-            adapter=adapter,
+        comparison[light] = _compare(
+            head, against, techniques, light, adapter, region=region, medium=medium, model=model
         )
         rows += [table_line(light, row) for row in comparison[light].rows]
     return "\n".join(rows), comparison
@@ -97,8 +100,8 @@ def table(
 def fine_atlas_row(head: Head, adapter: str) -> str:
     """Return a row of the laser's stripe against heat, on an atlas of 2048."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
-    comparison = compare(
-        head, "heat", only, light="laser", region="ear", settings=settings, model="layered", adapter=adapter
+    comparison = _compare(
+        head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
     )
     return table_line("laser, atlas 2048", comparison.rows[0])
 
@@ -109,19 +112,10 @@ def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]]
     path_traced : comparisons with Monte Carlo profiles, by medium and light
     """
     rows, techniques = [], ("texture-space", "screen-space")
-    for light, samples in SAMPLES_BY_LIGHT.items():
+    for light in SAMPLES_BY_LIGHT:
         for medium, by_photons in path_traced.items():
-            layered = compare(
-                head,
-                "path-traced",
-                techniques,
-                light=light,
-                region=default_region(light),
-                medium=medium,
-                model="layered",
-                settings=SETTINGS,
-                samples=samples,
-                adapter=adapter,
+            layered = _compare(
+                head, "path-traced", techniques, light, adapter, medium=medium, model="layered"
             )
             for model, comparison in (("layered", layered), ("counted", by_photons[light])):
                 compared = (row for row in comparison.rows if row.technique in techniques)
@@ -141,12 +135,12 @@ def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) 
     """Return errors of Lambertian skin with a half-space's directional albedo, under the front light."""
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
-    seen = surface_points(renderer, scene, SETTINGS)
+    visible = surface_points(renderer, scene, SETTINGS)
     mesh = head.mesh
 
     def interpolate(values: Floats) -> Floats:
-        corners = values[mesh.triangles[seen.triangle]]
-        return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
+        corners = values[mesh.triangles[visible.triangle]]
+        return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
 
     normal, position = interpolate(mesh.normals), interpolate(mesh.positions) - np.array(head.centre_mm)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -157,10 +151,10 @@ def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) 
     layer = media()[medium].layers[0]
     single_albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     albedo = np.stack([directional_albedo(cosine, one) for one in single_albedo], axis=-1)
-    irradiance = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
-    image = np.zeros((*seen.mask.shape, 3))
-    image[seen.mask] = irradiance * albedo / np.pi
-    error, energy = errors_by_channel(image, path_traced.reference, path_traced.reference.mask & seen.mask)
+    irradiance = irradiance_at(renderer, scene, SETTINGS, visible.triangle, visible.barycentric)
+    image = np.zeros((*visible.mask.shape, 3))
+    image[visible.mask] = irradiance * albedo / np.pi
+    error, energy = errors_by_channel(image, path_traced.reference, path_traced.reference.mask & visible.mask)
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 
@@ -182,18 +176,16 @@ def _direction_rows(
     lines = []
     for medium in ("skin1", "skin2"):
         for direction in ("lambertian", "half-space"):
-            comparison = compare(
+            values = {"region": region, "medium": medium, "direction": direction, "samples": samples}
+            comparison = _compare(
                 head,
                 "path-traced",
                 ("texture-space",),
-                light=light,
-                region=region,
-                medium=medium,
+                light,
+                adapter,
                 settings=settings,
-                direction=direction,
                 model="layered",
-                samples=samples,
-                adapter=adapter,
+                **values,
             )
             _, error, flip, energy, _ = cells(comparison.rows[0])
             image, reference = comparison.images["texture-space"], comparison.reference

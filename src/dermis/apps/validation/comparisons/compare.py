@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,21 +162,14 @@ def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImag
 
 
 def _comparison_row(comparison: Comparison, technique: str, ms: float) -> ComparisonRow:
-    from dermis.apps.truths.metrics import energy_ratio, relative_rmse
+    from dermis.apps.truths.metrics import energy_ratio, flip, relative_rmse
 
     reference, image = comparison.reference, comparison.images[technique]
     error = relative_rmse(image, reference.image, reference.mask, reference.variance)
     energy = energy_ratio(image, reference.image, reference.mask, reference.variance)
-    flip_error = _flip(comparison.tone_mapped(image), comparison.tone_mapped(reference.image), reference.mask)
+    pictures = comparison.tone_mapped(image), comparison.tone_mapped(reference.image)
+    flip_error = flip(*pictures, reference.mask).mean if find_spec("flip_evaluator") else None
     return ComparisonRow(technique, comparison.against, *error, flip_error, *energy, ms)
-
-
-def _flip(image: Floats, reference: Floats, mask: NDArray[np.bool_]) -> float | None:
-    from importlib.util import find_spec
-
-    from dermis.apps.truths.metrics import flip
-
-    return flip(image, reference, mask).mean if find_spec("flip_evaluator") else None
 
 
 _REFERENCE_SOURCES = {

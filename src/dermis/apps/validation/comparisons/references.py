@@ -74,10 +74,10 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
     samples : ignored
     """
     started = time.perf_counter()
-    seen = surface_points(subject.renderer, subject.scene, subject.settings)
-    lit, profile = irradiance_samples(subject), subject.profile
-    exitance = _integrated(hit_positions(subject, seen), lit, profile.weight, profile.variance_mm2)
-    return _image_of_points(seen, exitance, started, f"{len(lit.positions):,} irradiance samples")
+    visible = surface_points(subject.renderer, subject.scene, subject.settings)
+    light, profile = irradiance_samples(subject), subject.profile
+    exitance = _integrated(hit_positions(subject, visible), light, profile.weight, profile.variance_mm2)
+    return _image_of_points(visible, exitance, started, f"{len(light.positions):,} irradiance samples")
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -93,13 +93,13 @@ def surface_heat_around(
     subject: ComparisonSubject,
     target_mm: tuple[float, float, float],
     radius_mm: float,
-    lit: IrradianceSamples,
+    light: IrradianceSamples,
     min_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
     """Diffuse the subject's Gaussians along the surface as heat, around a visible point.
 
     target_mm : relative to the head's centre; the nearest visible point is the centre of the patch
-    lit : irradiance on the whole head, see `irradiance_samples`
+    light : irradiance on the whole head, see `irradiance_samples`
     min_mm2 : variance below which Gaussians are integrated by Euclidean distance instead
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
@@ -108,21 +108,21 @@ def surface_heat_around(
     started = time.perf_counter()
     narrow = subject.profile.variance_mm2 < min_mm2
     variances, weight = subject.profile.variance_mm2, subject.profile.weight
-    seen = surface_points(subject.renderer, subject.scene, subject.settings)
-    points = hit_positions(subject, seen)
+    visible = surface_points(subject.renderer, subject.scene, subject.settings)
+    points = hit_positions(subject, visible)
     target = np.array(target_mm) + subject.scene.head.centre_mm
     centre = points[np.linalg.norm(points - target, axis=1).argmin()]
     patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
     irradiance = _irradiance(subject, *patch.vertex_barycentrics())
     levels = diffuse_on_surface(patch.positions, patch.triangles, irradiance, variances[~narrow])
-    fine, weights = patch.locate(seen.triangle, seen.barycentric)
+    fine, weights = patch.locate(visible.triangle, visible.barycentric)
     inside = (fine >= 0) & patch.contains(points)
     diffused = np.einsum("knc,kc->nc", levels, weight[~narrow])
     exitance = patch.interpolate(diffused, fine[inside], weights[inside])
-    exitance += _integrated(points[inside], lit, weight[narrow], variances[narrow])
-    mask = seen.mask.copy()
-    mask[seen.mask] = inside
-    compared = SurfacePoints(mask, seen.triangle[inside], seen.barycentric[inside])
+    exitance += _integrated(points[inside], light, weight[narrow], variances[narrow])
+    mask = visible.mask.copy()
+    mask[visible.mask] = inside
+    compared = SurfacePoints(mask, visible.triangle[inside], visible.barycentric[inside])
     note = f"{radius_mm:g} mm around the middle; {narrow.sum()} Gaussians under {min_mm2:g} mm2 "
     note += "by Euclidean distance"
     return replace(_image_of_points(compared, exitance, started, note), has_translucency=False)
@@ -178,28 +178,28 @@ def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycen
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
-def _integrated(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
+def _integrated(points: Floats, light: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
     """Return (n, 3) radiant exitance at points by Gaussians of the Euclidean distance."""
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate_exitance(points, lit, Profile(weight, variance_mm2))
+    return integrate_exitance(points, light, Profile(weight, variance_mm2))
 
 
-def hit_positions(subject: ComparisonSubject, seen: SurfacePoints) -> Floats:
+def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
     """Return (n, 3) positions where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
-    corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
-    return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
+    corners = mesh.positions[mesh.triangles[visible.triangle]].astype(np.float64)
+    return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
 
 
-def _image_of_points(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> ReferenceImage:
-    image = np.zeros((*seen.mask.shape, 3))
-    image[seen.mask] = exitance / np.pi
+def _image_of_points(visible: SurfacePoints, exitance: Floats, started: float, note: str) -> ReferenceImage:
+    image = np.zeros((*visible.mask.shape, 3))
+    image[visible.mask] = exitance / np.pi
     seconds, noise = time.perf_counter() - started, np.zeros_like(image)
-    return ReferenceImage(image, noise, seen.mask, 1, seconds, (note,), has_interreflection=False)
+    return ReferenceImage(image, noise, visible.mask, 1, seconds, (note,), has_interreflection=False)
 
 
 def check_visible(mask: NDArray[np.bool_]) -> None:

@@ -54,7 +54,7 @@ def babylon_page(library: Path) -> Iterator[Page]:
 
 
 def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return (side, side, 3) radiance of the canvas over that of the lit half, bottom row first."""
+    """Return the (side, side, 3) radiance of the canvas relative to its fully lit part, bottom row first."""
     edge = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": azimuth}
     data = base64.b64decode(page.evaluate("(edge) => drawEdge(edge)", edge))
     levels = np.frombuffer(data, np.uint8).reshape(CANVAS_SIDE, CANVAS_SIDE, 4)[..., :3]

@@ -141,9 +141,9 @@ def render_cycles(
 
 
 def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
-    """Return differences of outline and colour, and errors, of another program's pictures.
+    """Return the differences in outline and colour and the relative RMSE of another program's pictures.
 
-    theirs : (seeds, h, w, 4)
+    theirs : (seeds, h, w, 4) pictures with different random seeds
     """
     mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
     a, b = ours[..., 3] > 0.5, mean[..., 3] > 0.5

@@ -13,7 +13,7 @@ from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.validation.pages import JsonObject
-from dermis.apps.validation.peers.rendering import GPU_GEMS_3_VARIANTS, VARIANTS, FrameTimes, PeerRenders
+from dermis.apps.validation.peers.rendering import GPU_GEMS_3_VARIANTS, VARIANTS, PeerRenders
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -128,11 +128,8 @@ def _dermis_row(renders: PeerRenders, name: str, mask: Mask) -> RendererRow:
     frames, reference = renders.ours[name], renders.reference
     error = relative_rmse(frames.image, reference.image, mask, reference.variance)
     energy = energy_ratio(frames.image, reference.image, mask, reference.variance)
-    return RendererRow("dermis", name, *_median_times(frames), 0.0, *error, *energy)
-
-
-def _median_times(frames: FrameTimes) -> tuple[float, float]:
-    return statistics.median(frames.seconds), statistics.median(frames.core_seconds)
+    times = statistics.median(frames.seconds), statistics.median(frames.core_seconds)
+    return RendererRow("dermis", name, *times, 0.0, *error, *energy)
 
 
 def _time_ratios(row: RendererRow, ours: RendererRow) -> dict[str, float]:

@@ -63,12 +63,12 @@ def peers(
     plan = QUICK if quick else PeerPlan()
     plan = plan if side is None else replace(plan, side=side)
     report = compare_peers(head, lights.split(","), plan, adapter)
-    machine_line, scenes = machine_text(report), scenes_text(report)
+    machine, scenes = machine_text(report), scenes_text(report)
     if target is not None:
         write_results(target, report)
     if target == FIGURES:
-        fill_page(PAGE, machine_line=machine_line, scenes=scenes)
-    print_lines(machine_line, "", scenes)
+        fill_page(PAGE, machine=machine, scenes=scenes)
+    print_lines(machine, "", scenes)
 
 
 def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:

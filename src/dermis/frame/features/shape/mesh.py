@@ -47,7 +47,7 @@ def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> H
 
 
 def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:
-    """Upload (t, 3) triangles without vertices, atlas coordinates and materials, for depth passes."""
+    """Upload only the indices (t, 3) of triangles, for depth passes."""
     table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
     table[0, :, :3] = triangles
     return _uploaded(device, table, {})

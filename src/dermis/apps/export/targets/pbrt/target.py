@@ -137,7 +137,7 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free path whose table is closest to the profile."""
+        """Return the reflectance, and the mean free path with which pbrt is closest to the profile."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 

@@ -54,7 +54,7 @@ class Three(EnginePage):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the same parameters with the material's default index of refraction."""
+        """Return `parameters` with the material's default index of refraction."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

@@ -171,7 +171,7 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the number of the colour map, and its picture entries at nodes of sliders that change it."""
+    """Return the index of the colour map, and the pictures that replace it at sampled slider positions."""
     number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}

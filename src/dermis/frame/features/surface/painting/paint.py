@@ -282,7 +282,7 @@ class PaintedTextures(NamedTuple):
 
 
 class RawPaintedArrays(NamedTuple):
-    """Painted texels, in the channels of skin.wgsl of the painting.
+    """Painted texels in the channels that skin.wgsl writes.
 
     colour : (n, n, 4)
     specular : (n, n, 4) specular factor, amount of pores, and log2 of the mm per unit of uv
