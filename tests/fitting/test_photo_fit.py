@@ -1,4 +1,4 @@
-"""Known light and skin are found again in pictures that the renderer made of them."""
+"""Known light and skin are recovered from pictures by the renderer."""
 
 from __future__ import annotations
 
@@ -55,33 +55,33 @@ def photo(scene: Scene) -> NDArray[np.float32]:
 
 
 @pytest.fixture(scope="module")
-def found(person: Human, scene: Scene, photo: NDArray[np.float32]) -> FitResult:
-    """From bytes, at half the exposure, under light a fifth redder than white."""
+def fitted(person: Human, scene: Scene, photo: NDArray[np.float32]) -> FitResult:
+    """Return a fit to bytes at half the exposure, under light with a fifth more red than white."""
     seen = encode_srgb8(np.clip(0.5 * photo * (1.2, 1.0, 0.9), 0.0, 1.0))
     return fit(seen, person, camera=CAMERA, exposure=0.5, white=(1.2, 1.0, 0.9), adapter="cpu", **SMALL)
 
 
-def test_finds_skin_and_light(found: FitResult) -> None:
-    assert found.values["melanin"] == pytest.approx(0.05, rel=0.05)
-    assert found.values["blood"] == pytest.approx(0.012, rel=0.1)
-    assert found.values["roughness"] == pytest.approx(0.25, abs=0.05)
-    ((way, strength),) = found.suns
+def test_finds_skin_and_light(fitted: FitResult) -> None:
+    assert fitted.values["melanin"] == pytest.approx(0.05, rel=0.05)
+    assert fitted.values["blood"] == pytest.approx(0.012, rel=0.1)
+    assert fitted.values["roughness"] == pytest.approx(0.25, abs=0.05)
+    ((towards, strength),) = fitted.suns
     true = np.array([0.5, 0.4, 0.77])
-    assert way @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
+    assert towards @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
     assert strength == pytest.approx(2.0, rel=0.1)
-    assert light_basis.panorama(found.strengths[: light_basis.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
-    assert found.residual < 0.02
+    assert light_basis.panorama(fitted.strengths[: light_basis.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
+    assert fitted.residual < 0.02
 
 
-def test_files_are_a_scene_that_loads(found: FitResult, tmp_path: Path) -> None:
-    save_fit(tmp_path, found)
+def test_files_are_a_scene_that_loads(fitted: FitResult, tmp_path: Path) -> None:
+    save_fit(tmp_path, fitted)
     scene, settings = load_scene(tmp_path / "scene.toml")
     assert settings.size == SIZE and settings.exposure == 0.5
-    assert scene.head.maps.look.melanin == pytest.approx(found.values["melanin"])  # type: ignore[attr-defined]
+    assert scene.head.maps.look.melanin == pytest.approx(fitted.values["melanin"])  # type: ignore[attr-defined]
     red, green, _ = scene.lights[0].irradiance
     assert red / green == pytest.approx(1.2, rel=1e-6)
-    told = json.loads((tmp_path / "fit.json").read_text())
-    assert any(one.startswith("exposure: given, 0.5") for one in told["priors"])
+    message = json.loads((tmp_path / "fit.json").read_text())
+    assert any(one.startswith("exposure: given, 0.5") for one in message["priors"])
     names = {"light.exr", "person.json", "scene.toml", "photo.png", "fit.png", "difference.png", "fit.json"}
     assert {one.name for one in tmp_path.iterdir()} == names
 
@@ -102,10 +102,10 @@ def test_light_is_nowhere_negative_and_what_it_was() -> None:
 
 
 def test_lobes_make_up_all_of_the_second_order() -> None:
-    places = fibonacci_sphere(200)
-    x, y, z = places.T
+    positions = fibonacci_sphere(200)
+    x, y, z = positions.T
     wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
-    lobes = light_basis.lobe_radiance(light_basis.lobe_directions(), places)
+    lobes = light_basis.lobe_radiance(light_basis.lobe_directions(), positions)
     made = lobes @ np.linalg.lstsq(lobes, wanted, rcond=None)[0]
     assert np.abs(made - wanted).max() < 1e-9
 
@@ -122,22 +122,22 @@ def test_clipped_pixels_are_not_trusted() -> None:
 def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
     head, size = person.head(subdivide=0), (300, 400)
     points = landmark_points(head, "ibug-68")
-    places = np.einsum("nk,nkc->nc", points.weight, head.positions_mm[points.point]) - head.centre_mm
+    positions = np.einsum("nk,nkc->nc", points.weight, head.positions_mm[points.point]) - head.centre_mm
     camera = CAMERA.to_opencv(size)
-    seen = (places @ camera.R.T + camera.t) @ camera.K.T
+    seen = (positions @ camera.R.T + camera.t) @ camera.K.T
     pixels = seen[:, :2] / seen[:, 2:]
     rows = [f"{name},{x},{y}" for name, (x, y) in zip(points.names, pixels.tolist(), strict=True)]
     (tmp_path / "face.csv").write_text("\n".join(["name,x,y", *rows]))
     made = align_to_landmarks(fit_subject(Human()), tmp_path / "face.csv", size)
     assert made.person is not None
     other = made.scene.camera
-    way, true = (np.subtract(one.position, one.target) for one in (other, CAMERA))
-    cosine = way @ true / np.linalg.norm(way) / np.linalg.norm(true)
+    towards, true = (np.subtract(one.position, one.target) for one in (other, CAMERA))
+    cosine = towards @ true / np.linalg.norm(towards) / np.linalg.norm(true)
     assert cosine > np.cos(np.radians(3.0))
     again = made.person.head(subdivide=0)
     there = np.einsum("nk,nkc->nc", points.weight, again.positions_mm[points.point]) - again.centre_mm
-    found = other.to_opencv(size)
-    back = (there @ found.R.T + found.t) @ found.K.T
+    fitted = other.to_opencv(size)
+    back = (there @ fitted.R.T + fitted.t) @ fitted.K.T
     off = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels, axis=1)
     assert np.median(off) < 1.5
 
@@ -145,12 +145,12 @@ def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
 def test_landmarks_of_mediapipe(tmp_path: Path) -> None:
     face = [{"x": 0.5, "y": k / 478, "z": 0.0} for k in range(478)]
     (tmp_path / "face.json").write_text(json.dumps({"face_landmarks": [face]}))
-    name, found = read_landmarks(tmp_path / "face.json", (200, 100))
-    assert name == "mediapipe" and found["239"] == pytest.approx([99.5, 49.5])
+    name, fitted = read_landmarks(tmp_path / "face.json", (200, 100))
+    assert name == "mediapipe" and fitted["239"] == pytest.approx([99.5, 49.5])
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"suns": 3}, "suns: expected"),
         ({"exposure": 0.0}, "exposure: expected"),
@@ -158,6 +158,6 @@ def test_landmarks_of_mediapipe(tmp_path: Path) -> None:
         ({"camera": 3}, "camera: expected"),
     ],
 )
-def test_refusals(person: Human, photo: NDArray[np.float32], given: dict[str, Any], told: str) -> None:
-    with pytest.raises(DermisError, match=told):
+def test_refusals(person: Human, photo: NDArray[np.float32], given: dict[str, Any], message: str) -> None:
+    with pytest.raises(DermisError, match=message):
         fit(photo, person, **given)

@@ -1,4 +1,4 @@
-"""Works in one line: every one with authors, title and year, and no sign that only TeX reads."""
+"""References in one line: authors, title and year, without TeX markup."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page: whole without a network, its sliders move, it fits telephones and desks."""
+"""Gallery page: no network, working sliders, a layout for phones and desktops."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_equations_have_indices_and_powers() -> None:
     assert shown == "E<sub>k</sub> = a<sup>1−mix</sup> &amp; x<sup>2</sup>"
 
 
-def test_a_fault_is_told_and_the_others_go_on(tmp_path: Path) -> None:
+def test_a_fault_is_shown_and_the_others_are_drawn(tmp_path: Path) -> None:
     from dermis.base.errors import refuse
 
     class Faulty(Script):
@@ -71,9 +71,11 @@ def test_a_fault_is_told_and_the_others_go_on(tmp_path: Path) -> None:
 
 
 def test_sheet_stands_in_rows_over_captions() -> None:
-    made = panel_sheet({"a": plain(255, 0, 0), "b": plain(0, 255, 0), "film": [plain(0, 0, 255)]}, columns=2)
-    assert made.shape == (2 * (64 + 24), 128, 3)
-    assert made[10, 10].tolist() == [255, 0, 0] and made[100, 10].tolist() == [0, 0, 255]
+    page_file = panel_sheet(
+        {"a": plain(255, 0, 0), "b": plain(0, 255, 0), "film": [plain(0, 0, 255)]}, columns=2
+    )
+    assert page_file.shape == (2 * (64 + 24), 128, 3)
+    assert page_file[10, 10].tolist() == [255, 0, 0] and page_file[100, 10].tolist() == [0, 0, 255]
 
 
 @pytest.fixture(scope="module")
@@ -90,15 +92,15 @@ def browser() -> Iterator[Any]:
 @pytest.mark.parametrize("width", [390, 1280])
 def test_in_a_browser(page: Path, browser: Any, width: int) -> None:
     view = browser.new_page(viewport={"width": width, "height": 800})
-    said: list[str] = []
-    view.on("console", lambda message: said.append(message.text))
-    view.on("pageerror", lambda fault: said.append(str(fault)))
+    content: list[str] = []
+    view.on("console", lambda message: content.append(message.text))
+    view.on("pageerror", lambda fault: content.append(str(fault)))
     view.goto(page.as_uri())
     assert view.evaluate("document.documentElement.scrollWidth") <= width
     seam = view.locator(".slider")
     box = seam.locator("img").first.bounding_box()
     assert box["width"] > 0.8 * min(width, 736)
-    shown = [_colour(view, box, share) for share in (0.25, 0.75)]
+    shown = [_colour(view, box, fraction) for fraction in (0.25, 0.75)]
     assert shown == ["red", "blue"]
     view.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + 20)
     assert _colour(view, box, 0.75) == "red"
@@ -111,16 +113,16 @@ def test_in_a_browser(page: Path, browser: Any, width: int) -> None:
     assert view.locator("dialog img").get_attribute("alt") == "panel1"
     view.keyboard.press("Enter")
     assert not view.locator("dialog").is_visible()
-    assert said == []
+    assert content == []
 
 
-def _colour(view: Any, box: dict[str, float], share: float) -> str:
+def _colour(view: Any, box: dict[str, float], fraction: float) -> str:
     """Return the colour of the slider's picture at a fraction of its width."""
     import io
 
     from PIL import Image
 
-    x, y = box["x"] + share * box["width"], box["y"] + 0.5 * box["height"]
+    x, y = box["x"] + fraction * box["width"], box["y"] + 0.5 * box["height"]
     shot = view.screenshot(clip={"x": x, "y": y, "width": 4, "height": 4})
     red, _, blue = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))[1, 1]
     return "red" if red > blue else "blue"

@@ -1,4 +1,4 @@
-"""Every gallery script runs and is described; small, since only people need its picture large."""
+"""Gallery scripts run at a small size and have descriptions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def studio() -> Studio:
 
 @pytest.fixture
 def coarse_people(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make people with the triangles of their template, since only their picture needs more."""
+    """Load people with the triangles of their template, which is enough for small pictures."""
     head = Human.head
     monkeypatch.setattr(Human, "head", lambda self, **options: head(self, **{**options, "subdivide": 0}))
 
@@ -90,7 +90,7 @@ def test_a_number_means_one_picture() -> None:
 
 
 def test_pages_show_pictures_that_scripts_draw() -> None:
-    """Or pictures of something else that lie there, such as the viewer's."""
+    """Pages may also show other pictures of that folder, such as the viewer's."""
     root = Path(__file__).parents[2]
     drawn = {script.name for script in SCRIPTS}
     for page in (root / "README.md", *(root / "docs").glob("*.md")):

@@ -1,4 +1,4 @@
-"""A half-space of a medium as a head to trace."""
+"""Half-space of a medium as a head for path tracing."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def traced(
 
 
 def mean_and_error(image: PathTraced) -> tuple[Floats, Floats]:
-    """(3,) mean over an image whose pixels all show the same, and its standard error."""
+    """Return the mean (3,) of an image whose pixels all show the same, and its standard error."""
     count = image.mask.size
     variance = image.variance.astype(np.float64).sum(axis=(0, 1)) / count**2
     return image.image.astype(np.float64).mean(axis=(0, 1)), np.sqrt(variance)

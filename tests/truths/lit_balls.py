@@ -1,4 +1,4 @@
-"""A ball under a light of each kind."""
+"""Ball under one light of each kind."""
 
 from __future__ import annotations
 

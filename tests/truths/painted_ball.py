@@ -1,4 +1,4 @@
-"""A ball of painted skin, where what is to be seen is known."""
+"""Ball of painted skin, for which the image is known."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EVERYWHERE = Environment(name="uniform")
 
 
 def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16) -> SkinTextures:
-    """Even skin; eyes and teeth of one colour each."""
+    """Return textures of uniform skin, and of eyes and teeth in one colour each."""
     even = np.ones((side, side), np.float32)
     skin = np.broadcast_to(np.asarray(colour, np.float32), (side, side, 3))
     plain = [even[..., None] * np.float32(c) * np.ones(3, np.float32) for c in (0.1, 0.6, 0.5)]
@@ -30,12 +30,12 @@ def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16)
 
 
 def ball(**painted: Any) -> Person:
-    """Without eyes and hairs."""
+    """Return a person that is a ball without eyes and hair."""
     return Person("ball", uv_sphere(RADIUS_MM, 64, 32), np.zeros((0, 4, 4)), (), (), paint(**painted))
 
 
 def scene(**given: Any) -> Scene:
-    """Return a ball in light from everywhere, unless told otherwise."""
+    """Return a scene of a ball, in uniform light by default."""
     lit = {"environment": EVERYWHERE} if "lights" not in given else {}
     head = Head("ball", uv_sphere(RADIUS_MM, 64, 32), Maps())
     return Scene(head, camera=CAMERA, **{**lit, **given})

@@ -1,4 +1,4 @@
-"""Scenes passed to Cycles, and, where DERMIS_BLENDER_PYTHON names a Blender, its pictures."""
+"""Scenes for Cycles, and its pictures where DERMIS_BLENDER_PYTHON names a Python with bpy."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GREY = Lambertian((0.8, 0.5, 0.2))
 blender = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTHON_VARIABLE} is not set")
 
 
-def test_skin_is_told_as_colour_and_radius() -> None:
+def test_skin_is_described_by_colour_and_radius() -> None:
     described, arrays = describe_scene(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8))
     (skin,) = described["materials"]
     (layer,) = SKIN1.layers
@@ -63,7 +63,7 @@ def test_what_cycles_cannot_do_is_refused() -> None:
 
 @blender
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_lights_and_pixels_are_those_of_the_truth(kind: str) -> None:
+def test_lights_and_pixels_are_those_of_mitsuba(kind: str) -> None:
     pytest.importorskip("mitsuba")
     scene, settings = ball_scene(LIGHTS[kind]), Settings(size=(64, 64))
     ours, theirs = path_trace(scene, GREY, 128, settings), cycles_render(scene, GREY, 64, settings)
@@ -76,7 +76,7 @@ def test_lights_and_pixels_are_those_of_the_truth(kind: str) -> None:
 
 @blender
 @pytest.mark.samples
-def test_environment_is_that_of_the_truth() -> None:
+def test_environment_is_that_of_mitsuba() -> None:
     pytest.importorskip("mitsuba")
     scene = ball_scene(environment=Environment(name="lebombo", rotation_degrees=70.0))
     ours, theirs = (
@@ -85,7 +85,7 @@ def test_environment_is_that_of_the_truth() -> None:
     whole = ours.mask > 0.999
     noise = (ours.variance[whole] + theirs.variance[whole]).mean()
     squared = np.mean((ours.image[whole] - theirs.image[whole]) ** 2) - noise
-    # The truth's own noise is 4 %, which hides what is smaller than this.
+    # Errors below the reference's noise of 4 % cannot be measured.
     assert squared < 0.02**2 * np.mean(ours.image[whole] ** 2)
     assert theirs.image[whole].sum() / ours.image[whole].sum() == pytest.approx(1.0, abs=0.006)
 
@@ -114,7 +114,7 @@ def test_passes_have_seeds_of_their_own_and_repeat() -> None:
 
 @blender
 def test_a_coat_reflects_and_keeps_that_from_the_skin() -> None:
-    """Index 1.4 reflects 3 to 6 % of even light off the edge; of the rest the colour's share comes back."""
+    """At index 1.4 the surface reflects 3 to 6 % of uniform light; the skin's colour scales the rest."""
     scene = ball_scene(environment=Environment(name="uniform"))
     grey = PrincipledSkin(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)
     means = []

@@ -1,4 +1,4 @@
-"""How Blender's Python may fail, with scripts in its place: each way has a message of its own."""
+"""Failures of Blender's Python, imitated by scripts: each has its own message."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def python(tmp_path: Path) -> Path:
 
 
 def render(python: Path, script: str) -> PathTraced:
-    """With a shell script for Blender's Python; `$3` is the folder that it works in."""
+    """Render with a shell script in place of Blender's Python; `$3` is its working folder."""
     python.write_text(f"#!/bin/sh\n{script}\n")
     python.chmod(0o755)
     return cycles_render(ball_scene(LIGHTS["point"]), SKIN1, 4, Settings(size=(4, 4)), python=python)
 
 
 def test_script_gets_the_scene_and_is_isolated(python: Path) -> None:
-    with pytest.raises(DermisError, match="left something else"):
+    with pytest.raises(DermisError, match="its files are unusable"):
         render(python, f'echo "$1 $2" > {python}.args; cp "$3"/scene.json {python}.json')
     assert Path(f"{python}.args").read_text().startswith("-I ")
     passes = json.loads(Path(f"{python}.json").read_text())["passes"]
@@ -58,7 +58,7 @@ def test_file_that_is_no_program_is_named(python: Path) -> None:
 def test_failure_tells_its_last_words(python: Path) -> None:
     with pytest.raises(DermisError, match=r"it failed \(RuntimeError: no such socket\)\. Try bpy 5\.0"):
         render(python, 'echo "Traceback" >&2; echo "RuntimeError: no such socket" >&2; exit 1')
-    with pytest.raises(DermisError, match=r"it failed \(it said nothing\)"):
+    with pytest.raises(DermisError, match=r"it failed \(no output\)"):
         render(python, "exit 3")
     with pytest.raises(DermisError, match=r"it failed \(\ufffd\ufffd\)"):
         render(python, r"printf '\377\376' >&2; exit 1")
@@ -69,20 +69,20 @@ def test_crash_tells_the_signal(python: Path) -> None:
         render(python, "echo 'Writing: blender.crash.txt'; kill -11 $$")
 
 
-def test_endless_run_is_ended(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_endless_run_is_stopped(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cycles, "_MAX_START_S", 0.2)
     with pytest.raises(DermisError, match=r"it was ended after 0 s\. Take fewer samples or a smaller image"):
         render(python, "exec sleep 60")
 
 
 def test_nothing_or_garbage_is_no_rendering(python: Path) -> None:
-    for script, said in (
+    for script, message in (
         ("true", "No such file"),
         ('echo "}{" > "$3"/done.json', "Expecting value"),
         ('echo "{}" > "$3"/done.json; echo picture > "$3"/pass_0.exr', "pass_0.exr"),
         ("echo '[]' > \"$3\"/done.json", "pass_0.exr"),
     ):
-        with pytest.raises(DermisError, match=f"it left something else .*{said}"):
+        with pytest.raises(DermisError, match=f"its files are unusable .*{message}"):
             render(python, script)
 
 
@@ -106,5 +106,5 @@ def test_passes_are_what_was_asked_for(tmp_path: Path) -> None:
         (good, [1, 2]),
     ):
         left(tmp_path, picture.astype(np.float32), done)
-        with pytest.raises(DermisError, match="it left something else"):
+        with pytest.raises(DermisError, match="its files are unusable"):
             read_passes(tmp_path, [8], (3, 2))

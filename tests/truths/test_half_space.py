@@ -1,4 +1,4 @@
-"""Closed forms of a half-space against published values and one another."""
+"""Closed forms of a half-space against published values and each other."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_normal_incidence_is_as_published(albedo: float) -> None:
 
 @pytest.mark.parametrize("albedo", [0.2, 0.8, 0.99])
 def test_h_solves_its_equation(albedo: float) -> None:
-    # The form with cancellation, on other nodes: H = 1 + albedo / 2 mu H int H' / (mu + mu') dmu'.
+    # Form with cancellation, on other nodes: H = 1 + albedo / 2 mu H int H' / (mu + mu') dmu'.
     nodes, weights = np.polynomial.legendre.leggauss(200)
     mu, weight = 0.5 * (nodes + 1.0), 0.5 * weights
     H = h_function(mu, albedo)
@@ -38,7 +38,7 @@ def test_all_views_together_are_the_albedo(albedo: float) -> None:
         assert seen == pytest.approx(float(directional_albedo(cosine, albedo)), rel=1e-5)
 
 
-def test_light_and_view_change_places() -> None:
+def test_reflection_is_reciprocal() -> None:
     assert float(reflected_radiance(0.3, 0.9, 0.8)) == pytest.approx(
         float(reflected_radiance(0.9, 0.3, 0.8)), rel=1e-12
     )

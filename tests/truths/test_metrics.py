@@ -1,4 +1,4 @@
-"""Measures of error with known answers, and their standard errors by simulation."""
+"""Error measures with known results, and their standard errors by simulation."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ SAMPLES = 64
 
 
 def test_without_noise_it_is_the_plain_ratio() -> None:
-    truth = np.full((4, 5, 3), 2.0)
-    image = truth.copy()
+    reference = np.full((4, 5, 3), 2.0)
+    image = reference.copy()
     image[:2] += 0.5
-    assert relative_rmse(image, truth) == pytest.approx((np.sqrt(0.5 * 0.25 / 4.0), 0.0))
-    assert energy_ratio(image, truth) == pytest.approx((1.125, 0.0))
-    assert relative_rmse(truth, truth) == Estimate(0.0, 0.0)
-    assert relative_rmse(image[..., 0], truth[..., 0]).value == relative_rmse(image, truth).value
+    assert relative_rmse(image, reference) == pytest.approx((np.sqrt(0.5 * 0.25 / 4.0), 0.0))
+    assert energy_ratio(image, reference) == pytest.approx((1.125, 0.0))
+    assert relative_rmse(reference, reference) == Estimate(0.0, 0.0)
+    assert relative_rmse(image[..., 0], reference[..., 0]).value == relative_rmse(image, reference).value
 
 
 def test_only_the_mask_counts() -> None:
-    truth = np.ones((4, 4, 3))
-    image, mask = truth.copy(), np.zeros((4, 4), bool)
+    reference = np.ones((4, 4, 3))
+    image, mask = reference.copy(), np.zeros((4, 4), bool)
     mask[1:3] = True
     image[1:3] *= 1.1
     image[0] = 50.0
-    assert relative_rmse(image, truth, mask).value == pytest.approx(0.1)
-    assert energy_ratio(image, truth, mask).value == pytest.approx(1.1)
+    assert relative_rmse(image, reference, mask).value == pytest.approx(0.1)
+    assert energy_ratio(image, reference, mask).value == pytest.approx(1.1)
 
 
 def scene() -> tuple[Floats, Floats, Floats]:
-    """Return a truth, a picture of it with an error of 8 %, and the deviation of one sample of it."""
+    """Return a reference, an image of it with an error of 8 %, and the standard deviation of one sample."""
     y, x = np.mgrid[:24, :24] / 24.0
-    truth = 0.2 + np.sin(3.0 * x) ** 2 + 0.3 * y
-    return truth, truth * (1.0 + 0.08 * np.cos(9.0 * y)) + 0.03, 0.8 * truth
+    reference = 0.2 + np.sin(3.0 * x) ** 2 + 0.3 * y
+    return reference, reference * (1.0 + 0.08 * np.cos(9.0 * y)) + 0.03, 0.8 * reference
 
 
 def noisy(
-    rng: np.random.Generator, truth: Floats, deviation: Floats, shared: bool = False, skewed: bool = False
+    rng: np.random.Generator, reference: Floats, deviation: Floats, shared: bool = False, skewed: bool = False
 ) -> tuple[Floats, Floats]:
-    """Mean of samples, skewed as of paths that seldom carry light, and the estimate of its variance."""
-    shape = (SAMPLES, *truth.shape[:2], 1 if shared else truth.shape[-1])
+    """Return the mean of skewed samples, like those of rarely lit paths, and its estimated variance."""
+    shape = (SAMPLES, *reference.shape[:2], 1 if shared else reference.shape[-1])
     paths = rng.exponential(size=shape) - 1.0 if skewed else rng.normal(size=shape)
-    samples = truth + deviation * paths
+    samples = reference + deviation * paths
     return samples.mean(axis=0), samples.var(axis=0, ddof=1) / SAMPLES
 
 
@@ -61,23 +61,23 @@ def noisy(
     [(1, False, False, 1.0), (3, True, False, 1.0), (3, False, False, np.sqrt(3.0)), (1, False, True, 1.0)],
 )
 def test_noise_is_taken_off(channels: int, shared: bool, skewed: bool, slack: float) -> None:
-    """Unbiased within three of its own errors over many truths; each error says what the spread is.
+    """The estimate is unbiased within three standard errors over many references.
 
-    Deviations of channels are added: right when they share their paths, sqrt(3) too much when they do not.
-    Skewed noise has them a little too small: here by 7 %.
+    The stated errors match the spread. Deviations of channels are added: this is right when they share paths,
+    and sqrt(3) too large when they do not. For skewed noise the stated error is 7 % too small here.
     """
     rng = np.random.default_rng(5)
-    truth, image, deviation = (np.repeat(values[..., None], channels, axis=2) for values in scene())
-    right = relative_rmse(image, truth).value, energy_ratio(image, truth).value
+    reference, image, deviation = (np.repeat(values[..., None], channels, axis=2) for values in scene())
+    right = relative_rmse(image, reference).value, energy_ratio(image, reference).value
     biased, found = [], []
     for _ in range(TRIALS):
-        mean, variance = noisy(rng, truth, deviation, shared, skewed)
+        mean, variance = noisy(rng, reference, deviation, shared, skewed)
         biased.append(relative_rmse(image, mean).value)
         found.append((relative_rmse(image, mean, None, variance), energy_ratio(image, mean, None, variance)))
     assert np.mean(biased) > 1.2 * right[0]
     for k, (expected, power) in enumerate(zip(right, (2, 1), strict=True)):
         values, errors = np.array([both[k] for both in found]).T
-        # of the square, whose estimate is the unbiased one
+        # the square, whose estimate is unbiased
         off = (values**power).mean() - expected**power
         assert abs(off) < 3.0 * (values**power).std() / np.sqrt(TRIALS)
         assert errors.mean() == pytest.approx(slack * values.std(), rel=0.12)
@@ -86,12 +86,15 @@ def test_noise_is_taken_off(channels: int, shared: bool, skewed: bool, slack: fl
 
 
 def test_noise_of_both_is_taken_off() -> None:
-    """A noisy image is as far from a noisy truth as without noise; its error is on the safe side."""
+    """A noisy image has the same error against a noisy reference as without noise.
+
+    Its standard error is not too small.
+    """
     rng = np.random.default_rng(7)
-    truth, image, deviation = (values[..., None] for values in scene())
-    right, found = relative_rmse(image, truth).value, []
+    reference, image, deviation = (values[..., None] for values in scene())
+    right, found = relative_rmse(image, reference).value, []
     for _ in range(TRIALS):
-        mean, variance = noisy(rng, truth, deviation)
+        mean, variance = noisy(rng, reference, deviation)
         seen, own = noisy(rng, image, 0.5 * deviation)
         found.append(relative_rmse(seen, mean, None, variance, own))
     values, errors = np.array(found).T
@@ -101,19 +104,19 @@ def test_noise_of_both_is_taken_off() -> None:
 
 
 def test_a_perfect_picture_is_within_its_error() -> None:
-    """Below the noise the root is 0 or small: at most its error where the square is, in 84 of 100 cases."""
+    """Below the noise the root is 0 or small; it is at most its standard error in 84 of 100 cases."""
     rng = np.random.default_rng(6)
-    truth, _, deviation = (values[..., None] for values in scene())
+    reference, _, deviation = (values[..., None] for values in scene())
     found = [
-        relative_rmse(truth, mean, None, variance)
-        for mean, variance in (noisy(rng, truth, deviation) for _ in range(200))
+        relative_rmse(reference, mean, None, variance)
+        for mean, variance in (noisy(rng, reference, deviation) for _ in range(200))
     ]
     assert np.mean([e.value <= e.standard_error for e in found]) == pytest.approx(0.84, abs=0.08)
     assert all(0.0 < e.standard_error < 0.1 for e in found)
 
 
 @pytest.mark.parametrize(
-    ("image", "truth", "mask", "variance"),
+    ("image", "reference", "mask", "variance"),
     [
         (np.ones((2, 2)), np.ones((2, 3)), None, None),
         (np.ones((2, 2)), np.full((2, 2), np.nan), None, None),
@@ -124,11 +127,11 @@ def test_a_perfect_picture_is_within_its_error() -> None:
         (np.ones((2, 2)), np.zeros((2, 2)), None, np.ones((2, 2))),
     ],
 )
-def test_wrong_pictures_are_refused(image: Floats, truth: Floats, mask: None, variance: None) -> None:
+def test_wrong_pictures_are_refused(image: Floats, reference: Floats, mask: None, variance: None) -> None:
     with pytest.raises(DermisError):
-        relative_rmse(image, truth, mask, variance)
+        relative_rmse(image, reference, mask, variance)
     with pytest.raises(DermisError):
-        energy_ratio(image, truth, mask, variance)
+        energy_ratio(image, reference, mask, variance)
 
 
 def flat(*colour: float) -> Floats:
@@ -136,7 +139,7 @@ def flat(*colour: float) -> Floats:
 
 
 def test_flip_of_known_pairs() -> None:
-    """Its scale ends with green against blue; equal pictures do not differ; order does not matter."""
+    """FLIP is 1 for green against blue and 0 for equal pictures, and symmetric."""
     pytest.importorskip("flip_evaluator")
     assert flip(flat(0.2, 0.5, 0.7), flat(0.2, 0.5, 0.7)).mean == 0.0
     assert flip(flat(0.0, 0.0, 1.0), flat(0.0, 1.0, 0.0)).mean == pytest.approx(1.0, abs=1e-4)
@@ -159,7 +162,7 @@ def test_flip_counts_the_mask_only() -> None:
 
 
 def test_flip_sees_less_of_finer_detail() -> None:
-    """The same pixels, further away: a chequered pattern merges into grey."""
+    """A checkerboard from farther away merges into grey."""
     pytest.importorskip("flip_evaluator")
     board = flat(0.4, 0.4, 0.4)
     board[::2, ::2] = board[1::2, 1::2] = 0.6
@@ -185,13 +188,13 @@ def test_flip_refuses_what_it_cannot_judge(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_difference_is_grey_where_there_is_none() -> None:
-    truth = flat(0.3, 0.2, 0.1)
-    np.testing.assert_array_equal(signed_difference(truth, truth), 0.5)
-    redder = signed_difference(truth * [1.1, 1.0, 1.0], truth, 4.0)[0, 0]
+    reference = flat(0.3, 0.2, 0.1)
+    np.testing.assert_array_equal(signed_difference(reference, reference), 0.5)
+    redder = signed_difference(reference * [1.1, 1.0, 1.0], reference, 4.0)[0, 0]
     assert redder[0] == pytest.approx(0.5 + 4.0 * (encode_srgb(0.33) - encode_srgb(0.3)))
     assert (redder[1:] == 0.5).all()
-    assert (signed_difference(10.0 * truth, truth) == 1.0).all()
-    assert (signed_difference(0.0 * truth, truth) == 0.0).all()
+    assert (signed_difference(10.0 * reference, reference) == 1.0).all()
+    assert (signed_difference(0.0 * reference, reference) == 0.0).all()
 
 
 def test_wrong_differences_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""Mitsuba's scene against the renderer's own: the same pixels see the same light on the same head."""
+"""Mitsuba's scene against the renderer: the same pixels show the same light on the same head."""
 
 from __future__ import annotations
 
@@ -31,17 +31,20 @@ def renderer() -> Renderer:
 
 
 def both(renderer: Renderer, scene: Scene, samples: int, **given: Any) -> tuple[NDArray[Any], PathTraced]:
-    """Return a dry image by the renderer, and the same by Mitsuba."""
+    """Return an image without scattering by the renderer, and the same by Mitsuba."""
     settings = Settings(**({"atlas": 64, "samples": 16, "technique": "none", "shadow_size": 4096} | given))
     dry = renderer.draw(scene, settings).linear().astype(np.float64)
     albedo = tuple(load_profile(scene.skin.profile).weight.sum(axis=0).tolist())
     return dry, path_trace(scene, Lambertian(albedo), samples, settings)
 
 
-def error_of(dry: NDArray[Any], truth: PathTraced) -> tuple[float, float]:
-    """RMSE over covered pixels relative to the truth, less the truth's noise; ratio of all light."""
-    whole = truth.mask > 0.999
-    image, noise = truth.image[whole].astype(np.float64), truth.variance[whole].astype(np.float64).mean()
+def error_of(dry: NDArray[Any], reference: PathTraced) -> tuple[float, float]:
+    """Return the relative RMSE over covered pixels without the reference's noise, and the energy ratio."""
+    whole = reference.mask > 0.999
+    image, noise = (
+        reference.image[whole].astype(np.float64),
+        reference.variance[whole].astype(np.float64).mean(),
+    )
     squared = np.mean((dry[whole] - image) ** 2) - noise
     return float(np.sqrt(max(squared, 0.0) / (np.mean(image**2) - noise))), float(
         dry[whole].sum() / image.sum()
@@ -64,7 +67,7 @@ def test_uniform_light_is_the_same(renderer: Renderer) -> None:
 
 @pytest.mark.samples
 @pytest.mark.parametrize("degrees", [0.0, 70.0])
-def test_environment_is_turned_the_same_way(renderer: Renderer, degrees: float) -> None:
+def test_environment_has_the_same_rotation(renderer: Renderer, degrees: float) -> None:
     around = Environment(name="lebombo", rotation_degrees=degrees)
     error, energy = error_of(
         *both(renderer, ball_scene(environment=around), 256, size=(64, 64), occlusion="none")
@@ -79,11 +82,11 @@ def scan(sample_folder: Any) -> Head:
     return Head(head.name, head.mesh, Maps())
 
 
-@pytest.mark.parametrize("place", [(60, 60, 1100), (-450, 400, 1000)])
-def test_scan_is_lit_the_same(renderer: Renderer, scan: Head, place: tuple[float, float, float]) -> None:
-    light = PointLight(position=place, irradiance=COLOUR, softness_mm=0.3)
+@pytest.mark.parametrize("position", [(60, 60, 1100), (-450, 400, 1000)])
+def test_scan_is_lit_the_same(renderer: Renderer, scan: Head, position: tuple[float, float, float]) -> None:
+    light = PointLight(position=position, irradiance=COLOUR, softness_mm=0.3)
     scene = Scene(scan, lights=(light,), camera=portrait(scan), skin=DRY)
-    straight = {"interreflection": False, "shadow_size": 8192}  # as the truth here
+    straight = {"interreflection": False, "shadow_size": 8192}  # as in the reference
     error, energy = error_of(*both(renderer, scene, 64, size=(128, 128), **straight))
     assert error < 0.01
     assert energy == pytest.approx(1.0, abs=0.003)
@@ -98,7 +101,7 @@ def coverage(renderer: Renderer, scene: Scene, settings: Settings) -> NDArray[np
 
 
 def shift_between(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By how much an image lies to the right of and below another, by least squares [pixel]."""
+    """Return the shift of an image to the right of and below another, by least squares [pixel]."""
     down, right = np.gradient(ours)
     slopes = np.column_stack((right.ravel(), down.ravel()))
     return -np.linalg.lstsq(slopes, (theirs - ours).ravel(), rcond=None)[0]
@@ -114,7 +117,7 @@ def test_pixels_are_the_same(renderer: Renderer, scan: Head, turned: bool) -> No
     settings = Settings(size=(160, 112), atlas=64, samples=32, technique="none")
     ours = coverage(renderer, scene, settings)
     theirs = path_trace(scene, Lambertian((1, 1, 1)), 8, settings).mask.astype(np.float64)
-    # In all four quarters, so that scale and turn are seen too.
+    # In all four quadrants, which shows differences of scale and rotation too.
     for rows in (slice(0, 56), slice(56, 112)):
         for columns in (slice(0, 80), slice(80, 160)):
             assert np.abs(shift_between(ours[rows, columns], theirs[rows, columns])).max() < 0.03

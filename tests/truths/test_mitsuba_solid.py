@@ -14,7 +14,7 @@ from dermis.mesh.primitives import SKIN, uv_sphere
 
 
 def is_closed(solid: ClosedSurface) -> bool:
-    """Whether each edge is run along once in either direction."""
+    """Return whether each edge occurs once in each direction."""
     t = solid.triangles
     sides = np.vstack((t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]))
     forth = np.sort(sides[:, 0].astype(np.int64) * len(solid.positions) + sides[:, 1])

@@ -1,4 +1,4 @@
-"""Path tracing against closed forms and photons, its statistics, and what it keeps."""
+"""Path tracing against closed forms and Monte Carlo, its statistics and its cache."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_half_space_reflects_by_the_h_function(degrees: float) -> None:
 
 @pytest.mark.usefixtures("mitsuba")
 def test_dense_medium_is_not_thinned_by_the_steps_off_its_surface() -> None:
-    # Ten scatterings in a millimetre: steps of 0.01 mm through it would cost 6 % of the first channel.
+    # With ten scatterings per mm, skipping 0.01 mm would cost 6 % of the first channel.
     mean, error = mean_and_error(traced(pan(40.0, 20.0), (Layer(10 * (1 - ALBEDO), 10 * ALBEDO),), 256))
     exact = np.array([float(reflected_radiance(1.0, 1.0, one)) for one in ALBEDO])
     assert np.all(np.abs(mean / exact - 1.0) < 0.003 + STANDARD_ERRORS * error / exact)
@@ -63,7 +63,7 @@ def test_dense_medium_is_not_thinned_by_the_steps_off_its_surface() -> None:
 
 @pytest.mark.usefixtures("mitsuba")
 def test_total_reflectance_agrees_with_photons_and_published_values() -> None:
-    # Light from everywhere seen along the normal is light along the normal seen from everywhere.
+    # By reciprocity, uniform light seen along the normal equals light along the normal seen from all sides.
     mean, error = mean_and_error(traced(pan(300.0, 150.0), (Layer(1.0 - ALBEDO, ALBEDO),), 256, around=True))
     published = np.array([0.1152, 0.2853, 0.5355])  # adding-doubling, to four digits
     assert np.all(np.abs(mean - published) < STANDARD_ERRORS * error + 5e-5)
@@ -93,7 +93,7 @@ def test_layers_inside_one_another_agree_with_photons_through_layers() -> None:
 def test_variance_of_a_pixel_is_that_of_another_trial() -> None:
     first = path_trace(ball_scene(), SKIN1, 160, SMALL)
     both = path_trace(ball_scene(), SKIN1, 320, SMALL)
-    second = 2.0 * both.image.astype(np.float64) - first.image  # the mean of the 160 samples that were added
+    second = 2.0 * both.image.astype(np.float64) - first.image  # mean of the 160 added samples
     seen = first.mask > 0.99
     apart = (second - first.image)[seen].astype(np.float64)
     expected = 4.0 * both.variance[seen].astype(np.float64)
@@ -114,7 +114,7 @@ def test_more_samples_add_to_those_there_are() -> None:
 
 
 @pytest.mark.usefixtures("mitsuba")
-def test_kept_passes_are_those_traced_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cached_passes_equal_those_traced_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path_trace(ball_scene(), SKIN1, 8, SMALL)
     grown = path_trace(ball_scene(), SKIN1, 24, SMALL)
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
@@ -123,7 +123,7 @@ def test_kept_passes_are_those_traced_at_once(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.usefixtures("mitsuba")
-def test_passes_not_to_be_kept_are_neither_read_nor_stored(
+def test_without_cache_passes_are_neither_read_nor_stored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
@@ -144,7 +144,7 @@ def test_damaged_file_is_traced_anew(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.usefixtures("mitsuba")
-def test_interrupted_passes_are_kept() -> None:
+def test_interrupted_passes_are_cached() -> None:
     scene = ball_scene(irradiance=(2, 2, 2))
 
     def stop(done: int, of: int) -> None:

@@ -1,4 +1,4 @@
-"""Eyes for path tracing: what the cornea shows of the iris, and what of the ball is clear."""
+"""Eyes for path tracing: refraction by the cornea, and the clear part of the eyeball."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SIDE, FRAME_MM, FAR_MM = 24, 9.0, 300.0
 
 
 def ramps() -> NDArray[np.float32]:
-    """Red grows with x, green with y, blue is even."""
+    """Return a texture whose red increases with x and green with y, with constant blue."""
     along = (np.arange(512, dtype=np.float32) + 0.5) / 512
     return np.stack([*np.meshgrid(along, along), np.ones((512, 512), np.float32)], axis=-1)
 
 
-def seen(degrees: float) -> Any:
-    """(n, n, 2) places of a glowing iris that a camera sees, from the front or from the side [mm]."""
+def visible_positions(degrees: float) -> Any:
+    """Return the positions (n, n, 2) of a glowing iris that a camera sees from the front or the side [mm]."""
     mi, reach = load_mitsuba(), 6.5
     turn = np.radians(degrees)
     middle = np.array([0.0, 0.0, cornea_centre_mm()])
@@ -49,7 +49,7 @@ def seen(degrees: float) -> Any:
 
 
 def pixels(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where rays through the middles of pixels meet the cornea's sphere, and their ways."""
+    """Return where rays through the centres of pixels meet the cornea's sphere, and their directions."""
     eye, target = np.array(camera.position), np.array(camera.target)
     ahead = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(ahead, (0.0, 1.0, 0.0))
@@ -57,43 +57,43 @@ def pixels(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     up = np.cross(right, ahead)
     along = ((np.arange(SIDE) + 0.5) / SIDE - 0.5) * FRAME_MM / FAR_MM
     x, y = np.meshgrid(along, -along)
-    ways = ahead + x[..., None] * right + y[..., None] * up
-    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    directions = ahead + x[..., None] * right + y[..., None] * up
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     off = eye - [0.0, 0.0, cornea_centre_mm()]
-    b = ways @ off
+    b = directions @ off
     root = b**2 - off @ off + CORNEA_MM**2
-    places = eye + ways * (-b - np.sqrt(np.maximum(root, 0.0)))[..., None]
-    return places, ways
+    positions = eye + directions * (-b - np.sqrt(np.maximum(root, 0.0)))[..., None]
+    return positions, directions
 
 
-def by_snell(places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, n, 2) where refracted rays meet the plane of the iris [mm]."""
-    n = (places - [0.0, 0.0, cornea_centre_mm()]) / CORNEA_MM
-    cosine = -(ways * n).sum(axis=-1, keepdims=True)
+def by_snell(positions: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where refracted rays meet the plane of the iris (n, n, 2) [mm]."""
+    n = (positions - [0.0, 0.0, cornea_centre_mm()]) / CORNEA_MM
+    cosine = -(directions * n).sum(axis=-1, keepdims=True)
     inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.CORNEA_INDEX**2)
-    bent = ways / eyes.CORNEA_INDEX + (cosine / eyes.CORNEA_INDEX - inner) * n
-    far = (iris_mm() - places[..., 2:]) / bent[..., 2:]
-    return np.asarray((places + far * bent)[..., :2])
+    bent = directions / eyes.CORNEA_INDEX + (cosine / eyes.CORNEA_INDEX - inner) * n
+    far = (iris_mm() - positions[..., 2:]) / bent[..., 2:]
+    return np.asarray((positions + far * bent)[..., :2])
 
 
 @pytest.mark.parametrize("degrees", [0.0, 40.0])
-def test_the_iris_is_seen_where_snell_says(degrees: float) -> None:
-    found, (places, ways) = seen(degrees)
-    expected = by_snell(places, ways)
-    clear = np.hypot(places[..., 0], places[..., 1]) < LIMBUS_MM - eyes.LIMBUS_BLUR_MM - 0.5
+def test_the_iris_is_refracted_by_snells_law(degrees: float) -> None:
+    found, (positions, directions) = visible_positions(degrees)
+    expected = by_snell(positions, directions)
+    clear = np.hypot(positions[..., 0], positions[..., 1]) < LIMBUS_MM - eyes.LIMBUS_BLUR_MM - 0.5
     clear &= np.hypot(*np.moveaxis(expected, -1, 0)) < 4.5
     assert clear.sum() > 60
-    assert np.abs(found - expected)[clear].max() < 0.08  # a fifth of a pixel; paths are few
+    assert np.abs(found - expected)[clear].max() < 0.08  # a fifth of a pixel, for few paths
 
 
 def test_the_ball_is_whole_and_has_the_published_shape() -> None:
-    places, triangles, normals, uv = eyes.eyeball_mesh()
-    assert np.linalg.norm(places, axis=1).min() >= SCLERA_MM - 1e-9
-    assert places[:, 2].max() == pytest.approx(apex_mm())
-    corners = places[triangles]
+    positions, triangles, normals, uv = eyes.eyeball_mesh()
+    assert np.linalg.norm(positions, axis=1).min() >= SCLERA_MM - 1e-9
+    assert positions[:, 2].max() == pytest.approx(apex_mm())
+    corners = positions[triangles]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((facing * corners.mean(axis=1)).sum(axis=1) >= 0.0).all()
-    assert (np.einsum("vc,vc->v", normals, places) > 0.0).all()
+    assert (np.einsum("vc,vc->v", normals, positions) > 0.0).all()
     assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.UV_RADIUS)
 
 
@@ -115,7 +115,7 @@ def test_the_iris_reaches_the_ball_and_is_wider_than_a_pupil() -> None:
 def test_eyes_stand_where_their_frames_say() -> None:
     mi = load_mitsuba()
     frame = np.eye(4)
-    frame[:3, :3] *= 2.0  # half as large
+    frame[:3, :3] *= 2.0  # an eye of half the size
     frame[:3, 3] = -2.0 * np.array([30.0, 5.0, 60.0])
     with mitsuba_variant(mi, "scalar_rgb"):
         person: Person = replace(ball(), eyes=frame[None])

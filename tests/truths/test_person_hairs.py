@@ -1,4 +1,4 @@
-"""Hairs as curves of Mitsuba: through their knots, as thick and as dark as they are."""
+"""Hair fibres as curves of Mitsuba: knots, radii and absorption."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Painted skin for path tracing: the medium gives back its colour, the coat reflects as a dielectric."""
+"""Painted skin for path tracing: the medium has its colour, and the coat reflects like a dielectric."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from dermis.scene.lights import RectangleLight
 pytest.importorskip("mitsuba")
 COLOUR = (0.5, 0.3, 0.2)
 SHORT = np.full(3, 0.02)
-"""Mean free paths for which a ball is as good as flat [mm]."""
+"""Mean free paths for which a ball is nearly flat [mm]."""
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +37,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def middle(person: Any, paths: NDArray[np.float64] = SHORT, samples: int = 256, **given: Any) -> Any:
-    """Mean radiance of the ball's middle."""
+    """Return the mean radiance at the middle of the ball."""
     mi = load_mitsuba()
     with mitsuba_variant(mi, "scalar_rgb"):
         built, _ = person_scene(mi, scene(**given), person, paths, (16, 16))
@@ -62,8 +62,8 @@ def test_light_spreads_as_far_as_asked() -> None:
 
 
 def test_the_medium_looks_as_such_half_spaces_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From straight above a little darker than their colour, which is the mean of all directions."""
-    monkeypatch.setattr(skin, "COAT_INDEX", 1.0)  # nothing is reflected
+    """Seen at normal incidence the ball is a little darker than its colour, the mean over all directions."""
+    monkeypatch.setattr(skin, "COAT_INDEX", 1.0)  # no surface reflection
     expected = [
         COAT_TRANSMITTANCE * directional_albedo(1.0, float(albedo))
         for albedo in single_scattering_albedo(COLOUR)
@@ -72,7 +72,7 @@ def test_the_medium_looks_as_such_half_spaces_do(monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_coat_reflects_as_a_rough_dielectric() -> None:
-    """A softbox beside the camera, over skin as black as the albedo goes."""
+    """A softbox beside the camera lights skin of the lowest albedo."""
     light = RectangleLight(position=(60.0, 0.0, 300.0), width_mm=400.0, height_mm=400.0)
     black, mi = ball(colour=(0.0, 0.0, 0.0), roughness=0.4), load_mitsuba()
     found = middle(black, lights=(light,))
@@ -94,7 +94,7 @@ def test_the_coat_reflects_as_a_rough_dielectric() -> None:
 
 
 def test_relief_bends_the_coat() -> None:
-    """A ramp of height moves the highlight out of the middle."""
+    """A ramp of height moves the highlight away from the middle."""
     light = RectangleLight(position=(0.0, 0.0, 300.0), width_mm=60.0, height_mm=60.0)
     flat = ball(colour=(0.0, 0.0, 0.0), roughness=0.1)
     ramp = np.tile(np.linspace(0.0, 40.0, 16, dtype=np.float32), (16, 1))
@@ -106,7 +106,7 @@ def test_relief_bends_the_coat() -> None:
 def test_the_grid_has_the_colour_of_the_nearest_skin() -> None:
     side = 64
     halves = np.zeros((side, side, 3), np.float32)
-    halves[: side // 2] = (0.6, 0.1, 0.1)  # rows, of the ball's upper half
+    halves[: side // 2] = (0.6, 0.1, 0.1)  # rows of the ball's upper half
     halves[side // 2 :] = (0.1, 0.1, 0.6)
     person = ball()
     person = replace(person, textures=replace(person.textures, colour=halves))

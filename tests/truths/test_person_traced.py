@@ -1,4 +1,4 @@
-"""A person path-traced: kept on disk by all that the picture depends on, posed, with eyes and hairs."""
+"""Path-traced person: cache keys of everything in the picture, pose, eyes and hair."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def traced(samples: int, **painted: Any) -> PathTraced:
     return path_trace_person(scene(), paint(**painted), WAY, COLOUR, (24, 24), samples)
 
 
-def test_more_samples_are_added_to_those_that_are_kept() -> None:
+def test_more_samples_are_added_to_cached_ones() -> None:
     first, more = traced(8), traced(12)
     assert (first.samples, more.samples) == (8, 12)
     assert more.seconds > first.seconds > 0.0
-    difference = (12 * more.image.astype(float) - 8 * first.image) / 4  # of the four that came
+    difference = (12 * more.image.astype(float) - 8 * first.image) / 4  # mean of the four added samples
     assert difference.min() > -1e-3
     covered = more.mask > 0.999
     assert 0.2 < covered.mean() < 0.8 and np.isfinite(more.image).all()
@@ -57,7 +57,7 @@ def test_more_samples_are_added_to_those_that_are_kept() -> None:
     assert np.median(more.image[more.mask == 0.0]) == 0.0
 
 
-def test_pictures_are_kept_by_what_they_depend_on() -> None:
+def test_cache_keys_depend_on_all_inputs() -> None:
     person, path = posed_person(scene(), paint()), np.ones(3)
     brows, *others = person.hairs
     thicker = replace(person, hairs=(replace(brows, radius_mm=2 * brows.radius_mm), *others))
@@ -81,7 +81,7 @@ def test_a_pose_moves_skin_eyes_and_hairs() -> None:
     assert 10.0 < moved.max() < 60.0 and np.median(moved) < 0.5
     assert np.abs(posed.eyes[0, :3, :3] - rest.eyes[0, :3, :3]).max() > 0.1
     np.testing.assert_allclose(posed.eyes[1], rest.eyes[1], atol=1e-6)
-    assert len(posed.hairs) == len(rest.hairs) == 2  # brows and lashes, and the hair of the head
+    assert len(posed.hairs) == len(rest.hairs) == 2  # brows with lashes, and scalp hair
     assert 1.0 < np.linalg.norm(posed.hairs[0].knots_mm - rest.hairs[0].knots_mm, axis=-1).max() < 20.0
 
 

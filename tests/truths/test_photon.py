@@ -1,4 +1,4 @@
-"""The compiled parts of a photon's walk, each against what is known of it."""
+"""Compiled parts of a photon's random walk against known results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def generator() -> photon.RandomState:
 
 
 def test_random_words_are_those_of_the_published_generator() -> None:
-    """The first words from the state (1, 2, 3, 4), as the authors' own program prints them."""
+    """The first words from the state (1, 2, 3, 4) are those that the authors' program prints."""
     rng = np.array([1, 2, 3, 4], np.uint64)
     published = [
         41943041,
@@ -36,7 +36,7 @@ def test_random_words_are_those_of_the_published_generator() -> None:
 
 @pytest.mark.parametrize(("word", "expected"), [(0, 2.0**-53), (2**64 - 1, 1.0 - 2.0**-53)])
 def test_uniform_number_is_never_0_or_1(word: int, expected: float) -> None:
-    rng = np.array([word, 0, 0, 0], np.uint64)  # from here the generator gives its least and greatest words
+    rng = np.array([word, 0, 0, 0], np.uint64)  # the state before the smallest or largest word
     assert photon.uniform(rng) == expected
 
 
@@ -54,7 +54,7 @@ def test_refraction_is_that_of_the_closed_form(eta: float) -> None:
 def test_deflections_have_the_moments_of_henyey_and_greenstein(
     direction: tuple[float, float, float], g: float
 ) -> None:
-    """Legendre moments g and g^2 of the cosine, none across; lengths stay 1."""
+    """The Legendre moments of the cosine are g and g^2, the mean sideways is 0, and lengths stay 1."""
     rng = generator()
     after = np.array([photon.deflect(*direction, g, rng) for _ in range(DEFLECTIONS)])
     assert np.allclose(np.linalg.norm(after, axis=1), 1.0, atol=1e-12)

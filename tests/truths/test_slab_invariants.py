@@ -1,4 +1,4 @@
-"""What must hold of the Monte Carlo of any stack: energy, limits, reproducibility; and what it refuses."""
+"""Invariants of Monte Carlo in any stack (energy, limits, reproducibility), and invalid input."""
 
 from __future__ import annotations
 
@@ -66,14 +66,14 @@ def test_no_light_is_lost(layers: tuple[ScatteringLayer, ...]) -> None:
 
 
 def test_light_in_a_half_space_without_absorption_comes_back() -> None:
-    """All of it would, after unbounded walks: those given up are counted, and few."""
+    """All light would return after unbounded walks; the few dropped photons are counted."""
     run = trace_slab([CONSERVATIVE], 2000)
     assert run.absorbed.tolist() == [0.0]
     assert 0.0 < run.unfinished < 0.03
     assert not trace_slab([ScatteringLayer(1e-3, 1.0)], 2000).unfinished
 
 
-def test_shares_of_entering_light_are_larger_by_what_was_mirrored() -> None:
+def test_fractions_of_entering_light_exclude_the_mirror() -> None:
     run = trace_slab(SKIN, 2000)
     assert run.specular == pytest.approx(normal_reflectance(1.4), abs=1e-15)
     entered = 1.0 - run.specular
@@ -132,7 +132,7 @@ def test_thin_scatterer_lights_a_cone_in_glass() -> None:
 
 
 def test_gap_of_air_above_changes_only_what_is_called_specular() -> None:
-    """The mirror is now a face within the stack, and photons leave it on their way up."""
+    """The reflecting face is then inside the stack, and photons leave it upwards."""
     plain = trace_slab(SKIN, 400_000)
     below = trace_slab([ScatteringLayer(0.0, 0.0, 0.1, eta=1.0), *SKIN], 400_000, seed=1)
     assert below.specular == 0.0
@@ -143,8 +143,8 @@ def test_gap_of_air_above_changes_only_what_is_called_specular() -> None:
     assert np.allclose(below.absorbed[1:], plain.absorbed, atol=STANDARD_ERRORS * 1.5e-3)
 
 
-def test_similar_media_are_alike_at_every_scale() -> None:
-    """Eight times as long, with an eighth of the coefficients: the same photons, farther apart."""
+def test_results_scale_with_length() -> None:
+    """With eight times the lengths and an eighth of the coefficients, the photons are only farther apart."""
     small = trace_slab([ScatteringLayer(1.0, 9.0, 0.5, 0.5)], 20_000)
     large = trace_slab([ScatteringLayer(0.125, 1.125, 4.0, 0.5)], 20_000, edges_mm=8.0 * small.edges_mm)
     assert np.allclose(64.0 * large.reflectance, small.reflectance, rtol=1e-12)
@@ -155,7 +155,7 @@ def test_standard_errors_are_the_scatter_of_many_runs() -> None:
     for name in ("total_reflectance", "absorbed"):
         values = np.array([getattr(run, name) for run in many])
         stated = np.mean([getattr(run, f"{name}_se") for run in many])
-        assert 0.8 < values.std(ddof=1) / stated < 1.22  # 100 runs tell it within 7 %
+        assert 0.8 < values.std(ddof=1) / stated < 1.22  # 100 runs determine it within 7 %
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -199,31 +199,31 @@ def test_rings_cover_the_plane_from_the_axis() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "message"),
     [
-        (lambda: ScatteringLayer(-0.1, 1.0), "absorption and scattering of 0 or more"),
-        (lambda: ScatteringLayer(0.1, float("nan")), "absorption and scattering of 0 or more"),
-        (lambda: ScatteringLayer(0.1, float("inf")), "absorption and scattering of 0 or more"),
+        (lambda: ScatteringLayer(-0.1, 1.0), "coefficients of 0 or more"),
+        (lambda: ScatteringLayer(0.1, float("nan")), "coefficients of 0 or more"),
+        (lambda: ScatteringLayer(0.1, float("inf")), "coefficients of 0 or more"),
         (lambda: ScatteringLayer(0.1, 1.0, 0.0), "thickness above 0"),
         (lambda: ScatteringLayer(0.1, 1.0, float("nan")), "thickness above 0"),
         (lambda: ScatteringLayer(0.0, 0.0), "infinite layer"),
         (lambda: ScatteringLayer(0.1, 1.0, g=1.0), "mean cosine"),
         (lambda: ScatteringLayer(0.1, 1.0, eta=0.9), "index of refraction"),
         (lambda: trace_slab([]), "at least one layer"),
-        (lambda: trace_slab([CONSERVATIVE, GLASS]), "in the last layer only"),
+        (lambda: trace_slab([CONSERVATIVE, GLASS]), "an infinite last layer only"),
         (lambda: trace_slab(SKIN, 0), "photons: expected a whole number"),
         (lambda: trace_slab(SKIN, 10**10 + 1), "photons: expected a whole number"),
         (lambda: trace_slab(SKIN, 1e6 + 0.5), "photons: expected a whole number"),
         (lambda: trace_slab(SKIN, 10, seed=-1), "seed: expected a whole number"),
-        (lambda: trace_slab(SKIN, 10, edges_mm=[0.1, 1.0]), "begin with 0"),
-        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0, 1.0, 1.0]), "begin with 0"),
-        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0]), "begin with 0"),
-        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0, float("inf")]), "begin with 0"),
+        (lambda: trace_slab(SKIN, 10, edges_mm=[0.1, 1.0]), "increasing edges of rings"),
+        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0, 1.0, 1.0]), "increasing edges of rings"),
+        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0]), "increasing edges of rings"),
+        (lambda: trace_slab(SKIN, 10, edges_mm=[0.0, float("inf")]), "increasing edges of rings"),
         (lambda: trace_medium(Medium("m", (Layer(np.ones(1), np.ones(1)),)), 10, g=1.0), "mean cosine"),
     ],
 )
-def test_bad_input_is_refused(wrong: Callable[[], object], said: str) -> None:
-    with pytest.raises(DermisError, match=said):
+def test_bad_input_is_refused(wrong: Callable[[], object], message: str) -> None:
+    with pytest.raises(DermisError, match=message):
         wrong()
 
 
@@ -236,8 +236,8 @@ threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
 """
     with child_process.start([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True) as run:
-        _, said = run.communicate(timeout=60)
-    assert run.returncode != 0 and "KeyboardInterrupt" in said
+        _, message = run.communicate(timeout=60)
+    assert run.returncode != 0 and "KeyboardInterrupt" in message
 
 
 def test_importing_the_module_leaves_the_compiler_alone() -> None:

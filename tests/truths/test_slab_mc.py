@@ -1,4 +1,4 @@
-"""Monte Carlo against published and exact numbers, and against what other programs counted."""
+"""Monte Carlo against published, exact and other programs' results."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def close(computed: float, error: float, expected: float) -> bool:
     return abs(computed - expected) < STANDARD_ERRORS * error
 
 
-def alike(deviations: Floats) -> bool:
-    """Whether deviations in standard errors are those of chance: all together, and the worst of them."""
+def consistent_with_chance(deviations: Floats) -> bool:
+    """Return whether deviations in units of standard errors are consistent with chance."""
     count = len(deviations)
     worst = norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / count)))
     return bool(chi2.sf(np.sum(deviations**2), count) > CHANCE and np.abs(deviations).max() < worst)
@@ -49,7 +49,7 @@ def runs(sample_folder: Path) -> dict[str, dict[str, str]]:
 
 
 def test_slab_of_van_de_hulst() -> None:
-    """Albedo 0.9, optical thickness 2, g 0.75; the printed transmittance includes what nothing scattered."""
+    """Albedo 0.9, optical thickness 2, g 0.75; the printed transmittance includes unscattered light."""
     run = trace_slab([ScatteringLayer(1.0, 9.0, 0.2, 0.75, 1.0)], 4_000_000)
     assert close(run.total_reflectance, run.total_reflectance_se, 0.09739)
     through = np.exp(-2.0)
@@ -59,7 +59,7 @@ def test_slab_of_van_de_hulst() -> None:
 
 
 def test_half_space_of_giovanelli() -> None:
-    """His 0.2600 includes the surface reflection of 0.04."""
+    """The published 0.2600 includes the surface reflection of 0.04."""
     run = trace_slab([ScatteringLayer(1.0, 9.0, eta=1.5)], 4_000_000)
     assert run.specular == pytest.approx(0.04, abs=1e-12)
     assert close(run.total_reflectance + run.specular, run.total_reflectance_se, 0.2600)
@@ -70,14 +70,14 @@ def test_half_space_of_giovanelli() -> None:
     [(0.5, 0.1152258777072045), (0.9, 0.41494747913081687), (0.98, 0.6710837470136696)],
 )
 def test_matched_half_space_is_that_of_chandrasekhar(albedo: float, exact: float) -> None:
-    """1 - sqrt(1 - albedo) H(1), H being his function for isotropic scattering."""
+    """The result is 1 - sqrt(1 - albedo) H(1), with H for isotropic scattering."""
     run = trace_slab([ScatteringLayer(1.0 - albedo, albedo, eta=1.0)], 2_000_000)
     assert run.specular == 0.0
     assert close(run.total_reflectance, run.total_reflectance_se, exact)
 
 
 def test_three_layers_of_mcml(sample_folder: Path) -> None:
-    """Its sample run of a million photons with weights of at most 1: binomial errors are an upper bound."""
+    """MCML's sample run has a million photons of weight 1 or less: binomial errors are an upper bound."""
     rows = read(sample_folder / "reference" / "data" / "mc_vs_mcml_sample_mco.csv")
     run = trace_slab(MCML_SLAB, 1_500_000, edges_mm=0.1 * np.arange(50))
     for kind, rings, total, overflow, published in (
@@ -85,16 +85,18 @@ def test_three_layers_of_mcml(sample_folder: Path) -> None:
         ("Tt_r", run.transmittance, run.total_transmittance, run.overflow_transmittance, 0.0964896),
     ):
         theirs = np.array([float(row["MCML_sample_mco_per_mm2"]) for row in rows if row["quantity"] == kind])
-        areas = np.pi * 0.01 * (2.0 * np.arange(50) + 1.0)  # its last ring holds all that is beyond
+        areas = (
+            np.pi * 0.01 * (2.0 * np.arange(50) + 1.0)
+        )  # the last ring of the table contains everything beyond
         expected = np.append(theirs * areas, published)
         computed = np.append(np.append(rings * areas[:-1], overflow), total)
         variance = expected * (1.0 - expected) * (1.0 / MCML_PHOTONS + (1.0 - run.specular) / run.photons)
-        assert alike((computed - expected) / np.sqrt(variance))
+        assert consistent_with_chance((computed - expected) / np.sqrt(variance))
     assert np.allclose(run.absorbed, [0.2612, 0.1488, 0.2316], atol=STANDARD_ERRORS * 6e-4)
 
 
 def test_totals_of_other_runs(sample_folder: Path) -> None:
-    """38 media by another program, whose totals include what mirrors alone sent back or through."""
+    """The totals of 38 media by another program include unscattered light."""
     deviations = []
     for row in runs(sample_folder).values():
         run = trace_slab(stack(row), 80_000)
@@ -106,7 +108,7 @@ def test_totals_of_other_runs(sample_folder: Path) -> None:
             error = np.sqrt(error_density * (1.0 - run.specular - error_density) / run.photons)
             deviations.append(T / np.hypot(error, float(row["Tt_se"])))
     assert len(deviations) > 40
-    assert alike(np.array(deviations))
+    assert consistent_with_chance(np.array(deviations))
 
 
 @pytest.mark.parametrize(
@@ -121,7 +123,7 @@ def test_totals_of_other_runs(sample_folder: Path) -> None:
     ],
 )
 def test_profiles_of_other_runs(sample_folder: Path, case: str, face: str) -> None:
-    """All rings in which at least 25 photons are to be expected."""
+    """All rings with at least 25 expected photons are compared."""
     data = np.load(sample_folder / "reference" / "data" / "mc_profiles.npz")
     edges, expected, their_error = (data[f"{case}/{name}"] for name in ("edges", face, f"{face}_se"))
     run = trace_slab(stack(runs(sample_folder)[case]), 1_500_000, edges_mm=edges)
@@ -133,4 +135,4 @@ def test_profiles_of_other_runs(sample_folder: Path, case: str, face: str) -> No
     error = np.sqrt(error_density * (1.0 - run.specular - error_density) / run.photons) / areas
     full = error_density * run.photons > 25.0
     assert full.sum() > 50
-    assert alike((computed - expected)[full] / np.hypot(error, their_error)[full])
+    assert consistent_with_chance((computed - expected)[full] / np.hypot(error, their_error)[full])

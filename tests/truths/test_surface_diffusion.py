@@ -1,4 +1,4 @@
-"""Heat on triangles against what is known in closed form: planes, spheres, and what it must conserve."""
+"""Heat on triangles against closed forms for planes and spheres, and conservation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Surface = tuple[Floats, NDArray[np.int64]]
 
 AXIS = np.array([0.36, 0.48, 0.8])
-"""Away from the poles of the spheres, so that their harmonics have no symmetry with the mesh."""
+"""Axis of the harmonics, away from the poles of the spheres to avoid symmetry with the mesh."""
 
 
 def rough_plane(size_mm: float, segments: int, roughness: float = 0.0) -> Surface:
@@ -42,7 +42,7 @@ def middle_of(positions: Floats) -> int:
 
 
 def point_of_light(surface: Surface) -> tuple[Floats, Floats]:
-    """Values (n, 1) that hold one unit of light in the middle vertex, and the vertices' areas."""
+    """Return values (n, 1) with one unit of light at the middle vertex, and the areas of the vertices."""
     areas = vertex_areas(*surface)
     values = np.zeros((len(areas), 1))
     middle = middle_of(surface[0])
@@ -53,7 +53,7 @@ def point_of_light(surface: Surface) -> tuple[Floats, Floats]:
 def harmonic_decay(
     radius_mm: float, degree: int, variance: float, segments: int, steps: int = STEPS_PER_LEVEL
 ) -> float:
-    """How much of a spherical harmonic is left."""
+    """Return the remaining fraction of a spherical harmonic."""
     surface = welded_surface(uv_sphere(radius_mm, segments, segments // 2))
     values = eval_legendre(degree, surface[0] @ AXIS / radius_mm)[:, None]
     areas = vertex_areas(*surface)[:, None]
@@ -66,19 +66,20 @@ def harmonic_decay(
 def test_point_on_a_plane_spreads_to_the_gaussian(
     roughness: float, tolerance: float, variances: list[float]
 ) -> None:
-    """On the longest edges allowed: a cell's diagonal, and what roughness may add at both ends.
+    """The edges are the longest that are allowed: a cell's diagonal, plus the roughness at both ends.
 
-    A rough mesh costs twice as much, as the point itself, a hat over uneven triangles, is not quite round.
+    The error is twice as large on a rough mesh, because the point itself, a hat function on irregular
+    triangles, is not quite round.
     """
     diagonal = np.sqrt(2) * (1 + 2 * roughness)
     surface = rough_plane(13.0, 2 * int(np.ceil(6.5 * diagonal / max_edge_mm(variances))), roughness)
     values, areas = point_of_light(surface)
     square = (surface[0] ** 2).sum(axis=1)
     for v, level in zip(variances, diffuse_on_surface(*surface, values, variances), strict=True):
-        truth = np.exp(-square / (2 * v)) / (2 * np.pi * v)
-        difference = level[:, 0] - truth
-        assert np.abs(difference).max() < tolerance * truth.max()
-        assert np.sqrt((areas * difference**2).sum() / (areas * truth**2).sum()) < tolerance
+        expected = np.exp(-square / (2 * v)) / (2 * np.pi * v)
+        difference = level[:, 0] - expected
+        assert np.abs(difference).max() < tolerance * expected.max()
+        assert np.sqrt((areas * difference**2).sum() / (areas * expected**2).sum()) < tolerance
         assert (areas * level[:, 0] * square).sum() / (2 * v) == pytest.approx(1.0, abs=0.005)
 
 
@@ -94,16 +95,16 @@ def test_heat_does_not_ring_on_a_point() -> None:
 )
 @pytest.mark.parametrize("degree", [1, 2, 3, 4])
 def test_harmonics_of_a_sphere_decay(radius_mm: float, variance: float, segments: int, degree: int) -> None:
-    truth = np.exp(-degree * (degree + 1) * variance / (2 * radius_mm**2))
+    expected = np.exp(-degree * (degree + 1) * variance / (2 * radius_mm**2))
     if (radius_mm, degree) == (5, 1):
-        assert truth == pytest.approx(0.744, abs=1e-3)
-    tolerance = 0.002 if radius_mm == 5 else 0.0002  # of the harmonic before
-    assert harmonic_decay(radius_mm, degree, variance, segments) == pytest.approx(truth, abs=tolerance)
+        assert expected == pytest.approx(0.744, abs=1e-3)
+    tolerance = 0.002 if radius_mm == 5 else 0.0002  # relative to the initial harmonic
+    assert harmonic_decay(radius_mm, degree, variance, segments) == pytest.approx(expected, abs=tolerance)
 
 
 def test_convergence_is_of_second_order_in_the_edge() -> None:
-    truth = np.exp(-6 * 7.41 / 50)
-    errors = [abs(harmonic_decay(5.0, 2, 7.41, segments, 60) / truth - 1) for segments in (36, 72, 144)]
+    expected = np.exp(-6 * 7.41 / 50)
+    errors = [abs(harmonic_decay(5.0, 2, 7.41, segments, 60) / expected - 1) for segments in (36, 72, 144)]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert (orders > 1.8).all(), errors
 
@@ -134,14 +135,14 @@ def test_light_is_conserved_and_a_constant_stays(surface: Surface) -> None:
 
 
 def test_borders_let_nothing_through() -> None:
-    """Beside a straight border heat is mirrored by it."""
+    """A straight border mirrors heat."""
     whole = rough_plane(12.0, 48)
     kept = (whole[0][whole[1]][:, :, 0] <= 1e-6).all(axis=1)
     half = whole[0], whole[1][kept]
-    place = np.flatnonzero(whole[0][:, 0] <= 1e-6)
+    position = np.flatnonzero(whole[0][:, 0] <= 1e-6)
     values = np.exp(-((np.abs(whole[0][:, :1]) - 1) ** 2 + whole[0][:, 1:2] ** 2))
     mirrored = diffuse_on_surface(*whole, values, [1.0])[0]
-    assert np.allclose(diffuse_on_surface(*half, values, [1.0])[0][place], mirrored[place], atol=2e-3)
+    assert np.allclose(diffuse_on_surface(*half, values, [1.0])[0][position], mirrored[position], atol=2e-3)
 
 
 def test_a_vertex_without_triangles_keeps_its_value() -> None:
@@ -152,7 +153,7 @@ def test_a_vertex_without_triangles_keeps_its_value() -> None:
 
 
 def test_degenerate_triangles_do_no_harm() -> None:
-    """A vertex in the middle of an edge, and two corners in one place."""
+    """The mesh has a vertex in the middle of an edge, and two corners at one position."""
     positions, triangles = rough_plane(6.0, 20)
     a, b, c = triangles[100]
     positions = np.vstack((positions, (positions[a] + positions[b]) / 2, positions[a]))
@@ -183,12 +184,12 @@ def test_long_edges_are_refused_and_the_levels_that_they_allow_named() -> None:
 @pytest.mark.parametrize(
     ("values", "variances", "steps", "complaint"),
     [
-        (np.ones((121, 1)), [3.0, 3.0], 4, "variances above 0 that rise"),
-        (np.ones((121, 1)), [], 4, "variances above 0 that rise"),
-        (np.ones((121, 1)), [float("nan")], 4, "variances above 0 that rise"),
+        (np.ones((121, 1)), [3.0, 3.0], 4, "increasing variances above 0"),
+        (np.ones((121, 1)), [], 4, "increasing variances above 0"),
+        (np.ones((121, 1)), [float("nan")], 4, "increasing variances above 0"),
         (np.ones(121), [3.0], 4, "finite values"),
         (np.full((121, 1), np.inf), [3.0], 4, "finite values"),
-        (np.ones((121, 1)), [3.0], 0, "at least one step"),
+        (np.ones((121, 1)), [3.0], 0, "at least one time step"),
     ],
 )
 def test_unfit_arguments_are_refused(

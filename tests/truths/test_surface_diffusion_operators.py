@@ -1,4 +1,4 @@
-"""Flips to Delaunay edges within the surface, and the matrices of heat."""
+"""Intrinsic Delaunay flips, and the matrices of the heat equation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def skewed_plane(cells: int) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def test_flips_make_the_best_of_obtuse_triangles() -> None:
-    """The leaning triangles become halves of the grid's squares, but for the leaning borders."""
+    """The sheared triangles become halves of the grid's squares, except at the sheared borders."""
     positions, triangles = skewed_plane(30)
     skewed = intrinsic_triangulation(positions, triangles)
     flipped = delaunay(skewed)

@@ -1,4 +1,4 @@
-"""Patches: the surface stays, places are found again, and heat on them is that on the whole surface."""
+"""Patches: the surface keeps its shape, points are located, and heat is that on the whole surface."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_a_patch_has_one_border_outside_its_margin() -> None:
     assert 0 < SMALL.contains(SMALL.positions).sum() < len(SMALL.positions)
 
 
-def test_places_are_found_again() -> None:
+def test_points_are_located() -> None:
     rng = np.random.default_rng(2)
     fine = rng.integers(len(SMALL.triangles), size=500)
     inside = rng.dirichlet(np.ones(3), 500)
@@ -74,20 +74,20 @@ def test_places_are_found_again() -> None:
     assert np.allclose(placed, np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][SMALL.parent[fine]]))
 
 
-def test_places_off_the_patch_are_not_found() -> None:
+def test_points_outside_the_patch_are_not_located() -> None:
     far = np.setdiff1d(np.arange(len(COARSE[1])), SMALL.parent)[:5]
     found, _ = SMALL.locate(far, np.full((5, 3), 1 / 3))
     assert (found == -1).all()
 
 
-def test_vertices_know_their_place_on_the_coarse_surface() -> None:
+def test_vertices_have_barycentrics_on_the_coarse_surface() -> None:
     triangle, weights = SMALL.vertex_barycentrics()
     placed = np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][triangle])
     assert np.allclose(placed, SMALL.positions, atol=1e-12)
 
 
 def heat(patch: Patch) -> tuple[Floats, Floats]:
-    """Positions and levels where the small patch may judge; the light is everywhere, and uneven."""
+    """Return positions and levels inside the valid region of the small patch, for uneven light."""
     values = 1 + np.cos(patch.positions @ np.array([[1.1, 0.2], [0.4, -0.9], [0.3, 0.7]]))
     levels = diffuse_on_surface(patch.positions, patch.triangles, values, VARIANCES)
     judged = SMALL.contains(patch.positions)
@@ -96,10 +96,10 @@ def heat(patch: Patch) -> tuple[Floats, Floats]:
 
 
 def test_heat_on_a_patch_is_that_on_the_whole_within_the_margin() -> None:
-    places, truth = heat(WHOLE)
+    points, exact = heat(WHOLE)
     same, levels = heat(SMALL)
-    assert np.allclose(places, same)
-    assert np.abs(levels - truth).max() < 5e-4 * truth.max()
+    assert np.allclose(points, same)
+    assert np.abs(levels - exact).max() < 5e-4 * exact.max()
 
 
 def test_without_a_margin_the_border_is_felt() -> None:
@@ -111,7 +111,7 @@ def test_without_a_margin_the_border_is_felt() -> None:
 
 
 def test_edges_in_need_alone_are_halved() -> None:
-    """A long thin triangle is cut across, and one that is fine already stays as it is."""
+    """A long thin triangle is split across, and a fine one is left unchanged."""
     positions = np.array([[0.0, 0, 0], [8, 0, 0], [0, 0.5, 0], [-0.5, 0, 0]])
     patch = refine_patch(positions, [[0, 1, 2], [0, 2, 3]], [0, 0, 0], np.inf, 1.0, 0.0)
     assert (patch.parent == 1).sum() == 1
@@ -120,14 +120,14 @@ def test_edges_in_need_alone_are_halved() -> None:
     assert (uses(patch.triangles) <= 2).all()
 
 
-def test_huge_flat_triangles_are_cut_near_the_place_only() -> None:
+def test_huge_flat_triangles_are_split_near_the_centre_only() -> None:
     patch = refine_patch(*welded_surface(plane(1000.0)), [3.0, 4.0, 0.0], 2.0, 0.5, 1.0)
     assert 100 < len(patch.triangles) < 1500
 
 
 @pytest.mark.samples
 def test_the_ear_of_a_scan_keeps_its_light() -> None:
-    """Thin, folded and cut by uv seams: the rightmost place at the height of the eyes."""
+    """The ear is thin, folded and cut by uv seams; it is the rightmost point at the height of the eyes."""
     head = load_head("lee_perry_smith")
     surface = welded_surface(head.mesh)
     off = surface[0] - head.centre_mm

@@ -1,4 +1,4 @@
-"""Light summed over surfaces against closed forms and against plain quadrature."""
+"""Surface integrals of light against closed forms and plain quadrature."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.mesh.primitives import plane, uv_sphere
 Floats = NDArray[np.float64]
 
 ERROR = 1e-3
-"""What `integrate` promises by default; closed forms are met to a few times that, with the samples' own."""
+"""Default error of `integrate_exitance`; results are within a few times this, because of the samples."""
 
 PUBLISHED = GaussianSum(
     np.array(
@@ -41,7 +41,7 @@ def gaussian(variance: float) -> GaussianSum:
 
 
 def along(x: Floats) -> Floats:
-    """Points on the plane z = 0, along a line that is no axis of it."""
+    """Return points on the plane z = 0, along a line that is not an axis."""
     return np.column_stack((x, 0.37 * x + 0.1, np.zeros_like(x)))
 
 
@@ -64,7 +64,7 @@ def test_even_light_stays_even() -> None:
 @pytest.mark.parametrize("variance", [0.0064, 0.187, 7.41])
 @pytest.mark.parametrize("frequency", [0.04, 0.12])
 def test_waves_are_damped(variance: float, frequency: float) -> None:
-    """Each channel has a phase of its own, so that the light is coloured."""
+    """Each channel has its own phase, so the light is coloured."""
 
     def waves(places: Floats) -> Floats:
         return np.cos(2.0 * np.pi * frequency * places[:, :1] + np.array([0.0, 1.0, 2.0]))
@@ -78,7 +78,7 @@ def test_waves_are_damped(variance: float, frequency: float) -> None:
 
 @pytest.mark.parametrize("profile", [gaussian(0.0484), gaussian(1.99), PUBLISHED])
 def test_edge_of_light_is_smoothed(profile: GaussianSum) -> None:
-    """The samples close in on the edge; between the last two the light goes over 0.02 mm."""
+    """Samples are refined towards the edge; the light changes over 0.02 mm between the last two."""
 
     def half(places: MeshPoints) -> Floats:
         return white((places.positions[:, 0] > 0.123).astype(np.float64))
@@ -102,7 +102,7 @@ def test_point_of_light_is_the_profile() -> None:
 
 
 def test_light_comes_through_thin_parts() -> None:
-    """A lit sheet 1.5 mm behind the point: each Gaussian keeps exp(-d² / 2v)."""
+    """A lit sheet is 1.5 mm behind the point, so each Gaussian is multiplied by exp(-d² / 2v)."""
     samples = sample_irradiance(plane(80.0), even, 2.0)
     exitance = integrate_exitance([[0.3, 0.2, 1.5]], samples, PUBLISHED)
     error_density = np.exp(-(1.5**2) / (2.0 * PUBLISHED.variance_mm2))
@@ -110,7 +110,7 @@ def test_light_comes_through_thin_parts() -> None:
 
 
 def test_all_light_comes_out_again() -> None:
-    """Sum of the exitance over a grid, which is exact for so smooth a spot, against that of the light."""
+    """The sum of the exitance over a grid, exact for such a smooth spot, is that of the light."""
 
     def spot(places: Floats) -> Floats:
         return np.exp(-(places**2).sum(axis=1, keepdims=True) / 8.0) * np.array([1.0, 0.7, 0.4])
@@ -124,9 +124,9 @@ def test_all_light_comes_out_again() -> None:
 
 @pytest.mark.parametrize(("radius", "variance"), [(5.0, 7.41), (5.0, 0.567), (20.0, 7.41), (2.0, 1.0)])
 def test_harmonics_of_a_sphere(radius: float, variance: float) -> None:
-    """With k = R²/v the chord's Gaussian times P_l integrates to 2 k exp(-k) i_l(k), a Bessel function.
+    """With k = R²/v the Gaussian of the chord times P_l integrates to 2 k exp(-k) i_l(k), a Bessel function.
 
-    That is 1 - exp(-2k) for even light and 1 + exp(-2k) - (1 - exp(-2k)) / k for light that goes with z.
+    This is 1 - exp(-2k) for uniform light and 1 + exp(-2k) - (1 - exp(-2k)) / k for light proportional to z.
     """
 
     def light(places: MeshPoints) -> Floats:
@@ -146,7 +146,7 @@ def test_harmonics_of_a_sphere(radius: float, variance: float) -> None:
 
 
 def bumpy() -> IrradianceSamples:
-    """Return a hilly patch of coarse triangles under coloured light with a dark side and a stripe."""
+    """Return an uneven patch of coarse triangles under coloured light with a dark side and a stripe."""
     flat = sample_irradiance(plane(30.0), even, 1.3)
     x, y = flat.positions[:, 0], flat.positions[:, 1]
     places = np.column_stack((x, y, 3.0 * np.sin(0.5 * x) * np.cos(0.4 * y)))
@@ -164,23 +164,23 @@ def points_on(samples: IrradianceSamples, count: int) -> Floats:
 
 
 def plain_sum(points: Floats, samples: IrradianceSamples, R: Callable[[Floats], Floats]) -> Floats:
-    """Products of two Gauss-Legendre rules on each triangle, on 400 parts of those near the point."""
+    """Return sums by Gauss-Legendre quadrature on each triangle, on 400 parts of those near the point."""
     corners = samples.positions[samples.triangles]
     light, area = samples.irradiance[samples.triangles], triangle_areas(corners)
     far = np.linalg.norm(corners[:, None].mean(axis=2) - points[None], axis=2) > 1.8
     result = np.zeros((len(points), 3))
     for i, point in enumerate(points):
         for which, parts in ((far[:, i], 2), (~far[:, i], 20)):
-            weights, shares = square_rule(parts)
+            weights, fractions = square_rule(parts)
             places = weights @ corners[which]
-            flux = (weights @ light[which]) * (shares[:, None] * area[which][:, None, None])
+            flux = (weights @ light[which]) * (fractions[:, None] * area[which][:, None, None])
             distance = np.linalg.norm(places - point, axis=2)
             result[i] += (R(distance.ravel()).reshape(flux.shape) * flux).sum(axis=(0, 1))
     return result
 
 
 def square_rule(parts: int) -> tuple[Floats, Floats]:
-    """Barycentric weights (q, 3) and shares of the area (q,) of a square's rule folded onto a triangle."""
+    """Return barycentric weights (q, 3) and area fractions (q,) of a square's rule mapped onto a triangle."""
     node, weight = np.polynomial.legendre.leggauss(3)
     at = ((np.arange(parts)[:, None] + 0.5 + 0.5 * node) / parts).ravel()
     w = np.tile(weight / 2.0 / parts, parts)
@@ -190,7 +190,7 @@ def square_rule(parts: int) -> tuple[Floats, Floats]:
 
 
 def dipole_like() -> RadialTable:
-    """Steep near the axis, with a long exponential tail."""
+    """Return a profile that is steep near the axis, with a long exponential tail."""
     r = np.geomspace(0.02, 30.0, 150)
     R = np.exp(-np.outer(r, [0.6, 1.2, 2.0])) / (0.05 + r[:, None] ** 2)
     return RadialTable(r, R)
@@ -200,11 +200,11 @@ def dipole_like() -> RadialTable:
 def test_octree_against_plain_sum(profile: Profile) -> None:
     samples = bumpy()
     points = points_on(samples, 14)
-    truth = plain_sum(points, samples, lambda r: profile.derivatives(r)[0])
+    exact = plain_sum(points, samples, lambda r: profile.derivatives(r)[0])
     errors = []
     for error in (3e-2, 1e-2, 1e-3, 1e-4):
-        difference = integrate_exitance(points, samples, profile, error) - truth
-        errors.append(np.sqrt((difference**2).mean(axis=0)) / truth.mean(axis=0))
+        difference = integrate_exitance(points, samples, profile, error) - exact
+        errors.append(np.sqrt((difference**2).mean(axis=0)) / exact.mean(axis=0))
         assert (errors[-1] < error).all()
     assert (errors[-1] < 0.1 * errors[0]).all()
 

@@ -1,4 +1,4 @@
-"""Where irradiance is sampled on a mesh, and the octree over the samples."""
+"""Irradiance samples on a mesh, and the octree over the samples."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dermis.mesh.primitives import plane, uv_sphere
 Floats = NDArray[np.float64]
 
 
-def even(places: MeshPoints) -> Floats:
-    return np.ones_like(places.positions)
+def even(mesh_points: MeshPoints) -> Floats:
+    return np.ones_like(mesh_points.positions)
 
 
 def sides_mm(samples: IrradianceSamples) -> Floats:
@@ -40,13 +40,13 @@ def test_sides_are_short_and_meet() -> None:
     assert counts.max() == 2 and border == pytest.approx(along, rel=1e-6)
 
 
-def test_places_carry_what_the_mesh_knows() -> None:
+def test_points_interpolate_values_of_the_mesh() -> None:
     mesh = plane(20.0, 3)
     seen: list[MeshPoints] = []
 
-    def light(places: MeshPoints) -> Floats:
-        seen.append(places)
-        return even(places)
+    def light(mesh_points: MeshPoints) -> Floats:
+        seen.append(mesh_points)
+        return even(mesh_points)
 
     samples = sample_irradiance(mesh, light, 1.1)
     uv = seen[0].interpolate(mesh, mesh.uv)
@@ -55,12 +55,12 @@ def test_places_carry_what_the_mesh_knows() -> None:
 
 
 def test_samples_crowd_where_light_changes() -> None:
-    """Only the new ones are asked for, and all keep the light of their own place."""
+    """The light is evaluated for new samples only, and all keep the light of their positions."""
     asked: list[int] = []
 
-    def disc(places: MeshPoints) -> Floats:
-        asked.append(len(places.positions))
-        inside = np.hypot(places.positions[:, 0], places.positions[:, 1]) < 3.0
+    def disc(mesh_points: MeshPoints) -> Floats:
+        asked.append(len(mesh_points.positions))
+        inside = np.hypot(mesh_points.positions[:, 0], mesh_points.positions[:, 1]) < 3.0
         return np.repeat(inside[:, None].astype(np.float64), 3, axis=1)
 
     samples = sample_irradiance(plane(20.0), disc, 2.0, finest_mm=0.1)
@@ -76,10 +76,10 @@ def test_samples_crowd_where_light_changes() -> None:
 
 
 def test_crowding_ends_at_a_single_bright_corner() -> None:
-    """Sides that fan out from it would stay long for ever if only they were cut."""
+    """Sides that meet in a corner would remain long for ever if only they were split."""
 
-    def corner(places: MeshPoints) -> Floats:
-        at = np.linalg.norm(places.positions - np.array([5.0, 5.0, 0.0]), axis=1) < 1e-6
+    def corner(mesh_points: MeshPoints) -> Floats:
+        at = np.linalg.norm(mesh_points.positions - np.array([5.0, 5.0, 0.0]), axis=1) < 1e-6
         return np.repeat(at[:, None].astype(np.float64), 3, axis=1)
 
     samples = sample_irradiance(plane(10.0), corner, 10.0, finest_mm=0.05)
@@ -104,15 +104,15 @@ def test_only_skin_is_sampled() -> None:
 
 @pytest.fixture(scope="module")
 def tree() -> Octree:
-    def light(places: MeshPoints) -> Floats:
-        x = places.positions
+    def light(mesh_points: MeshPoints) -> Floats:
+        x = mesh_points.positions
         return np.column_stack((np.maximum(x[:, 0], 0.0), np.ones(len(x)), np.maximum(5.0 - x[:, 1], 0.0)))
 
     return build_octree(sample_irradiance(uv_sphere(8.0, 32, 16), light, 0.8))
 
 
 def test_nodes_hold_their_triangles_once(tree: Octree) -> None:
-    """A walk that opens every node comes by every triangle exactly once."""
+    """A traversal that opens every node visits every triangle exactly once."""
     met = np.zeros(len(tree.area), np.int64)
     for node in range(len(tree.first)):
         if tree.next_node[node] == node + 1:
@@ -126,7 +126,7 @@ def test_nodes_hold_their_triangles_once(tree: Octree) -> None:
 
 @pytest.mark.parametrize("part", [0.0, 0.003, 0.5, 1.0])
 def test_points_stand_for_a_node(tree: Octree, part: float) -> None:
-    """Flux, centres, second moments and bounds against sums over many points of the triangles."""
+    """Flux, centroids, second moments and bounds are compared with sums over many points of the triangles."""
     node = round(part * (len(tree.first) - 1))
     inside = slice(tree.first[node], tree.end[node])
     weights = np.random.default_rng(2).dirichlet((1.0, 1.0, 1.0), 150 if part == 0.0 else 4000)
@@ -151,14 +151,14 @@ def test_points_stand_for_a_node(tree: Octree, part: float) -> None:
     assert tree.second_moment[node] == pytest.approx(second_moment.max(), rel=0.05)
 
 
-def second_moments(places: Floats, flux: Floats) -> Floats:
-    return np.einsum("nc,na,nb->cab", flux, places, places)
+def second_moments(mesh_points: Floats, flux: Floats) -> Floats:
+    return np.einsum("nc,na,nb->cab", flux, mesh_points, mesh_points)
 
 
 def test_flat_nodes_of_white_light_keep_second_moments() -> None:
     tree = build_octree(sample_irradiance(plane(12.0), even, 0.5))
-    places = tree.points[0] - tree.centre[0]
-    np.testing.assert_allclose(places.T @ places / 3.0, np.diag([12.0, 12.0, 0.0]), atol=1e-5)
+    mesh_points = tree.points[0] - tree.centre[0]
+    np.testing.assert_allclose(mesh_points.T @ mesh_points / 3.0, np.diag([12.0, 12.0, 0.0]), atol=1e-5)
     assert tree.moment_error.max() < 1e-6 and tree.centroid_error.max() < 1e-6
 
 

@@ -1,4 +1,4 @@
-"""Light across the border of two media: one medium's known answer, and light that goes both ways alike."""
+"""Light across the border of two media: the known result of a single medium, and reciprocity."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def test_one_medium_on_both_sides_is_that_medium() -> None:
     assert left.mean() == pytest.approx(true.total_reflectance / (1.0 - true.specular), rel=0.03)
 
 
-def test_light_goes_both_ways_alike_but_for_how_it_falls() -> None:
-    made = strip_transfer(np.array([0.05, 0.4]), np.array([2.0, 2.0]), EDGES, 20_000)
-    there, back = made[:12, 12:].sum(), made[12:, :12].sum()
+def test_transfer_between_the_media_is_nearly_reciprocal() -> None:
+    transfer = strip_transfer(np.array([0.05, 0.4]), np.array([2.0, 2.0]), EDGES, 20_000)
+    there, back = transfer[:12, 12:].sum(), transfer[12:, :12].sum()
     assert there == pytest.approx(back, rel=0.12)
-    assert made[:12].sum() > 1.5 * made[12:].sum()
+    assert transfer[:12].sum() > 1.5 * transfer[12:].sum()

@@ -1,4 +1,4 @@
-"""One default skin: what one command makes with defaults, the others read with defaults."""
+"""Default skin: results of one command with defaults are valid for others with defaults."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def test_tissue_people_and_fits_start_from_the_same_skin() -> None:
     }
     own = skin_of(dermis.Human()).pigments
     assert own is not None and own.epidermis_mm == DEFAULT_SKIN.epidermis_mm
-    held = fit_subject(dermis.Scene(dermis.Human().head())).scene.skin.pigments
-    assert held is not None and held.epidermis_mm == DEFAULT_SKIN.epidermis_mm
+    fixed = fit_subject(dermis.Scene(dermis.Human().head())).scene.skin.pigments
+    assert fixed is not None and fixed.epidermis_mm == DEFAULT_SKIN.epidermis_mm
 
 
 def test_the_published_skins_keep_their_thickness() -> None:

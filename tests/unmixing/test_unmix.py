@@ -1,4 +1,4 @@
-"""Melanin and blood of known skins are found again, on the device and in float64."""
+"""Melanin and blood of known skins are recovered on the device and in float64."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Pixels = NDArray[np.float32]
 SIDE = 48
 
 
-def shares(count: int, seed: int = 3) -> tuple[Floats, Floats]:
+def random_fractions(count: int, seed: int = 3) -> tuple[Floats, Floats]:
     random = np.random.default_rng(seed)
     return 10.0 ** random.uniform(-2.3, -0.5, count), 10.0 ** random.uniform(-2.7, -1.2, count)
 
@@ -45,12 +45,12 @@ def exact(melanin: float, blood: float) -> Floats:
 @pytest.fixture(scope="module")
 def colours() -> Pixels:
     """Return a synthetic colour map of skin."""
-    m, b = shares(SIDE * SIDE)
+    m, b = random_fractions(SIDE * SIDE)
     return skin_model().colours(m, b).reshape(SIDE, SIDE, 3).astype(np.float32)
 
 
-def test_known_skins_are_found_without_noise() -> None:
-    m, b = shares(24)
+def test_known_skins_are_recovered_without_noise() -> None:
+    m, b = random_fractions(24)
     found = solve_pigments(
         skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3
     )
@@ -59,8 +59,8 @@ def test_known_skins_are_found_without_noise() -> None:
     np.testing.assert_allclose(found.residual, 1.0, atol=5e-3)
 
 
-def test_with_noise_they_are_as_far_off_as_is_said() -> None:
-    m, b = shares(40)
+def test_errors_with_noise_match_the_stated_deviations() -> None:
+    m, b = random_fractions(40)
     plain = skin_model().colours(m, b)
     random = np.random.default_rng(0)
     noisy = plain * (1.0 + 0.01 * random.standard_normal((60, *plain.shape)))
@@ -87,9 +87,9 @@ def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, th
     noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
     noisy = noisy.astype(np.float32)
     model = skin_model(third=third)
-    made, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
+    estimate, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
     twin = solve_pigments(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
-    pairs = [(made[..., 0], twin.melanin), (made[..., 1], twin.blood), (made[..., 2], twin.third)]
+    pairs = [(estimate[..., 0], twin.melanin), (estimate[..., 1], twin.blood), (estimate[..., 2], twin.third)]
     pairs += [(sd[..., 0], twin.melanin_sd), (sd[..., 1], twin.blood_sd)]
     for got, wanted in pairs:
         assert np.percentile(np.abs(got.ravel() - wanted) / (np.abs(wanted) + 1e-4), 99.0) < 2e-3
@@ -98,22 +98,22 @@ def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, th
     assert np.mean(cost > least + 0.1) < 2e-3
 
 
-def test_blood_that_melanin_hides_is_what_is_usual() -> None:
+def test_hidden_blood_is_at_its_prior() -> None:
     thick = replace(DEFAULT_SKIN, epidermis_mm=0.25)
     found = solve_pigments(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
     assert 0.005 < found.blood[0] < 0.03 and found.blood_sd[0] > found.blood[0]
     assert found.melanin[0] == pytest.approx(0.4, rel=0.02)
 
 
-def test_oxygen_is_found_where_it_shows() -> None:
+def test_oxygen_is_recovered_where_blood_is_visible() -> None:
     pale = replace(DEFAULT_SKIN, oxygen=0.4)
     colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
-    held, free = (solve_pigments(skin_model(third=one), colour) for one in ("none", "oxygen"))
+    fixed, free = (solve_pigments(skin_model(third=one), colour) for one in ("none", "oxygen"))
     assert 0.35 < free.third[0] < 0.6
-    assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(held.residual)).max()
+    assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(fixed.residual)).max()
 
 
-def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
+def test_recolouring_and_unmixing_are_inverse(
     colours: Pixels,
 ) -> None:
     found = unmix(colours, adapter="cpu")
@@ -123,7 +123,7 @@ def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
     assert np.median(ratio) == pytest.approx(2.0, rel=0.01)
     assert np.median(darker.blood / found.blood) == pytest.approx(1.0, rel=0.02)
     cold = found.recoloured(PigmentChange(oxygen=0.2), "cpu")
-    assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen takes more of the red
+    assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen absorbs more red light
 
 
 def test_recolouring_opens_no_further_device(colours: Pixels, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,7 +145,7 @@ def test_a_larger_median_adds_and_a_smaller_one_multiplies() -> None:
             parse_fraction_change("--melanin", wrong)
 
 
-def test_paint_stays(colours: Pixels) -> None:
+def test_residual_is_kept(colours: Pixels) -> None:
     painted = colours.copy()
     painted[10:20, 10:20] = (0.05, 0.4, 0.1)
     found = unmix(painted, adapter="cpu")
@@ -154,8 +154,8 @@ def test_paint_stays(colours: Pixels) -> None:
     assert found.summary()["skin"] < 1.0 - 90.0 / SIDE**2
 
 
-def test_light_in_the_map_is_found_and_divided_by() -> None:
-    m, b = shares(128 * 128)
+def test_shading_is_estimated_and_removed() -> None:
+    m, b = random_fractions(128 * 128)
     plain = skin_model().colours(0.02 + 0.2 * m, 0.01 + 0.1 * b).reshape(128, 128, 3)
     across = np.linspace(-0.3, 0.3, 128)
     light = np.exp(across[:, None] * np.cos(across))
@@ -178,7 +178,7 @@ def test_light_in_the_map_is_found_and_divided_by() -> None:
         (np.full((4, 4, 3), np.nan), "reflectances from 0 to 1"),
     ],
 )
-def test_what_is_no_colour_map_is_refused(picture: NDArray[np.float64], expected: str) -> None:
+def test_other_pictures_are_refused(picture: NDArray[np.float64], expected: str) -> None:
     with pytest.raises(DermisError, match=f"colours: expected {expected}"):
         unmix(picture, adapter="cpu")
 

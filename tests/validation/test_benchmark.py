@@ -1,4 +1,4 @@
-"""The benchmark measures what it says: floors by hand, cases that differ in one thing, whole runs."""
+"""Benchmarks: floors against direct counts, cases that differ in one parameter, complete runs."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def test_cases_vary_in_one_thing(preset: object) -> None:
         case.technique for case in others if case.varies == "technique"
     }
     for case in others:
-        told = asdict(replace(case, varies=""))
-        assert [name for name, value in asdict(usual).items() if told[name] != value] == [case.varies]
+        fields = asdict(replace(case, varies=""))
+        assert [name for name, value in asdict(usual).items() if fields[name] != value] == [case.varies]
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 6, 8])
@@ -111,7 +111,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert found["shadows"] == drawn * 4 + geometry
     assert found["visibility"] == traffic.head_pixels * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
-    # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
+    # The narrower Gaussian is not blurred; the blur of the other one reads stretch and reach by texel.
     light = texel_bytes(traffic.inputs.resources.diffusion.levels.stacks[0])
     gutter = traffic.inputs.layouts[0].atlas.gutter.size // 16
     assert gutter > 0
@@ -121,7 +121,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
 
 
 def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
-    """By the numbers that the buffers were made from."""
+    """The floor is computed from the sizes of the buffers."""
     from small_head import obj_text
 
     vertices = [line.split() for line in obj_text().splitlines()]
@@ -167,8 +167,8 @@ def test_copies_take_time(device: Device) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(row: BenchmarkRow) -> Benchmark:
-    """Return a benchmark of which one row was measured."""
+def benchmark_of_one_row(row: BenchmarkRow) -> Benchmark:
+    """Return a benchmark with one measured row."""
     others = [
         replace(row, case=replace(TINY, atlas=128, varies="atlas")),
         replace(row, case=replace(TINY, technique=GPU_GEMS_3, varies="technique"), gpu_ms={"total": 1e3}),
@@ -181,43 +181,43 @@ def made(row: BenchmarkRow) -> Benchmark:
     return Benchmark(*where, (row, *others), (skipped,))
 
 
-def test_the_published_passes_are_compared(made: Benchmark, row: BenchmarkRow) -> None:
-    assert made.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
-    assert made.ratio(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
-    assert replace(made, rows=(row,)).ratio(GPU_GEMS_3) is None
-    assert replace(made, rows=made.rows[1:]).ratio(GPU_GEMS_3) is None
+def test_the_published_passes_are_compared(benchmark_of_one_row: Benchmark, row: BenchmarkRow) -> None:
+    assert benchmark_of_one_row.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
+    assert benchmark_of_one_row.ratio(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
+    assert replace(benchmark_of_one_row, rows=(row,)).ratio(GPU_GEMS_3) is None
+    assert replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:]).ratio(GPU_GEMS_3) is None
 
 
-def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
+def test_the_json_has_what_was_asked_for(benchmark_of_one_row: Benchmark) -> None:
     import json
 
-    told = json.loads(json.dumps(as_json(made)))
+    fields = json.loads(json.dumps(as_json(benchmark_of_one_row)))
     wanted = {"image", "atlas", "adapter", "gaussians", "lights", "frame_ms", "gpu_ms", "floor_ratio"}
-    assert all(wanted <= set(one) for one in told["rows"])
-    assert told["rows"][0]["image"] == [48, 32] and told["copy_gb_s"] == 2.0
-    assert "total" in told["rows"][0]["gpu_ms"]
-    assert (told["published_ratio"], told["published_fragments_ratio"]) == (
-        made.ratio(GPU_GEMS_3),
-        made.ratio(FRAGMENT_TECHNIQUE),
+    assert all(wanted <= set(one) for one in fields["rows"])
+    assert fields["rows"][0]["image"] == [48, 32] and fields["copy_gb_s"] == 2.0
+    assert "total" in fields["rows"][0]["gpu_ms"]
+    assert (fields["published_ratio"], fields["published_fragments_ratio"]) == (
+        benchmark_of_one_row.ratio(GPU_GEMS_3),
+        benchmark_of_one_row.ratio(FRAGMENT_TECHNIQUE),
     )
-    (skipped,) = told["left_out"]
+    (skipped,) = fields["left_out"]
     assert (skipped["image"], skipped["reason"]) == ([9999, 32], "size: <too large>")
 
 
-def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
-    write_report(tmp_path / "report.html", made)
+def test_the_report_needs_nothing_else(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
+    write_report(tmp_path / "report.html", benchmark_of_one_row)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "an &lt;adapter&gt;" in page and page.count("<svg") == 2
     assert "src=" not in page and "<script" not in page and 'href="http' not in page
-    for stage, *_ in stage_table(made)[1:]:
+    for stage, *_ in stage_table(benchmark_of_one_row)[1:]:
         assert f"<td>{stage}</td>" in page
-    assert page.count("<tr>") == 1 + len(made.rows) + len(stage_table(made))
-    assert all(len(cells(row)) == len(COLUMNS) for row in made.rows)
+    assert page.count("<tr>") == 1 + len(benchmark_of_one_row.rows) + len(stage_table(benchmark_of_one_row))
+    assert all(len(cells(row)) == len(COLUMNS) for row in benchmark_of_one_row.rows)
     assert "2007, fragments" in page and "9999x32" in page and "&lt;too large&gt;" in page
 
 
-def test_a_report_without_the_usual_frame(made: Benchmark, tmp_path: Path) -> None:
-    others = replace(made, rows=made.rows[1:])
+def test_a_report_without_the_base_frame(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
+    others = replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:])
     assert others.base_row is None and stage_table(others) == []
     write_report(tmp_path / "report.html", others)
     assert "9999x32" in (tmp_path / "report.html").read_text(encoding="utf-8")

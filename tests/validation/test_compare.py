@@ -1,4 +1,4 @@
-"""Techniques against truths on a ball, where shadows and curvature are known."""
+"""Techniques against references on a ball, where shadows and curvature are known."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ SETTINGS = Settings(size=(64, 64), atlas=1024, shadow_size=256)
 
 
 @pytest.fixture(scope="module")
-def lasered() -> Comparison:
-    """Return a narrow stripe: all that is seen next to it is scattered light."""
+def stripe_comparison() -> Comparison:
+    """Return a scene with a narrow stripe, next to which all light is scattered light."""
     return compare(
         BALL,
         "surface-integral",
@@ -40,21 +40,21 @@ def lasered() -> Comparison:
     )
 
 
-def test_scattering_is_nearer_the_truth_than_none(lasered: Comparison) -> None:
-    none, ours = lasered.rows
+def test_scattering_reduces_the_error(stripe_comparison: Comparison) -> None:
+    none, ours = stripe_comparison.rows
     assert ours.relrmse < 0.2 * none.relrmse
     assert ours.energy_ratio == pytest.approx(1.0, abs=0.03)
     assert ours.relrmse_se == 0.0 and ours.ms > 0
 
 
-def test_truth_is_seen_where_the_image_is(lasered: Comparison) -> None:
-    """The brightest columns of both are the same: rays, lights and places agree."""
-    ours = lasered.images["texture-space"]
-    peaks = [picture.sum(axis=(0, 2)).argmax() for picture in (ours, lasered.reference.image)]
+def test_reference_and_image_are_aligned(stripe_comparison: Comparison) -> None:
+    """The brightest columns of image and reference are the same, so rays, lights and positions agree."""
+    ours = stripe_comparison.images["texture-space"]
+    peaks = [picture.sum(axis=(0, 2)).argmax() for picture in (ours, stripe_comparison.reference.image)]
     assert abs(int(peaks[0]) - int(peaks[1])) <= 1
 
 
-def test_heat_agrees_along_a_gentle_surface(lasered: Comparison) -> None:
+def test_heat_agrees_along_a_gentle_surface(stripe_comparison: Comparison) -> None:
     heat = compare(
         BALL,
         "heat",
@@ -65,14 +65,14 @@ def test_heat_agrees_along_a_gentle_surface(lasered: Comparison) -> None:
         adapter=ADAPTER,
     )
     none, ours = heat.rows
-    assert 0 < heat.reference.mask.sum() < lasered.reference.mask.sum()
+    assert 0 < heat.reference.mask.sum() < stripe_comparison.reference.mask.sum()
     assert ours.relrmse < 0.2 * none.relrmse
 
 
-def test_report_holds_all_pictures(lasered: Comparison, tmp_path: Path) -> None:
-    write_report(tmp_path / "report.html", lasered)
+def test_report_holds_all_pictures(stripe_comparison: Comparison, tmp_path: Path) -> None:
+    write_report(tmp_path / "report.html", stripe_comparison)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert text.count("data:image/png;base64,") == 1 + 2 * len(lasered.rows)
+    assert text.count("data:image/png;base64,") == 1 + 2 * len(stripe_comparison.rows)
     assert "surface-integral" in text and "http" not in text
 
 
@@ -107,16 +107,16 @@ def test_unknown_names_are_refused(words: dict[str, Any], says: str) -> None:
         compare(BALL, against, ("none",), settings=SETTINGS, adapter=ADAPTER, **words)
 
 
-def test_a_picture_without_the_head_is_refused_before_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its one pixel looks between two balls."""
+def test_a_picture_without_the_head_is_refused_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its only pixel lies between two balls."""
     monkeypatch.setitem(
         REFERENCES, "surface-integral", lambda subject, samples: pytest.fail("it was computed")
     )
     ball = uv_sphere(30.0, 16, 8)
-    places = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
+    hits = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
     uv = np.vstack([ball.uv * (0.5, 1) + (x, 0) for x in (0, 0.5)])
     triangles = np.vstack([ball.triangles, ball.triangles + len(ball.positions)])
-    balls = Head("balls", build_mesh(places, uv, triangles, np.tile(ball.material, 2), SKIN), Maps())
+    balls = Head("balls", build_mesh(hits, uv, triangles, np.tile(ball.material, 2), SKIN), Maps())
     with pytest.raises(DermisError, match="the picture: expected a pixel that shows nothing but the head"):
         single = Settings(size=(1, 1), atlas=64)
         compare(balls, "surface-integral", ("none",), settings=single, adapter=ADAPTER)

@@ -1,4 +1,4 @@
-"""Profiles by photons, in place of layered diffusion's."""
+"""Tabulated Monte Carlo profiles in place of layered diffusion."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_total_is_the_half_spaces(profiles: dict[ModelName, GaussianSum]) -> Non
 
 
 def test_less_light_goes_far(profiles: dict[ModelName, GaussianSum]) -> None:
-    """Diffusion has too little of what leaves within half a mean free path."""
+    """Diffusion underestimates the light that leaves within half a mean free path."""
     near = [profiles[name] for name in ("montecarlo", "counted", "layered")]
     radius = 0.5 * BODY.layers[0].mean_free_path_mm[0]
     now, tables, layered = (

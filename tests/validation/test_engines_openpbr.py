@@ -1,4 +1,4 @@
-"""The table of OpenPBR and pbrt: the page has what the figures say, and the figures what is computed now."""
+"""Table of OpenPBR and pbrt: the page contains the stored results, and these are those computed now."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dermis.apps.validation.engines import openpbr as script
 from dermis.apps.validation.engines.openpbr import FIGURES
 from dermis.apps.validation.engines.page import PAGE
 
-CHANGED = 2e-3  # of an edge
+CHANGED = 2e-3  # change of an edge response
 
 
 def test_the_page_has_the_figures() -> None:

@@ -1,4 +1,4 @@
-"""The page of engines says what the targets say."""
+"""The page of engines contains what the export targets predict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The passes of 2007 drawn as fragments give what they give as compute."""
+"""Passes of GPU Gems 3 as fragment shaders against the same as compute shaders."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Floats = NDArray[np.float64]
 
 
 class Drawn(NamedTuple):
-    """One frame.
+    """Intermediate results of one frame.
 
-    levels : light that entered, then blurred
-    results : their sum, what came through thin parts, and the image
+    levels : light that entered, then blurred levels
+    results : their sum, the transmitted light, and the image
     filled : render passes that filled targets
     """
 
@@ -44,7 +44,7 @@ def renderer() -> Renderer:
 
 @pytest.fixture(scope="module")
 def leaf() -> Scene:
-    """Flat and lit from two sides, so that light comes through; its colour map is noise."""
+    """Return a flat head lit from two sides, so that light is transmitted; its colour map is noise."""
     ball = uv_sphere(30.0, 24, 12)
     mesh = build_mesh(ball.positions * (1, 1, 0.1), ball.uv, ball.triangles, ball.material, SKIN)
     head = head_of(mesh, colour=np.random.default_rng(0).random((16, 16, 3)))
@@ -96,7 +96,7 @@ def test_light_blurs_and_sum_are_render_passes(both: tuple[Drawn, Drawn]) -> Non
 
 
 def test_every_level_is_the_same(both: tuple[Drawn, Drawn]) -> None:
-    """But for roundings to halves, of which level k has seen 2 k and one more."""
+    """Level k differs only by 2 k + 1 roundings to half precision."""
     compute, fragments = both
     assert len(compute.levels) == len(fragments.levels) == 6
     assert not np.allclose(compute.levels[1], compute.levels[5], rtol=0.1)

@@ -1,4 +1,4 @@
-"""Skin by directions against light that was traced through it, on a ball, which shadows itself nowhere."""
+"""Half-space skin against path tracing, on a ball, which does not shadow itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SETTINGS = Settings(size=(32, 32), atlas=256, shadow_size=512)
 
 
 def against_paths(direction: str) -> Comparison:
-    """Paths are kept on disk, so that they are traced once."""
+    """Return a comparison with path tracing; paths are cached, so that they are traced once."""
     return compare(
         BALL,
         "path-traced",
@@ -39,15 +39,15 @@ def both() -> tuple[Comparison, Comparison]:
 
 
 def test_half_space_is_much_nearer_to_the_paths(both: tuple[Comparison, Comparison]) -> None:
-    """Without scattering along the surface: to a ball as large as this, that is nothing."""
-    (lambertian,), (turned,) = (made.rows for made in both)
+    """Scattering along the surface is disabled; it hardly matters on such a large ball."""
+    (lambertian,), (turned,) = (result.rows for result in both)
     assert lambertian.relrmse > 0.2
     assert turned.relrmse + turned.relrmse_se < 0.4 * lambertian.relrmse
 
 
 def test_half_space_keeps_the_energy(both: tuple[Comparison, Comparison]) -> None:
-    """Light comes from behind: most of it is aslant on its way in and out."""
-    (lambertian,), (turned,) = (made.rows for made in both)
+    """Light comes from behind, so most of it enters and leaves at grazing angles."""
+    (lambertian,), (turned,) = (result.rows for result in both)
     assert lambertian.energy_ratio < 0.8
     assert turned.energy_ratio == pytest.approx(1.0, abs=0.05)
 

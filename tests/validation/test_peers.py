@@ -1,4 +1,4 @@
-"""The comparison with peers, with peers whose noise and bias are known, and without them."""
+"""Comparison with other renderers, replaced by ones of known noise and bias, and without them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from dermis.mesh.primitives import uv_sphere
 
 BALL = Head("ball", uv_sphere(100.0, 24, 12), Maps())
 SIDE, OURS, BIAS, NOISE = 64, 0.2, 0.1, 0.4
-"""Relative errors: ours, that of Cycles without noise, and its noise with one path a pixel."""
+"""Relative errors: ours, that of Cycles without noise, and its noise with one path per pixel."""
 
 
 def picture(factor: float) -> np.ndarray:
@@ -32,12 +32,12 @@ def picture(factor: float) -> np.ndarray:
 
 
 def cycles_passes(scene: Any, medium: Any, samples: Any, settings: Any, *, method: str, seed: int) -> Any:
-    made = []
+    written = []
     for k, count in enumerate(samples):
         noise = np.random.default_rng(seed + k + 1000 * (method == "burley")).normal(size=(SIDE, SIDE, 3))
         image = picture(1.0 + BIAS) * (1.0 + NOISE / (1.0 + BIAS) / np.sqrt(count) * noise)
-        made.append(CyclesPass(image, np.ones((SIDE, SIDE)), count, 0.5 * count, count, "5.0.1"))
-    return made
+        written.append(CyclesPass(image, np.ones((SIDE, SIDE)), count, 0.5 * count, count, "5.0.1"))
+    return written
 
 
 def no_blender(*given: Any, **named: Any) -> Any:
@@ -47,7 +47,7 @@ def no_blender(*given: Any, **named: Any) -> Any:
 def path_trace(
     scene: Any, medium: Any, samples: int, settings: Any, *, use_cache: bool, progress: Any
 ) -> PathTraced:
-    assert not use_cache  # a stored truth would have taken no time
+    assert not use_cache  # a cached reference would have taken no time
     for done in range(samples // 4):
         progress(done + 1, samples // 4)
     noise = np.random.default_rng(1).normal(size=(SIDE, SIDE, 3)) * 0.05
@@ -68,7 +68,7 @@ class FakeRenderer:
 
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Return the benchmark with all renderers replaced."""
+    """Return the module of the comparison with all renderers replaced."""
     monkeypatch.setattr(rendering, "cycles_passes", cycles_passes)
     monkeypatch.setattr(rendering, "path_trace", path_trace)
     monkeypatch.setattr(report, "load_mitsuba", lambda: None)
@@ -80,15 +80,15 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
     return report
 
 
-def test_noise_bias_and_time_are_told_apart(peers: Any, tmp_path: Path, capsys: Any) -> None:
+def test_noise_bias_and_time_are_separated(peers: Any, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "peers.json"
     peers.peers(lights="front", quick=True, output=out)
-    (told,) = json.loads(out.read_text())["scenes"]
-    rows = {(row["renderer"], row["setting"]): row for row in told["rows"]}
+    (results,) = json.loads(out.read_text())["scenes"]
+    rows = {(row["renderer"], row["setting"]): row for row in results["rows"]}
     ours = rows["dermis", "texture space, atlas 1024"]
     assert (ours["relrmse"], ours["energy_ratio"]) == pytest.approx((OURS, 1.0 + OURS), rel=0.02)
     walk = rows["Cycles, random walk", "4 paths per pixel"]
-    # Noise is relative to the mean picture, error to the truth; the pictures' power is alike for both.
+    # Noise is relative to the mean image, error to the reference; both have about the same energy.
     assert walk["noise"] == pytest.approx(NOISE / 2.0 / (1.0 + BIAS), rel=0.03)
     assert walk["relrmse"] == pytest.approx(np.hypot(BIAS, NOISE / 2.0), rel=0.03)
     assert walk["seconds"] == 2.0
@@ -101,12 +101,12 @@ def test_noise_bias_and_time_are_told_apart(peers: Any, tmp_path: Path, capsys: 
 def test_time_to_our_error_is_that_of_noise_over_bias(peers: Any, tmp_path: Path) -> None:
     out = tmp_path / "peers.json"
     peers.peers(lights="front", quick=True, output=out)
-    (told,) = json.loads(out.read_text())["scenes"]
-    near = told["as_near"]["texture space, atlas 1024"]["same_error"]
+    (results,) = json.loads(out.read_text())["scenes"]
+    near = results["as_near"]["texture space, atlas 1024"]["same_error"]
     assert near["samples"] == pytest.approx(NOISE**2 / (OURS**2 - BIAS**2), rel=0.05)
     assert near["seconds"] == pytest.approx(0.5 * near["samples"])
-    assert told["burley_against_random_walk"][0] < 3.0 * told["burley_against_random_walk"][1]
-    assert told["ours_energy_put_right"]["screen space"] == pytest.approx(0.0, abs=0.01)
+    assert results["burley_against_random_walk"][0] < 3.0 * results["burley_against_random_walk"][1]
+    assert results["ours_energy_put_right"]["screen space"] == pytest.approx(0.0, abs=0.01)
 
 
 def test_all_but_times_is_the_same_again(peers: Any, tmp_path: Path) -> None:
@@ -121,19 +121,19 @@ def test_all_but_times_is_the_same_again(peers: Any, tmp_path: Path) -> None:
     assert first == second and [one["light"] for one in first] == ["front", "back"]
 
 
-def test_without_blender_its_rows_are_left_out_and_it_is_said(
+def test_without_blender_its_rows_are_skipped_with_a_note(
     peers: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     monkeypatch.setattr(report, "blender_python", no_blender)
     monkeypatch.setattr(rendering, "cycles_passes", no_blender)
     peers.peers(lights="front", quick=True)
-    said = capsys.readouterr()
-    assert "Cycles is skipped. Cycles: expected a Python that has Blender's module bpy" in said.err
-    assert "Cycles, random walk" not in said.out and "Mitsuba, volpathmis" in said.out
-    assert "Skipped: random-walk. Cycles: expected a Python" in said.out
+    printed = capsys.readouterr()
+    assert "Cycles is skipped. Cycles: expected a Python that has Blender's module bpy" in printed.err
+    assert "Cycles, random walk" not in printed.out and "Mitsuba, volpathmis" in printed.out
+    assert "Skipped: random-walk. Cycles: expected a Python" in printed.out
 
 
-def test_without_mitsuba_there_is_no_truth(
+def test_without_mitsuba_there_is_no_reference(
     peers: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def missing() -> None:
@@ -159,13 +159,13 @@ def test_bar_ends_with_the_work(peers: Any) -> None:
 def test_the_passes_of_2007_are_set_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "peers.json"
     peers.peers(lights="front", quick=True, output=out)
-    (told,), said = json.loads(out.read_text())["scenes"], capsys.readouterr().out
-    seconds = {row["setting"]: row["seconds"] for row in told["rows"]}
+    (results,), printed = json.loads(out.read_text())["scenes"], capsys.readouterr().out
+    seconds = {row["setting"]: row["seconds"] for row in results["rows"]}
     for name in ("passes of 2007 as compute", "passes of 2007 as fragments"):
-        ratio = told["published"][name]["ratio"]
+        ratio = results["published"][name]["ratio"]
         assert ratio == pytest.approx(seconds[name] / seconds["texture space, atlas 1024"])
-        assert name not in told["as_near"]
-        assert f"The {name} take {ratio:.2f} times as long" in said
+        assert name not in results["as_near"]
+        assert f"The {name} take {ratio:.2f} times as long" in printed
 
 
 def test_unknown_lights_are_named(peers: Any) -> None:
@@ -173,7 +173,7 @@ def test_unknown_lights_are_named(peers: Any) -> None:
         peers.peers(lights="front,moon", quick=True)
 
 
-def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, capsys: Any) -> None:
+def test_a_bias_above_our_error_is_reported(peers: Any, tmp_path: Path, capsys: Any) -> None:
     class Nearer(FakeRenderer):
         def draw(self, scene: Any, settings: Any, force: bool) -> Any:
             return SimpleNamespace(linear=lambda: picture(1.0 + 0.5 * BIAS))
@@ -183,7 +183,7 @@ def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, caps
     assert "never has as small an error, because its bias is larger" in capsys.readouterr().out
 
 
-def test_page_is_written_with_all_its_places_filled(
+def test_page_is_written_with_all_placeholders_filled(
     peers: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     template = template_path(peers.PAGE).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A person beside its path-traced likeness: what is painted, which views there are, what is found."""
+"""Comparison of a person with its path-traced image: textures, views and errors of the iris."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_the_white_is_white_and_teeth_stand_in_gums(paint: SkinTextures) -> None
     upper, lower = paint.teeth
     enamel, gum = upper[100, 450:580].max(axis=0), upper[600].mean(axis=0)
     assert enamel[1] > 0.4 and gum[0] > 2 * gum[1]
-    assert not np.array_equal(upper, lower)  # whose widths differ
+    assert not np.array_equal(upper, lower)  # teeth of different widths
 
 
 def test_skin_is_painted_as_the_frame_paints_it(paint: SkinTextures) -> None:
@@ -96,13 +96,13 @@ def test_a_picture_is_the_mean_of_one_twice_as_large(renderer: Renderer) -> None
     np.testing.assert_allclose(found[5, 7], large[10:12, 14:16].mean(axis=(0, 1)), rtol=1e-5, atol=1e-7)
 
 
-def test_an_eye_is_much_like_its_likeness(
+def test_an_eye_is_close_to_its_path_traced_image(
     renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mitsuba")
     monkeypatch.setattr(medium, "VOXELS", 8)
     pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, use_cache=False)
-    assert pair.samples == 16  # eyes take twice as many
+    assert pair.samples == 16  # views of eyes use twice as many
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
     assert pair.tone_mapped(pair.ours).shape == (32, 32, 3)
     pupil = pair.reference[15:17, 15:17].mean()
@@ -114,8 +114,8 @@ def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> N
         compare_person(renderer, head(), paint, "aura")
 
 
-def made(shift: int, gain: float) -> PersonComparison:
-    """Return a dark pupil in an uneven iris, and a truth that is shifted to the right and brighter."""
+def iris_pair(shift: int, gain: float) -> PersonComparison:
+    """Return a dark pupil in an uneven iris, and a reference that is shifted to the right and brighter."""
     side = 128
     along = (np.arange(side) + 0.5 - 0.5 * side) * EYE_FRAME_MM / side
     x, y = np.meshgrid(along, along)
@@ -123,14 +123,16 @@ def made(shift: int, gain: float) -> PersonComparison:
     ours = np.repeat((0.1 + 0.02 * np.sin(5 * np.arctan2(y, x)))[..., None], 3, axis=2)
     ours[off < 2.0] = 0.001
     rng = np.random.default_rng(0)
-    truth = gain * np.roll(ours, shift, axis=1) + rng.normal(0.0, 0.002, ours.shape)
+    reference_image = gain * np.roll(ours, shift, axis=1) + rng.normal(0.0, 0.002, ours.shape)
     variance = np.full(ours.shape, 0.002**2, np.float32)
-    path = PathTraced(truth.astype(np.float32), variance, np.ones((side, side), np.float32), 8, 1.0, ())
+    path = PathTraced(
+        reference_image.astype(np.float32), variance, np.ones((side, side), np.float32), 8, 1.0, ()
+    )
     return comparison_of("eye", ours, path, np.ones((side, side), bool))
 
 
-def test_an_iris_is_found_where_it_is() -> None:
-    found = iris_errors(made(1, 0.5), EYE_FRAME_MM)
+def test_iris_shift_and_brightness() -> None:
+    found = iris_errors(iris_pair(1, 0.5), EYE_FRAME_MM)
     assert found.right.value == pytest.approx(1.0, abs=0.15) and abs(found.down.value) < 0.1
     assert found.brightness.value == pytest.approx(2.0, abs=0.05)
     assert found.left_half.value == pytest.approx(2.0, abs=0.1)

@@ -1,4 +1,4 @@
-"""The page of people beside their likenesses: its lines, its picture and its words."""
+"""Page about path-traced people: its rows, its picture and its text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ONE = Estimate(1.0, 0.01)
 
 
 def noisy(name: str, side: int) -> PersonComparison:
-    """Return a view of nothing but noise, which compresses worst."""
+    """Return a comparison whose pictures are noise, which compresses worst."""
     rng = np.random.default_rng(len(name))
     image, mask = rng.random((side, side, 3)), np.ones((side, side), bool)
     return PersonComparison(name, image, image, 0 * image, mask, ONE, ONE, (ONE,) * 3, 40, 12.0)
