@@ -128,9 +128,9 @@ def _deck(pictures: Sequence[GalleryPicture]) -> str:
 
 
 def _deck_row(row: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
-    shown = [picture.script for picture in pictures if row["row"] in picture.script.deck]
-    links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in shown)
-    command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in shown)])
+    scripts = [picture.script for picture in pictures if row["row"] in picture.script.deck]
+    links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in scripts)
+    command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in scripts)])
     return (
         f'<tr id="{row["row"]}"><td>{row["row"]}</td><td>{html.escape(row["shows"])}</td><td>{links}</td>'
         f"<td><code>{html.escape(command)}</code></td></tr>"

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ Floats = NDArray[np.float32]
 Numbers = NDArray[np.generic]
 Method = Literal["random-walk", "burley"]
 _PASS_COUNT = 4
+_SCRIPT = Path(__file__).with_name("cycles_script.py")
 _TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
 _MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
 """Time limits for the start and per path: a hundred times the time on two cores."""
@@ -130,7 +131,8 @@ def cycles_passes(
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
         _write_scene(folder, scene_dict, arrays)
-        _run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
+        timeout_s = _MAX_START_S + _MAX_PATH_S * size[0] * size[1] * sum(samples)
+        run_blender(interpreter, _SCRIPT, [str(folder)], timeout_s, _TASK)
         return read_passes(folder, samples, size)
 
 
@@ -142,15 +144,6 @@ def _check_samples(samples: int) -> None:
 def _write_scene(folder: Path, scene_dict: SceneDict, arrays: Mapping[str, Numbers]) -> None:
     (folder / "scene.json").write_text(json.dumps(scene_dict), encoding="utf-8")
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its parameter allow_pickle is no array
-
-
-def _run_cycles(python: Path, folder: Path, paths: int) -> None:
-    """Render the scene in a folder.
-
-    paths : number of all paths, which sets the time limit
-    """
-    script = Path(__file__).with_name("cycles_script.py")
-    run_blender(python, script, [str(folder)], _MAX_START_S + _MAX_PATH_S * paths, _TASK)
 
 
 def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
@@ -174,11 +167,8 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
             for p, count, (clock, cores) in results
         ]
     except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
-        _refuse_render(f"its files are unusable ({str(fault) or type(fault).__name__})")
-
-
-def _refuse_render(actual: str) -> NoReturn:
-    refuse(_TASK.renderer, _TASK.goal, actual, _TASK.advice)
+        actual = f"its files are unusable ({str(fault) or type(fault).__name__})"
+        refuse(_TASK.renderer, _TASK.goal, actual, _TASK.advice)
 
 
 @dataclass(frozen=True)

@@ -138,8 +138,8 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
         opaque[f"material_{k}"] = _material_mesh(mi, head, k, bsdf=_diffuse_bsdf(mi, colour))
     if isinstance(medium, Lambertian):
         diffuse = _diffuse_bsdf(mi, rgb(medium.albedo))
-        chosen = _materials_of_kind(head, "skin")
-        skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in chosen}
+        skin_materials = _materials_of_kind(head, "skin")
+        skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in skin_materials}
         return {**skin, **opaque}, ()
     bodies, notes = _layer_interfaces(mi, head, medium)
     return {**bodies, **opaque}, notes

@@ -114,8 +114,8 @@ def with_skin(scene: Scene, point: FitPoint) -> Scene:
     else:
         head, melanin, blood = scene.head, numbers["melanin"], numbers["blood"]
         skin_values["albedo"] = "profile"
-    held = (scene.skin.pigments or Pigments()).model_dump()
-    pigments = Pigments(**(held | {"melanin": float(melanin), "blood": float(blood)}))
+    fixed = (scene.skin.pigments or Pigments()).model_dump()
+    pigments = Pigments(**(fixed | {"melanin": float(melanin), "blood": float(blood)}))
     skin = Skin(**(scene.skin.model_dump() | skin_values | {"pigments": pigments}))
     return replace(scene, head=head, skin=skin)
 
