@@ -1,4 +1,4 @@
-"""Scripts run by Blender's Python in a process of its own."""
+"""Scripts run by Blender's Python in a separate process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def blender_python(python: str | Path | None = None) -> Path:
 def run_blender(
     python: Path, script: Path, options: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
-    """Run a script in Blender's Python, isolated from the modules beside it and from the user's.
+    """Run a script in Blender's Python, isolated from modules in its folder and from the user's.
 
     Raises DermisError when it cannot be run, fails, or takes longer than the timeout.
     """

@@ -1,6 +1,6 @@
 """Images of a scene by Blender's Cycles, with random-walk or Burley subsurface scattering.
 
-Blender's Python runs `cycles_script.py` in a process of its own on a folder with the described scene.
+Blender's Python runs `cycles_script.py` in a separate process on a folder with the described scene.
 """
 
 from __future__ import annotations

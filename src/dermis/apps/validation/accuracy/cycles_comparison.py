@@ -74,7 +74,7 @@ def highlights(adapter: str = "auto") -> None:
 
 
 def looks(adapter: str = "auto") -> None:
-    """Render skins beside Cycles and write benchmarks/results/look.json and docs/images/look.webp."""
+    """Render skins by the frame and by Cycles; write results/look.json and docs/images/look.webp."""
     in_checkout(PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEADS}

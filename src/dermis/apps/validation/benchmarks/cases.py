@@ -180,7 +180,7 @@ Doubles = NDArray[np.float64]
 
 
 def with_test_rig(head: Head, targets: int) -> Head:
-    """Return the head with `targets` morph targets, and a column of bones in place of its own."""
+    """Return the head with `targets` morph targets, and a column of bones instead of its skeleton."""
     points = head.positions_mm.astype(np.float64)
     rig = replace(head.control, targets=_targets(points, targets), skeleton=_skeleton(points))
     return replace(head, rig=rig)
@@ -212,7 +212,7 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
 
 
 def _skeleton(points: Doubles) -> Skeleton:
-    """Return a vertical chain of bones; each point is weighted between the two beside it."""
+    """Return a vertical chain of bones; each point is weighted between the two nearest ones."""
     low, high = points[:, 1].min(), points[:, 1].max()
     step = (high - low) / BONE_COUNT
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))

@@ -55,7 +55,7 @@ class BenchmarkRow:
 
     triangles : of the head
     frame_ms : elapsed time of a frame in a sequence, with several in flight
-    gpu_ms : device time by stage, each in a pass of its own, and "total"; on GPUs the total is that of other
+    gpu_ms : device time by stage, each in a separate pass, and "total"; on GPUs the total is that of other
         frames, whose stages share one pass as usual, and less than the sum
     floor_ms : the stage's bytes at the rate of a copy, and "total"
     python_ms : time to prepare, record and submit a frame while the device is idle

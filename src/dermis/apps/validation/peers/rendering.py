@@ -1,4 +1,4 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that a slow phase affects all alike."""
+"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that a slow phase affects all of them."""
 
 from __future__ import annotations
 
