@@ -224,7 +224,7 @@ def _take_landmarks(plan: Plan) -> None:
     from dermis.human.landmarks.points import landmark_points
 
     found = landmark_points(_ball(), plan["file"])
-    check_finite((found.share, found.corner), "landmarks")
+    check_finite((found.weight, found.point), "landmarks")
 
 
 @cache
