@@ -309,7 +309,7 @@ def test_tables_that_cannot_be_are_refused(
 def test_the_command_refuses_before_it_loads() -> None:
     with pytest.raises(DermisError, match=r"nowhere.toml: expected default, or regions in TOML"):
         assemble_scene("nobody.obj", SceneOptions(head={"regions": "nowhere.toml"}))
-    with pytest.raises(DermisError, match="--rho-s: expected one or the other"):
+    with pytest.raises(DermisError, match="--rho-s: expected only one of the two"):
         assemble_scene("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
 
 
