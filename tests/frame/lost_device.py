@@ -153,7 +153,7 @@ def observing(renderer: Renderer) -> Any:
     opened[-1].handle.destroy()
     assert depth.any() and np.array_equal(rendered.output("depth"), depth)
     known = list(renderer.observe(scenes, DRAWN, outputs=names))
-    for target, name, calls in ((CommandList, "submit", 3), (readback.Readback, "all", 2)):
+    for target, name, calls in ((CommandList, "submit", 3), (readback.Readback, "image_and_outputs", 2)):
         with losing(target, name, calls):
             found = list(renderer.observe(scenes, DRAWN, outputs=names))
         assert len(found) == len(scenes)
