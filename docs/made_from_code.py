@@ -205,7 +205,8 @@ def _told(thing: Any) -> bool:
 def bibliography() -> str:
     """Every work, by its key."""
     works = [
-        f"({key.lower()})=\n## {key}\n\n```bibtex\n{cite.bibtex([key])}\n```\n" for key in sorted(cite.citation_keys())
+        f"({key.lower()})=\n## {key}\n\n```bibtex\n{cite.bibtex([key])}\n```\n"
+        for key in sorted(cite.citation_keys())
     ]
     return "# Bibliography\n\n" + "\n".join(works)
 

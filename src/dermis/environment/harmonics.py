@@ -43,7 +43,7 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
     around = np.fft.rfft(weighted, axis=1)
     table = _legendre_table(height, degree)
     return [
-        _times(table[m], around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
+        _complex_product(table[m], around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
         if m < around.shape[1]
         else np.zeros((degree + 1 - m, radiance.shape[2]), complex)
         for m in range(degree + 1)
@@ -74,12 +74,12 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
     around = np.zeros((height, width // 2 + 1, count, channels), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
         scaled = (coefficients[m][:, None] * factors.T[m:, :, None]).reshape(-1, count * channels)
-        rows = _times(table[m].T, scaled) * np.exp(1j * m * _first_azimuth(width))
+        rows = _complex_product(table[m].T, scaled) * np.exp(1j * m * _first_azimuth(width))
         around[:, m] = rows.reshape(height, count, channels)
     return np.moveaxis(np.fft.irfft(around, width, axis=1) * width, 2, 0)
 
 
-def _times(matrix: Floats, values: Complex) -> Complex:
+def _complex_product(matrix: Floats, values: Complex) -> Complex:
     """Return the product of a real and a complex matrix; NumPy would first copy the real one as complex."""
     return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
@@ -109,9 +109,9 @@ def _polar_cosines(height: int) -> Floats:
 @lru_cache(maxsize=2)
 def _row_weights(height: int) -> Floats:
     """Return the quadrature weights (h,) of rows by Fejer's first rule, exact for low degrees."""
-    twice = 2.0 * np.pi * (np.arange(height) + 0.5) / height
+    double_angle = 2.0 * np.pi * (np.arange(height) + 0.5) / height
     k = np.arange(1, height // 2 + 1)
-    series = np.cos(np.outer(twice, k)) @ (2.0 / (4.0 * k**2 - 1.0))
+    series = np.cos(np.outer(double_angle, k)) @ (2.0 / (4.0 * k**2 - 1.0))
     return np.asarray(2.0 / height * (1.0 - series))
 
 

@@ -178,8 +178,8 @@ def _bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floats, Floats
 
 
 def _lobes(numbers: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
-    position, out_of_plane, log_width, share = numbers
-    weight = np.where(active, np.exp(share - share[active].max()), 0.0)
+    position, out_of_plane, log_width, log_weight = numbers
+    weight = np.where(active, np.exp(log_weight - log_weight[active].max()), 0.0)
     return IsotropicLobes(
         target.mean_angle + position * target.along_deviation,
         out_of_plane * target.across_deviation,

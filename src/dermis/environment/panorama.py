@@ -77,20 +77,20 @@ def mean_radiance(radiance: Floats) -> Floats:
 def resample(radiance: NDArray[np.floating], height: int) -> Floats:
     """Return a panorama of another size (height, 2 height, 3), averaged over texel solid angles."""
     rows, columns = radiance.shape[:2]
-    ours, theirs = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
-    upright = _means(radiance, ours, theirs)
-    ours, theirs = (np.linspace(0.0, 1.0, n + 1) for n in (columns, 2 * height))
-    return _means(upright.swapaxes(0, 1), ours, theirs).swapaxes(0, 1)
+    edges, target_edges = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
+    upright = _interval_means(radiance, edges, target_edges)
+    edges, target_edges = (np.linspace(0.0, 1.0, n + 1) for n in (columns, 2 * height))
+    return _interval_means(upright.swapaxes(0, 1), edges, target_edges).swapaxes(0, 1)
 
 
-def _means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
+def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
     """Return means over target intervals of values that are constant between edges, on the first axis."""
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
     after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(values))
     means = np.empty((len(first), *values.shape[1:]))
     for k, (a, b) in enumerate(zip(first, after, strict=True)):
-        share = np.diff(np.clip(edges[a : b + 1], target_edges[k], target_edges[k + 1]))
-        means[k] = np.tensordot(share / share.sum(), values[a:b], 1)
+        overlap = np.diff(np.clip(edges[a : b + 1], target_edges[k], target_edges[k + 1]))
+        means[k] = np.tensordot(overlap / overlap.sum(), values[a:b], 1)
     return means
 
 

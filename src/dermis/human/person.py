@@ -70,7 +70,6 @@ _RANGES = {
 _MIN_HAIR_FRACTION = 0.05
 _TARGET_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
-Levels = int | Callable[[Head], int]
 
 
 def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -292,7 +291,11 @@ class Human:
         return cls(**sample_fields(seed, given))
 
     def head(
-        self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1, hairs: float = 1.0
+        self,
+        maps: Maps | None = None,
+        layout: Layout = "own",
+        subdivide: int | Callable[[Head], int] = 1,
+        hairs: float = 1.0,
     ) -> Head:
         """Return the head in rest pose, with morph targets of expressions and bones.
 

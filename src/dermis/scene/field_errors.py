@@ -146,9 +146,9 @@ def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> st
         info = FieldInfo.from_annotation(get_args(info.annotation)[-1])
     low, high = field_bounds(info)
     reasons = [one for one in info.metadata if isinstance(one, Reason)]
-    why = f" ({reasons[0]})" if reasons else ""
-    whole = "a whole number" if set(_leaf_types(info.annotation)) <= {int, NoneType} else "a number"
-    return f"{whole} from {low:.10g} to {high:.10g}{why}" if low is not None and high is not None else ""
+    reason = f" ({reasons[0]})" if reasons else ""
+    kind = "a whole number" if set(_leaf_types(info.annotation)) <= {int, NoneType} else "a number"
+    return f"{kind} from {low:.10g} to {high:.10g}{reason}" if low is not None and high is not None else ""
 
 
 def _leaf_types(kind: Any) -> Iterator[Any]:

@@ -92,9 +92,9 @@ class _Documented(ModelMetaclass):
 
         def __dir__(self) -> list[str]:
             bases = self.__mro__[: self.__mro__.index(BaseModel)]
-            members = {name: thing for base in reversed(bases) for name, thing in vars(base).items()}
-            public = ((name, thing) for name, thing in members.items() if name[0] != "_")
-            return [name for name, thing in public if isinstance(thing, _MEMBER_TYPES)]
+            members = {name: member for base in reversed(bases) for name, member in vars(base).items()}
+            public = ((name, member) for name, member in members.items() if name[0] != "_")
+            return [name for name, member in public if isinstance(member, _MEMBER_TYPES)]
 
 
 class FrozenModel(BaseModel, metaclass=_Documented):
@@ -191,8 +191,7 @@ def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
 
 def constructor_signature(model: type[BaseModel]) -> Signature:
     """Return the signature of a model's constructor; a single required field may be positional."""
-    alone = _required(model)
-    return Signature(sorted(_parameters(model, alone), key=lambda one: one.kind))
+    return Signature(sorted(_parameters(model, _required(model)), key=lambda one: one.kind))
 
 
 def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Parameter]:
@@ -212,8 +211,8 @@ def _without_checks(kind: Any) -> Any:
         return _without_checks(parts[0])
     if origin in (None, Literal):
         return kind
-    bare = tuple(map(_without_checks, parts))
-    return reduce(or_, bare) if origin in (Union, UnionType) else origin[bare]
+    plain_parts = tuple(map(_without_checks, parts))
+    return reduce(or_, plain_parts) if origin in (Union, UnionType) else origin[plain_parts]
 
 
 def model_docstring(model: type[BaseModel]) -> str:

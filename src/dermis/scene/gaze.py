@@ -43,7 +43,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
         advice = f"{head.note}. {_EYES_ADVICE}" if head.note else _EYES_ADVICE
         refuse(head.name, "a head with eyes that turn", "it has none", advice)
     bounds = -MAX_DISTANCE_MM, MAX_DISTANCE_MM
-    goal_mm = checked_array("look at", target_mm, (3,), *bounds, "mm from the head's centre")
+    point_mm = checked_array("look at", target_mm, (3,), *bounds, "mm from the head's centre")
     eye_bones = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
     gaze_targets = {rotation.target for rotation in rig.bone_rotations if rotation.bone in eye_bones}
     weights = {name: value for name, value in base.weights.items() if name not in gaze_targets}
@@ -51,7 +51,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
     resting = eyes.frames(rig, rig.rest)
     for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
-        to_target = (frame @ np.append(goal_mm + np.array(head.centre_mm), 1.0))[:3]
+        to_target = (frame @ np.append(point_mm + np.array(head.centre_mm), 1.0))[:3]
         to_target = to_target - [0.0, 0.0, eyes.centre_offset_mm[k]]
         angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.gaze[k]))
         rotations = [rotation for rotation in rig.bone_rotations if rotation.bone == bone]
@@ -69,13 +69,13 @@ def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
     return [one._replace(target=known[one.target]) for one in arkit if one.target in known]
 
 
-def _rotation_angles(goal: Doubles, axis: Doubles) -> tuple[float, float]:
-    """Return the angles about x and y that rotate an axis onto a goal, both unit vectors (3,) [rad]."""
+def _rotation_angles(direction: Doubles, axis: Doubles) -> tuple[float, float]:
+    """Return the angles about x and y that rotate an axis onto a direction, both unit vectors (3,) [rad]."""
     x, y = 0.0, 0.0
     for _ in range(_ITERATIONS):
         current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
-        x += _pitch(goal) - _pitch(current)
-        y += math.remainder(_yaw(goal) - _yaw(current), math.tau)
+        x += _pitch(direction) - _pitch(current)
+        y += math.remainder(_yaw(direction) - _yaw(current), math.tau)
     return x, y
 
 
@@ -91,11 +91,11 @@ def _unit(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _weights(rotations: list[BoneRotation], goal: tuple[float, float]) -> dict[str, Any]:
+def _weights(rotations: list[BoneRotation], angles: tuple[float, float]) -> dict[str, Any]:
     """Return the weights of targets for rotation angles about x and y [rad]."""
     target_weights = {}
     for rotation in rotations:
-        for angle, limit in zip(np.degrees(goal), rotation.degrees[:2], strict=True):
+        for angle, limit in zip(np.degrees(angles), rotation.degrees[:2], strict=True):
             if limit and angle / limit > 0:
                 target_weights[rotation.target] = float(min(angle / limit, MAX_GAZE_WEIGHT))
     return target_weights

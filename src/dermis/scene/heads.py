@@ -137,9 +137,9 @@ def load_head(
     """
     opaque, eye_groups = ((one,) if isinstance(one, str) else one for one in (opaque, eye_groups))
     name, path = head_name(head), Path(head)
-    given_maps = {"colour": colour, "normal": normal, "height": height}
-    given_maps |= {"specular": specular, "roughness": roughness}
-    check_files_and_lengths(given_maps, unit_mm=unit_mm, height_mm=height_mm)
+    map_files = {"colour": colour, "normal": normal, "height": height}
+    map_files |= {"specular": specular, "roughness": roughness}
+    check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
     mesh_options: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
     mesh_options["eye_groups"], levels = eye_groups, resolve_levels(subdivide)
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
@@ -147,7 +147,7 @@ def load_head(
     mesh_options |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
     if is_person_name(name):
         mesh_options["eyes"] = eyes
-        return _with_look(_load_human(name, given_maps, height_mm, normal_y, mesh_options, levels), eye)
+        return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
     if sample is not None:
         _check_sample_kind(sample)
@@ -160,7 +160,7 @@ def load_head(
         _refuse_name(name)
     elif is_gltf(path):
         files, look = embedded_maps(path), embedded_eye_look(path)
-    chosen = _map_files(given_maps, files)
+    chosen = _map_files(map_files, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
     obj = path if sample is None and path.suffix.lower() == ".obj" else None
@@ -216,12 +216,14 @@ def _read_maps(
     normal_y: NormalY,
 ) -> tuple[Maps, str]:
     """Return the given maps together with those that the materials of an OBJ file name, and a notice."""
-    given = {role: file for role, file in chosen.items() if file is not None}
-    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
+    map_files = {role: file for role, file in chosen.items() if file is not None}
+    loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y)
     if obj is None:
         return loaded, ""
-    head_name, notice = obj_maps(obj, opaque=opaque, overridden=given, height_mm=height_mm, normal_y=normal_y)
-    return replace(head_name, **{role: getattr(loaded, role) for role in given}), notice
+    obj_file_maps, notice = obj_maps(
+        obj, opaque=opaque, overridden=map_files, height_mm=height_mm, normal_y=normal_y
+    )
+    return replace(obj_file_maps, **{role: getattr(loaded, role) for role in map_files}), notice
 
 
 def _refuse_name(name: str) -> NoReturn:
@@ -258,12 +260,12 @@ def _load_human(
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")
     check_relief(height_mm, maps["height"])
-    given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
-    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
-    found = levels if callable(levels) else lambda plain: levels
-    head = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, found(plain)))
-    given_maps = {role: getattr(loaded, role) for role in given}  # the other maps are painted
-    return replace(head, name=name, maps=replace(head.maps, **given_maps))
+    map_files: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
+    loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
+    level_of = levels if callable(levels) else lambda plain: levels
+    head = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, level_of(plain)))
+    user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
+    return replace(head, name=name, maps=replace(head.maps, **user_maps))
 
 
 def load_person(name: str) -> Human:
@@ -285,12 +287,12 @@ def load_person(name: str) -> Human:
     return Human.drawn(int(words))
 
 
-def _map_files(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
+def _map_files(map_files: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
     """Return the file of each map: the given one, else that of the head.
 
     A given normal map replaces the relief of the head.
     """
-    chosen = {role: files.get(role) if file is None else file for role, file in given.items()}
+    chosen = {role: files.get(role) if file is None else file for role, file in map_files.items()}
     return chosen | {"region": files.get("region")}
 
 

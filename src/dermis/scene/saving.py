@@ -42,7 +42,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
     """
     excluded = _SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
-    parts += [table_text("[head]", head), *_pose(scene.pose)]
+    parts += [table_text("[head]", head), *_pose_tables(scene.pose)]
     parts.append(_model_table("[skin]", scene.skin, excluded | {"pigments", "layers"}))
     if scene.skin.pigments:
         parts.append(_model_table("[skin.pigments]", scene.skin.pigments))
@@ -55,7 +55,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
     return "\n".join([_HEADER, *parts])
 
 
-def _pose(pose: Pose | None) -> list[str]:
+def _pose_tables(pose: Pose | None) -> list[str]:
     """Return the tables of a pose's weights and bones."""
     if pose is None:
         return []

@@ -53,7 +53,7 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     quad = _hairy_quads(mesh)
     corner_points = quad_corners(mesh, quad)
     counts = np.floor(per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
-    starts, chance = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
+    starts, threshold = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
     near = density.candidates[corner_points].any(axis=1)
     quad_index = np.repeat(np.flatnonzero(near), counts[near])
     ends = np.cumsum(counts)[near]
@@ -63,7 +63,7 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     position -= np.floor(position)
     values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
     relative = density.relative(interpolate_quads(position, values).T)
-    accepted = np.flatnonzero(chance.take(number) < relative)
+    accepted = np.flatnonzero(threshold.take(number) < relative)
     rooted = quad.take(quad_index.take(accepted)).astype(np.int32)
     return Roots(rooted, position.take(accepted, axis=0).astype(np.float32))
 

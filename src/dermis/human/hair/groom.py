@@ -131,8 +131,8 @@ def _join(groups: list[HairGroup], absorption: Doubles) -> Strands:
 
 
 def _concatenate(parts: Iterable[Roots]) -> Roots:
-    quads, places = zip(*parts, strict=True)
-    return Roots(np.concatenate(quads), np.concatenate(places))
+    quads, positions = zip(*parts, strict=True)
+    return Roots(np.concatenate(quads), np.concatenate(positions))
 
 
 def _per_hair(groups: list[HairGroup], name: str) -> Doubles:

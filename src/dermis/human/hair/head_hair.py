@@ -51,13 +51,13 @@ class GuideShape(NamedTuple):
 
     directions : (n, 3) unit directions along the skin
     length_mm : (n,)
-    rise, last_rise : (n,) angles between the skin and the hair at root and tip [rad]
+    rise, tip_rise : (n,) angles between the skin and the hair at root and tip [rad]
     """
 
     directions: Doubles
     length_mm: Doubles
     rise: Doubles
-    last_rise: Doubles
+    tip_rise: Doubles
 
 
 def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: float) -> GuideShape:
@@ -76,15 +76,15 @@ def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: flo
     sides = 1.0 - look.fade * (1.0 - smoothstep(-45.0, 62.0, high))
     near = 0.3 + 0.7 * np.maximum(smoothstep(0.0, 35.0, edge), top)
     length = look.length_mm * np.minimum(sides, near)
-    rise = (side + more * top for side, more in zip(_SHORT_RISE, _TOP_RISE, strict=True))
+    rise = (at_side + at_top * top for at_side, at_top in zip(_SHORT_RISE, _TOP_RISE, strict=True))
     return GuideShape(_combed_directions(points, normals, growth), length, *rise)
 
 
 def comb_beard(points: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
     """Return the guides of the beard, which point down and slightly to the sides; see `comb_scalp`."""
     n = len(points)
-    aside = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
-    directions = tangent_directions(np.stack([aside, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
+    sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
+    directions = tangent_directions(np.stack([sideways, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
     return GuideShape(directions, np.full(n, look.beard_mm), *(np.full(n, rise) for rise in _BEARD_RISE))
 
 
@@ -193,7 +193,7 @@ def _trace_guides(
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
     found = [np.zeros_like(root_mm)]
     for k in range(1, knots):
-        rise = guide.rise + (guide.last_rise - guide.rise) * (k - 0.5) / (knots - 1)
+        rise = guide.rise + (guide.tip_rise - guide.rise) * (k - 0.5) / (knots - 1)
         height = np.maximum(height + step * np.sin(rise), _MIN_HEIGHT_MM)
         directions = tangent_directions(directions, normal)
         base_mm, normal = skin.project(base_mm + (step * np.cos(rise))[:, None] * directions)
@@ -223,9 +223,9 @@ def _vary_directions(
     angle = variation.angle_deviation * rng.standard_t(4, size=n)
     lean = 1.0 + variation.angle_deviation * rng.normal(size=n)
     length = np.clip(1.0 + variation.length_deviation * rng.normal(size=n), 0.35, 1.2)
-    along, aside = length * np.cos(angle), length * np.sin(angle)
-    along, aside, rise = (one.astype(np.float32) for one in (along, aside, length * lean - along))
-    found: Floats = aside * cross_columns(normal, offsets)
+    along, sideways = length * np.cos(angle), length * np.sin(angle)
+    along, sideways, rise = (one.astype(np.float32) for one in (along, sideways, length * lean - along))
+    found: Floats = sideways * cross_columns(normal, offsets)
     found += (rise * dot_columns(offsets, normal))[:, None] * normal
     found += along * offsets
     return found
@@ -241,13 +241,13 @@ def _form_tufts(
         coordinate -= coordinate.min()
         cell *= coordinate.max() + 1
         cell += coordinate
-    leader = np.empty(cell.max() + 1, np.int64)
-    leader[cell] = np.arange(len(cell))  # one hair of each cell
-    leader = leader[cell]
+    tuft_hair = np.empty(cell.max() + 1, np.int64)
+    tuft_hair[cell] = np.arange(len(cell))  # one hair of each cell
+    tuft_hair = tuft_hair[cell]
     pull = (strength * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
-    difference = offsets.take(leader, axis=-1)
+    difference = offsets.take(tuft_hair, axis=-1)
     difference -= offsets
-    difference += (points.take(leader, axis=-1) - points).astype(np.float32)
+    difference += (points.take(tuft_hair, axis=-1) - points).astype(np.float32)
     difference *= pull[:, None]
     offsets += difference
 

@@ -118,13 +118,13 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
-    bare, cropped = (0.12, 0.5) if man else (0.03, 0.25)
+    hairless_below, cropped_below = (0.12, 0.5) if man else (0.03, 0.25)
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
     style: Style = "short"
     length = typical.length_mm if typical.style == "short" else _SHORT_LENGTH_MM
-    if style_chance < bare:
+    if style_chance < hairless_below:
         style = "none"
-    elif style_chance < cropped or typical.curl > _CROPPED_CURL:
+    elif style_chance < cropped_below or typical.curl > _CROPPED_CURL:
         style, length = "cropped", _CROPPED_LENGTH_MM
     length *= float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))

@@ -85,11 +85,14 @@ class RootFinder:
         u = 1 - v - w
         inside = np.flatnonzero((u >= _MIN_WEIGHT) & (v >= _MIN_WEIGHT) & (w >= _MIN_WEIGHT))
         z = (az + v * (bz - az) + w * (cz - az))[inside]
-        foremost = np.full(len(x), -1)
+        front_index = np.full(len(x), -1)
         order = inside[np.argsort(z)]
-        foremost[query_index[order]] = order  # the last assignment is the foremost triangle
-        hit = foremost >= 0
-        triangle, weights = triangle[foremost], np.stack([u[foremost], v[foremost], w[foremost]], axis=-1)
+        front_index[query_index[order]] = order  # the last assignment is the foremost triangle
+        hit = front_index >= 0
+        triangle, weights = (
+            triangle[front_index],
+            np.stack([u[front_index], v[front_index], w[front_index]], axis=-1),
+        )
         position = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[triangle], axis=0))
         quad = np.where(hit, front.quad[triangle], 0)
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit

@@ -88,7 +88,7 @@ def _region_map(
 ) -> Floats:
     """Return a map (h, w) of the values (n,) of covered texels, times the fine detail of an existing map."""
     if own_maps is None:
-        return _picture(atlas, level)
+        return _texel_image(atlas, level)
     y, x = np.nonzero(atlas.coverage)
     height, width = own_maps.shape
     values = own_maps[y * height // SIZE, x * width // SIZE].astype(np.float64)
@@ -96,18 +96,20 @@ def _region_map(
     local_mean = np.maximum(local_mean, _MIN_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, SIZE), max(width, SIZE)
-    detail = np.minimum(_resized(own_maps, shape) / _resized(_picture(atlas, local_mean), shape), _MAX_DETAIL)
-    return np.asarray(detail * _resized(_picture(atlas, level), shape))
+    detail = np.minimum(
+        _resized(own_maps, shape) / _resized(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
+    )
+    return np.asarray(detail * _resized(_texel_image(atlas, level), shape))
 
 
-def _picture(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
-    """Return the values (n,) of covered texels as a picture; other texels take the nearest value."""
+def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
+    """Return the values (n,) of covered texels as an image; other texels take the nearest value."""
     from scipy.ndimage import distance_transform_edt
 
-    picture = np.zeros(atlas.coverage.shape, np.float32)
-    picture[atlas.coverage] = values
+    image = np.zeros(atlas.coverage.shape, np.float32)
+    image[atlas.coverage] = values
     y, x = distance_transform_edt(~atlas.coverage, return_distances=False, return_indices=True)
-    return np.asarray(picture[y, x])
+    return np.asarray(image[y, x])
 
 
 def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:

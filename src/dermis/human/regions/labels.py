@@ -91,23 +91,23 @@ def _parse_landmarks(text: str, name: str) -> Landmarks:
 
 
 def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> None:
-    culprit = f"landmarks of {head.name}"
+    subject = f"landmarks of {head.name}"
     for name in landmarks.keys() - average.keys():
-        refuse(culprit, f"only {', '.join(average)}", f"got {name!r}", "Correct its name")
+        refuse(subject, f"only {', '.join(average)}", f"got {name!r}", "Correct its name")
     if len(landmarks) < _MIN_LANDMARKS:
         actual = f"got {len(landmarks)}"
-        refuse(culprit, f"at least {_MIN_LANDMARKS}", actual, "Add some all around the head")
+        refuse(subject, f"at least {_MIN_LANDMARKS}", actual, "Add some all around the head")
     skin = head.mesh.positions - np.array(head.centre_mm)
     for name, position in landmarks.items():
         distance = float(np.linalg.norm(skin - position, axis=1).min())
         if not distance < _MAX_SKIN_DISTANCE_MM:
             actual = f"{name!r} is {distance:.0f} mm off the nearest corner of the mesh"
             expected = "points on the skin, in mm from the head's centre"
-            refuse(culprit, expected, actual, "Correct its position")
+            refuse(subject, expected, actual, "Correct its position")
     points_mm = np.array(list(landmarks.values()))
     singular_values = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)
     if singular_values[-1] / np.sqrt(len(points_mm)) < _MIN_DEPTH_MM:
-        refuse(culprit, "points all around the head", "they lie in one plane", "Add some outside of it")
+        refuse(subject, "points all around the head", "they lie in one plane", "Add some outside of it")
 
 
 def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uint8]:

@@ -44,7 +44,7 @@ def lid_rings() -> NDArray[np.int64]:
     left = float_columns(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
     points_mm = _load_array("places")
     mirrored = points_mm[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
-    opposite = np.array([np.abs(points_mm - place).sum(axis=1).argmin() for place in mirrored])
+    opposite = np.array([np.abs(points_mm - point).sum(axis=1).argmin() for point in mirrored])
     return np.stack([left, opposite.reshape(left.shape)])
 
 
