@@ -61,6 +61,7 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[background]": BackgroundTable,
     "[[correlated]]": CorrelationGroup,
 }
+_KEYWORDS = re.compile(r"^\*\*(\w+)$")
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
 _PARTS = re.compile(
     r"_(?P<index>[A-Za-z]{2,})|\^(?:\((?P<power>[^()]*)\)|(?P<name>[A-Za-z]{2,}))"
@@ -203,7 +204,7 @@ def _told(thing: Any) -> bool:
 
 
 def bibliography() -> str:
-    """Every work, by its key."""
+    """Return the page of all works, by their keys."""
     works = [
         f"({key.lower()})=\n## {key}\n\n```bibtex\n{cite.bibtex([key])}\n```\n"
         for key in sorted(cite.citation_keys())
@@ -212,12 +213,12 @@ def bibliography() -> str:
 
 
 def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    """Lines "name : meaning" of the house's docstrings as Sphinx's fields, and keys as links."""
+    """Turn the lines "name : meaning" of docstrings into fields of Sphinx, and citation keys into links."""
     if isinstance(thing, type) and issubclass(thing, FrozenModel) and "Parameters" in lines:
         del lines[lines.index("Parameters") :]  # the table that follows has them
     made: list[str] = []
     entry: list[str] = []  # of the fields of a line, with what goes on below it
-    for line in [*lines, ""]:
+    for line in [*(_KEYWORDS.sub(r"\1 : keyword arguments", line) for line in lines), ""]:
         found = _FIELD.match(line)
         if entry and (found or not line.startswith(" ")):
             made += _fields_of(entry)
