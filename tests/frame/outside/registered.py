@@ -65,7 +65,7 @@ with warnings.catch_warnings(record=True) as notes:
     warnings.simplefilter("always")
     lines = light_lines([glow], None)
 assert [str(one.message) for one in notes] == [
-    "light 1: pbrt has no after-glow light and takes it for a point light"
+    "light 1: pbrt has no after-glow light, so it becomes a point light"
 ]
 assert any(line.startswith('LightSource "point"') for line in lines)
 try:
