@@ -42,10 +42,10 @@ def test_the_average_person_is_what_the_tool_measures(
     sample_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(TOOLS))
-    import label_fields
+    import human_fields
 
-    monkeypatch.setattr(label_fields, "OUT", tmp_path / "average.npz")
-    label_fields.main(sample_folder / "heads" / "human")
+    monkeypatch.setattr(human_fields, "OUT", tmp_path / "average.npz")
+    human_fields.main(sample_folder / "heads" / "human")
     with np.load(tmp_path / "average.npz") as made, np.load(DATA / "average.npz") as kept:
         assert set(made) == set(kept)
         assert np.abs(made["places"].astype(int) - kept["places"]).max() <= 1
