@@ -1,1 +1,1 @@
-"""Frame: all that the device computes to render a scene, and the renderer."""
+"""Frame: all that the device computes to render one picture of a scene, and the renderer that submits it."""

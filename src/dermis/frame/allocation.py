@@ -1,4 +1,4 @@
-"""Allocation of the resources of a frame, which depend neither on the camera nor on positions of lights."""
+"""Allocation of the resources of a frame, independent of the camera and of the positions of the lights."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LayoutAtlas = tuple[Atlas, AtlasTextures]
 
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
-    """Return the resources of a request; cached ones are reused.
+    """Return the textures, buffers and records that a request needs; unchanged ones come from the cache.
 
     Raises DermisError for sizes over the device's limits.
     """
@@ -90,7 +90,10 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
 
 
 def _shade_constants(request: FrameRequest) -> Constants:
-    """Return the pipeline constants for fine relief, modelled eyes and a map that blends profiles."""
+    """Return the pipeline constants of the shading pass for the optional features that the request uses.
+
+    These are relief finer than the maps, modelled eyes, and profiles that are blended by a map.
+    """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
     return tuple((name, 1) for name, value in used.items() if value)
@@ -99,7 +102,10 @@ def _shade_constants(request: FrameRequest) -> Constants:
 def _view(
     device: Device, request: FrameRequest, technique: Technique, own: TechniqueResources | None
 ) -> UniformRecord:
-    """Return the record of the shading pass without the camera."""
+    """Return the uniform record of the shading pass, with all members except those of the camera.
+
+    own : tables and textures of the technique, None for none
+    """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.split)
     technique.write_view_record(view, program, own)
@@ -122,7 +128,7 @@ def _shared_bindings(
     shapes: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
-    """Return the shader resources that all layouts share, without maps and lights."""
+    """Return the shader resources that all atlas layouts share, apart from maps and lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
     curvature = shapes.curvature
@@ -144,7 +150,7 @@ def _shared_bindings(
 def _sky(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
 ) -> VertexSky:
-    """Return the visibility of the sky at the vertices, from the head at rest."""
+    """Return buffers with the visible fraction of the sky at each vertex, computed for the head at rest."""
     at_rest = rest_geometry(memo, device, layout.head, shapes.tables, request.topology, None, 0)
     return memo.get(make_vertex_sky, device, request.topology, untracked=(at_rest,))
 
@@ -165,7 +171,12 @@ def _layout(
     shared: Bindings,
     index: int,
 ) -> AtlasLayout:
-    """Return the resources of one atlas layout, without lights."""
+    """Return the resources of one atlas layout; each frame adds the record of its lights.
+
+    layout_atlas : the atlas, and its textures on the device
+    shared : result of `_shared_bindings`, with the maps of the head
+    index : index of the layout, which keys its resources in the cache
+    """
     cached, number, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
     geometry = cached(upload_geometry, device, head.mesh, atlas, shapes.shape, owner=number)
     tables, settings = shapes.tables, request.settings

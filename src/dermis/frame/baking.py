@@ -36,11 +36,11 @@ _CONDITIONAL = {
 
 @dataclass(frozen=True, eq=False)
 class BakedMaps:
-    """Maps of the skin of a head, row 0 at the top.
+    """Maps of the skin of a head in its uv layout, row 0 at the top.
 
-    covered : (n, n) whether the centre of a texel is on skin; other texels copy the nearest one that is
+    covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest one in the mask
     maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.CHANNELS`
-    absent : reasons for missing maps, by name
+    absent : reason why a map is missing, by the name of the map
     """
 
     covered: NDArray[np.bool_]
@@ -49,12 +49,12 @@ class BakedMaps:
 
 
 def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
-    """Compute maps of the skin in its uv layout, with light before and after scattering.
+    """Compute maps of the skin in its uv layout: its properties, and light before and after scattering.
 
-    settings : settings of the light; size, samples, technique and `strands` are ignored
+    settings : settings of the lighting; size, samples, technique and `strands` are ignored
     side : side of the maps, a power of two [texels]
 
-    Texels hold values at their centres, filtered over the side of a texel.
+    Maps are evaluated at the centres of texels, with a filter as wide as a texel.
 
     Raises DermisError for sizes over the limits of the device, and when the device fails.
     """
@@ -72,8 +72,9 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Bak
 def bake_albedo(
     renderer: Renderer, scene: Scene, triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> Floats:
-    """Return the (n, 3) linear Rec. 709 albedo at surface points, eyes and mouths included [-].
+    """Return the (n, 3) linear Rec. 709 albedo at surface points of skin, eyes or mouth [-].
 
+    triangle : (n,) indices of the triangles on which the points lie
     weights : (n, 2) barycentric weights of the second and third corner
     """
     settings = Settings(size=_PICTURE, samples=1, atlas=_ALBEDO_ATLAS, strands=False)
@@ -84,9 +85,10 @@ def bake_albedo(
 
 
 def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the texels of a uv layout whose centres are on skin, and their surface points for bake.wgsl.
+    """Return the indices of texels whose centres are on skin, and their surface points packed for bake.wgsl.
 
-    Where triangles overlap, those that are not mirrored in uv take precedence, and then the last one.
+    Where triangles overlap in uv, one that is not mirrored wins over a mirrored one, and later triangles win
+    over earlier ones.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     texel, triangle = rasterise(mesh, side, np.flatnonzero(skin))
@@ -100,7 +102,10 @@ def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.
 def _weights(
     mesh: Mesh, side: int, texel: NDArray[np.int64], triangle: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return the (n, 2) barycentric weights of texel centres for the second and third corner."""
+    """Return (n, 2) barycentric weights of texel centres for the second and third corner of a triangle.
+
+    texel, triangle : (n,) indices of the texels, row by row, and of the triangles that cover them
+    """
     corners = texel_corners(mesh, side, triangle)
     offset = np.stack([texel % side, texel // side], axis=1) - corners[:, 0]
     second, third = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -114,7 +119,7 @@ def _weights(
 def _available(
     renderer: Renderer, scene: Scene, settings: Settings, names: tuple[str, ...], absent: dict[str, str]
 ) -> tuple[str, ...]:
-    """Return the names of outputs if the scene has them, else none; `absent` receives the reason."""
+    """Return `names` if the scene can render these outputs, else nothing and the reason in `absent`."""
     try:
         renderer.draw(scene, settings, timed=False, outputs=names)
     except DermisError:
@@ -131,7 +136,12 @@ def _bake_points(
     points: NDArray[np.uint32],
     side: int,
 ) -> Floats:
-    """Render a frame for its light, and return the (n, COUNT) shading channels of surface points."""
+    """Render a frame to light the atlas, and return the (n, COUNT) shading channels at surface points.
+
+    outputs : names of outputs whose resources bake.wgsl needs
+    points : (n, 4) surface points, packed by `features.shading.bake.point_words`
+    side : side of the maps, which sets the width of filters [texels]
+    """
     renderer.draw(scene, settings, timed=False, outputs=outputs)
     inputs = renderer.prepare(scene, settings, "", outputs)
     bindings, output_resources = _bindings(renderer, inputs, scene), inputs.resources.outputs
@@ -146,7 +156,7 @@ def _bake_points(
 
 
 def _bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
-    """Return the resources of the frame that bake.wgsl reads."""
+    """Return the shader resources of bake.wgsl: those of a rendered frame, curvature and thickness."""
     resources, device = inputs.resources, renderer.device
     skin_curvature = make_curvature(device, scene.head.topology.mesh)
     frame = CommandList(device, timed=False)
@@ -159,7 +169,11 @@ def _bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableB
 
 
 def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[str, str]) -> BakedMaps:
-    """Return maps of the values at texels; other texels copy the nearest of them."""
+    """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
+
+    texel : (n,) indices of the skin texels, row by row
+    values : (n, COUNT) shading channels of these texels
+    """
     covered = np.zeros(side * side, np.bool_)
     covered[texel] = True
     uncovered, nearest = np.flatnonzero(~covered), _nearest(covered.reshape(side, side))
@@ -177,7 +191,7 @@ def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[s
 
 
 def _nearest(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the index of the nearest covered texel of each texel that is not covered, in order."""
+    """Return, for each texel outside the mask in row order, the flat index of the nearest texel inside."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = distance_transform_edt(~covered, return_distances=False, return_indices=True)

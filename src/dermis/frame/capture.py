@@ -1,4 +1,4 @@
-"""Capture of the passes of frames, for players in other programs."""
+"""Capture of the GPU passes of a frame, so that players in other programs can replay them."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
 
 
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:
-    """Return a renderer whose frames suit GPUs or software adapters, whatever its own adapter is.
+    """Return a renderer that records passes for GPUs or software adapters, whatever its own adapter is.
 
-    device_kind : "gpu" or "software"
+    device_kind : adapter on which the passes will be replayed, "gpu" or "software"
     """
     renderer = Renderer(adapter, cache_size=_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -34,13 +34,16 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
 
 
 def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
-    """Return the passes of a frame without running them."""
+    """Record the passes of a frame, with their resources, without running them."""
     technique = TECHNIQUES[inputs.settings.technique]
     return capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
 def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
-    """Return a captured frame with fewer and wider coarse hairs, one of every `factor`; 0 keeps all."""
+    """Return a captured frame that draws one of every `factor` coarse hairs, widened to cover the same area.
+
+    factor : divisor of the number of hairs; 0 keeps all
+    """
     for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
         count = int(record["coarse"]) // factor
         record["wider"] *= record["coarse"] / max(1, count)
@@ -49,14 +52,14 @@ def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
 
 
 def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
-    """Return the passes that compute the mip levels of a map from the first one."""
+    """Record the passes that compute the mip levels of a map from its finest level."""
     return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
 def update_map(renderer: Renderer, texture: Texture, levels: list[NDArray[np.float16]]) -> None:
-    """Replace the texels of a map; if only the first mip level is given, the others are computed.
+    """Replace the texels of a map; if only the finest mip level is given, the other levels are computed.
 
-    levels : (l, h, w, c) texels of each mip level
+    levels : (l, h, w, c) texels of each mip level, the finest first, where l is the number of array layers
     """
     for mip, layers in enumerate(levels):
         for layer, texels in enumerate(layers):

@@ -1,1 +1,1 @@
-"""Features of a frame: one folder each, with its resources, passes, shaders and shader constants."""
+"""Features of a frame: one folder per stage, with its resources, passes, shaders and shader constants."""

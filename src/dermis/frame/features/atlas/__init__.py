@@ -1,4 +1,4 @@
-"""Atlas on the device: layout, stretch maps, stitched gutters, and blending of two layouts."""
+"""Atlas on the device: layouts, stretch maps, gutters that are stitched across seams, and blended layouts."""
 
 from dermis.frame.features.atlas.textures import atlas_constants as shader_constants
 

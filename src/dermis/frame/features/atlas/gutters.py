@@ -1,4 +1,4 @@
-"""Gutters of a stitched atlas, traced again over the surface of each person."""
+"""Gutters of a stitched atlas, whose sources are traced over the surface of each person at rest."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ _NO_NEIGHBOUR = 0xFFFFFFFF  # word of a side without skin across it
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Constant inputs of the passes that trace gutters.
+    """Inputs of the passes that trace paths from charts to the sources of gutter texels, constant for a mesh.
 
     starts : buffer of the start of each path, for gutter_trace.wgsl
-    sides : buffer of the triangle across each side of the mesh, for gutter_trace.wgsl
-    halvings : texel lists of each coarser atlas with gutters, for gutter_halve.wgsl
+    sides : buffer of the triangle across each edge of each triangle, for gutter_trace.wgsl
+    halvings : buffers of each coarser atlas with gutters: the finer gutter texels that each gutter texel
+        averages, by their names in gutter_halve.wgsl
     """
 
     starts: Buffer
@@ -36,7 +37,7 @@ class GutterTracing:
 
 
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
-    """Upload the constant inputs of tracing, for an atlas that has gutters."""
+    """Upload the constant inputs of gutter tracing, for an atlas that has gutters."""
     starts, sides = (device.buffer(words, "STORAGE") for words in (_start_words(atlas), _side_words(mesh)))
     pairs = pairwise((textures, *textures.coarser))
     halvings = tuple(_halving(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
@@ -44,7 +45,7 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 
 
 def with_own_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
-    """Return the atlas with empty gutter lists of its own, for `draw` to fill."""
+    """Return a copy of the atlas with separate, empty gutter buffers, which `draw` fills for a person."""
 
     def with_list(level: AtlasTextures) -> AtlasTextures:
         words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
@@ -54,7 +55,11 @@ def with_own_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
 
 
 def _start_words(atlas: Atlas) -> Words:
-    """Return (a, 5) words: texel, triangle and weights of the start of a path, and the fallback source."""
+    """Return (a, 5) words for gutter_trace.wgsl, one row for the path to each gutter texel.
+
+    The words are the packed texel, the triangle where the path starts, its two packed barycentric weights,
+    and the (x, y) source to use if tracing fails, as floats.
+    """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
     x, y = atlas.gutter.T.astype(np.uint32)
@@ -67,7 +72,10 @@ def _start_words(atlas: Atlas) -> Words:
 
 
 def _side_words(mesh: Mesh) -> Words:
-    """Return the (f, 3) words of the triangle across each side, for gutter_trace.wgsl."""
+    """Return (f, 3) words for gutter_trace.wgsl: the packed neighbour across each edge of each triangle.
+
+    A word holds the neighbouring triangle, its edge, and whether its orientation is reversed.
+    """
     neighbour, neighbour_side, flipped = side_neighbours(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     word = (neighbour.astype(np.uint32) << 3) | (neighbour_side.astype(np.uint32) << 1) | flipped
@@ -75,7 +83,7 @@ def _side_words(mesh: Mesh) -> Words:
 
 
 def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Return the texels of the finer gutter that each texel of the coarser gutter averages."""
+    """Upload, for each texel of the coarser gutter, the texels of the finer gutter that it averages."""
     width = int(finer.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -92,9 +100,9 @@ def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bi
 
 
 def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, head: HeadGeometry) -> None:
-    """Declare the passes that compute the source of each gutter texel.
+    """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
 
-    atlas : result of `with_own_gutters`
+    atlas : result of `with_own_gutters`, whose gutter buffers are filled
     head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)

@@ -1,4 +1,4 @@
-"""Passes of the atlas: stretch maps, stitched gutters, and blending of two layouts."""
+"""Passes of the atlas: stretch maps, stitched gutters, and the blend of two layouts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> N
 
 
 def draw_coarser(graph: Recorder, atlas: AtlasTextures) -> None:
-    """Declare the passes that fill the stretch maps of the coarser resolutions from the finest one."""
+    """Declare the passes that average the stretch map of the finest resolution for all coarser ones."""
     finer, halve = atlas.resources, program(graph.device, "atlas/stretch_halve.wgsl")
     for level in atlas.coarser:
         maps = {"finer": finer["stretch_map"], "reach_map": finer["reach_map"]}
@@ -38,16 +38,18 @@ def draw_coarser(graph: Recorder, atlas: AtlasTextures) -> None:
 
 
 def _no_edges(device: Device) -> Texture:
-    """Return a placeholder for the map of distances to the edges of charts."""
+    """Return a 1 x 1 placeholder for `edge_map`, the texel distances to chart edges, where it is not read."""
     return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))
 
 
 def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
-    """Declare the passes that fill the gutters of a texture of light.
+    """Declare the passes that copy light to the gutters of a texture from its sources across seams.
 
-    A list holds the light in between, because a pass cannot read and write the same texture.
+    A buffer holds the light in between, because a pass cannot read and write the same texture.
 
-    texel : format of the texture
+    stage : name of the stage in timings
+    light : texture of light over the atlas
+    texel : texture format of `light`
     """
     if atlas.gutter is None or atlas.gutter_light is None:
         return
@@ -62,9 +64,10 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
 
 
 def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, into: Texture) -> None:
-    """Declare the pass that fades from the first layout's light to the second's near the first's seams.
+    """Declare the pass that fades from the light of the first layout to that of the second near seams.
 
-    into : texture of the size of the first layout
+    first, second : layouts with different seams; the second is shown only near the seams of the first
+    into : texture for the result, as large as the atlas of the first layout
     """
     bound = {
         **second.bindings,  # with the atlas coordinates of the second layout

@@ -1,4 +1,4 @@
-"""Atlas as textures, prepared for a stretch correction and a treatment of seams."""
+"""Textures of the atlas on the device, for a chosen stretch correction and seam method."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SAME_SOURCE_TEXELS = 4.0
 
 
 def atlas_constants() -> dict[str, int | float]:
-    """Return the constants of shaders that read the atlas, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in shaders of the atlas, by name."""
     _, inner_b, inner_c = INNER_WEIGHTS
     tracing = {
         "inward": START_SHIFT,
@@ -45,13 +45,13 @@ class AtlasTextures:
 
     resources : textures by their shader names: atlas, stretch_map (filled by its pass), reach_map, and
         edge_map for two layouts and for feathered stretch; coarser resolutions have stretch_map and reach_map
-    sheared : whether blurs account for angles between u and v other than right ones
+    sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
     stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, or None
-    gutter, gutter_light : buffers of the gutter texels and of their light, None without any
+    gutter, gutter_light : buffers of the gutter texels and of their light, None without gutters
     gutter_texels : (a, 2) gutter texels, x and y
-    coarser : the atlas at half, a quarter, ... of the resolution; only of stitched layouts
-    median_texels_per_mm : median of the smaller of both densities at rest [texels/mm]
+    coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
+    median_texels_per_mm : median over texels of the smaller of the densities along u and v, at rest [texels/mm]
     """
 
     resources: dict[str, Texture]
@@ -65,17 +65,21 @@ class AtlasTextures:
     median_texels_per_mm: float = 0.0
 
     def mips_for(self, edge: str) -> tuple[AtlasTextures, ...]:
-        """Return the atlas at all resolutions that blurs with an edge mode may use, the finest first."""
+        """Return the atlas at all resolutions that blurs may use, the finest first.
+
+        edge : filter mode at the edges of charts; only "repeated" permits coarser resolutions
+        """
         return (self, *(self.coarser if edge == "repeated" else ()))
 
 
 def upload_atlas(
     device: Device, atlas: Atlas, stretch: str = "full", seams: SeamMethod = SEAM_METHODS["stitch"]
 ) -> AtlasTextures:
-    """Upload an atlas; its stretch map is filled by the stretch pass.
+    """Upload an atlas, with an empty stretch map that `draw_stretch` fills.
 
-    stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes one
-        density
+    stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes the same
+        texel density everywhere
+    seams : treatment of seams, which decides on the edge map and on feathering
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
@@ -99,15 +103,17 @@ def upload_atlas(
 
 
 def _mean_density(stretch: NDArray[np.float16]) -> float:
-    """Return the root mean square of the (n, 2) densities of texels [texels/mm]."""
+    """Return the root mean square of (n, 2) texel densities along u and v [texels/mm]."""
     return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
 
 
 def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
-    """Return the median over texels of the smaller density, along u or v [texels/mm].
+    """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    Non-negative half floats have the order of their 16-bit words, of which there are few: a histogram is
-    faster than sorting.
+    own : mask of the texels to count, those of charts without gutters
+
+    Non-negative half floats are ordered like their 16-bit patterns, so a histogram of these is faster than
+    sorting.
     """
     words = stretch.view(np.uint16)
     counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[own], minlength=1 << 16)
@@ -136,13 +142,16 @@ def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return the (r, 3) texel, triangle and weights of each entry for stretch_beyond.wgsl."""
+    """Return (r, 3) words for stretch_beyond.wgsl: each gutter texel, and the surface point it copies.
+
+    The words are the packed texel, the triangle, and two packed barycentric weights.
+    """
     (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.outside, atlas.border_weights))
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)
 
 
 def _coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
-    """Return the atlas at half, a quarter, ... of its resolution, computed or read from the disk cache."""
+    """Upload the atlas at half, a quarter, ... of its resolution, computed or read from the disk cache."""
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
     while count < MAX_HALVINGS and len(mip.reach) % (2 << count) == 0:
@@ -161,9 +170,9 @@ def _coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
 
 
 def pack_surface_points(triangle: NDArray[np.integer], barycentric: NDArray[np.number]) -> NDArray[np.uint32]:
-    """Return (n, n, 2) words: the triangle plus 1, and two packed barycentric weights.
+    """Pack surface points into (n, n, 2) words: the triangle index plus 1, and two barycentric weights.
 
-    triangle : (n, n) triangles, -1 for none
+    triangle : (n, n) triangle indices, -1 for texels without a surface
     barycentric : (n, n, 2) weights of the second and third corner [1/65535]
     """
     packed = barycentric[..., 0].astype(np.uint32) | (barycentric[..., 1].astype(np.uint32) << 16)
@@ -171,7 +180,7 @@ def pack_surface_points(triangle: NDArray[np.integer], barycentric: NDArray[np.n
 
 
 def edge_distances(atlas: Atlas) -> NDArray[np.float32]:
-    """Return the (n, n) approximate distances of texels to the edge of their chart [texels]."""
+    """Return the approximate distance of each texel to the edge of its chart, (n, n) [texels]."""
     from scipy.ndimage import distance_transform_edt
 
     # charts can be adjacent without an empty texel
@@ -184,8 +193,9 @@ def edge_distances(atlas: Atlas) -> NDArray[np.float32]:
 class AtlasMip:
     """Masks and gutters of an n x n atlas at one resolution.
 
-    covered, lit : (n, n) masks of texels with light, and of those among them that are no gutter
-    reach : (n, n, 4) numbers of connected texels of the same chart to the left, right, up and down
+    covered : (n, n) mask of the texels that hold light, gutters included
+    lit : (n, n) mask of the texels whose own surface is lit, gutters excluded
+    reach : (n, n, 4) number of connected texels of the same chart to the left, right, up and down
     gutter, source : (a, 2) gutter texels (x, y), and the positions whose light they copy [texels]
     """
 
@@ -197,7 +207,10 @@ class AtlasMip:
 
 
 def halve_mip(mip: AtlasMip) -> AtlasMip:
-    """Return the atlas at half resolution; gutter texels next to a chart are averaged, others stitched."""
+    """Return the masks and gutters of an atlas at half its resolution.
+
+    Gutter texels next to a chart become averages of finer texels; gutter texels farther away stay stitched.
+    """
     from scipy.ndimage import binary_dilation
 
     own = _quads(mip.lit)
@@ -209,12 +222,12 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
 
 
 def _quads(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Return the (4, n/2, n/2) texels (0, 0), (1, 0), (0, 1), (1, 1) of each 2 x 2 square."""
+    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), with their corners in row order."""
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
 def _reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return the reach of 2 x 2 squares, in squares: the least reach of their counted texels."""
+    """Return the reach of each 2 x 2 square, in squares: the smallest reach of its texels in `counted`."""
     squares = np.zeros((*counted.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
@@ -226,7 +239,7 @@ def _reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _gutter(mip: AtlasMip, stitched: NDArray[np.bool_]) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Return the squares that are stitched, and the mean sources of their texels."""
+    """Return the (x, y) of stitched squares, and the mean position of the sources of their texels."""
     x, y = (mip.gutter.astype(np.int64) // 2).T
     used = stitched[y, x]
     source = mip.source[used].astype(np.float64)

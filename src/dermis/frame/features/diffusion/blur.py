@@ -1,4 +1,4 @@
-"""Passes that fill the blur pyramid: each level is the previous one blurred along u, then along v."""
+"""Passes that fill the blur pyramid: each level is the previous level blurred along u, then along v."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
 
 def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-    """Fill level k with level 0 blurred by a Gaussian of variance blur.variance_mm2[k - 1]."""
+    """Declare the passes that fill each level k with level 0 blurred by the k-th Gaussian of `blur`."""
     variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
@@ -55,7 +55,11 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
 def _halve(
     graph: Recorder, levels: PyramidLevels, source: TextureOrView, k: int, halvings: int
 ) -> TextureOrView:
-    """Fill level k at half its resolution, and return the view of it."""
+    """Average texels of a level to fill level k at half its resolution; return the view of level k.
+
+    source : view of the level at the finer resolution
+    halvings : how often the resolution of the result is halved
+    """
     halved = levels.layer(k, halvings)
     shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
     _dispatch(graph, shader, {"source": source, "stored": halved}, levels.size >> halvings)
@@ -68,7 +72,13 @@ def _dispatch(graph: Recorder, shader: ComputeProgram, bindings: MutableBindings
 
 
 def _axis_program(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> ComputeProgram:
-    """Return the program that blurs along u (axis 0) or along v (axis 1)."""
+    """Return the program that blurs along one axis of the atlas.
+
+    texel : texture format of the levels
+    axis : 0 for u, 1 for v
+    sheared : whether to account for an angle between u and v that is not a right angle
+    edge : filter mode at the edges of charts
+    """
     table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
     constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGES.index(edge)))
     return program(device, "diffusion/diffuse.wgsl", constants, texel, texel)
@@ -85,7 +95,7 @@ def _kernel_texture(device: Device) -> Texture:
 def _spread_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
-    """Yield the members of the shader's struct `Spread` for each blurred level."""
+    """Yield, for each blurred level, the variances of the shader's struct `Spread`, resampling included."""
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = level_halvings > source_halvings

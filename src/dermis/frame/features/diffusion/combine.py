@@ -1,4 +1,4 @@
-"""The pass that sums the blurred levels by their weights."""
+"""Pass that sums the blurred levels, weighted by the Gaussians of the profile."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dermis.optics.gaussians import MAX_GAUSSIANS
 
 
 def make_sum(device: Device, side: int) -> Texture:
-    """Allocate the texture for the sum, side x side texels."""
+    """Allocate the texture for the weighted sum of blurred levels, side x side texels."""
     return make_texture(device, (side, side), FLOATS, name="sum of blurred light")
 
 
@@ -23,8 +23,9 @@ def draw(
     transmitted: Texture | None = None,
     lost: Texture | None = None,
 ) -> None:
-    """Sum all blurred levels by their weights, from coarse to fine resolution.
+    """Declare the passes that sum all blurred levels by their weights, from coarse to fine resolution.
 
+    target : texture for the sum
     transmitted : texture of light through thin parts to be added, None for none
     lost : texture of the fraction of blurred light that thin parts do not return, None for none
     """
@@ -63,5 +64,5 @@ def draw(
 
 
 def no_light(device: Device) -> Texture:
-    """Return a placeholder of 1 x 1 texels for a texture of light that the shader does not read."""
+    """Return a 1 x 1 placeholder for a texture of light that the shader does not read."""
     return device.cached("no light", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))

@@ -1,4 +1,4 @@
-"""Gaussian kernels of exact variance on whole texels, and chains of blurs at decreasing resolution."""
+"""Discrete Gaussian kernels with exact variance, and chains of blurs at decreasing resolution."""
 
 from __future__ import annotations
 
@@ -38,18 +38,23 @@ _MIN_VARIANCE_RATIO = 1.5  # between an intermediate level and any other
 
 
 def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
-    """Return the number of taps on each side of the centre for a variance [step^2]."""
+    """Return the number of taps of a Gaussian kernel on each side of its centre.
+
+    variance : variance of the kernel [step^2], where a step is the distance between taps
+    truncation : half-width of the kernel in standard deviations
+    """
     return math.ceil(truncation * math.sqrt(variance))
 
 
 @cache
 def kernel_table() -> NDArray[np.float32]:
-    """Return q = w(1) / w(0) of kernels w(n) = q^(n^2), by variance (rows) and taps on each side (columns).
+    """Return the ratio q of kernels w(n) = q^(n^2) with exact variance, (rows, columns) [-].
 
-    Rows are spaced by 1/64 step^2.
+    w(n) is the weight of the tap n steps from the centre, so q = w(1) / w(0). Rows are variances in steps of
+    1/64 step^2, columns are numbers of taps on each side of the centre.
 
-    A Gaussian that is sampled and truncated loses variance, a narrow one most of it. So q is solved for each
-    number of taps such that the kernel has the requested variance.
+    Sampling and truncation reduce the variance of a Gaussian, most of all that of a narrow one. So q is
+    solved for each number of taps such that the kernel has the requested variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MAX_TAPS + 1)
@@ -73,14 +78,17 @@ def _kernel_variance(q: Floats, within_kernel: NDArray[np.bool_]) -> Floats:
 def add_intermediate_levels(
     variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Return the variances [mm^2] of the cheapest chain of blurs, and the indices of its intermediate levels.
+    """Return the variances of the cheapest chain of blurs [mm^2], and the indices of its intermediate levels.
+
+    Blurs of intermediate width let later levels use half the resolution, which saves texel reads.
 
     variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
-    texels_per_mm : density of the atlas
+    texels_per_mm : texel density of the atlas at full resolution
     max_halvings : how often the resolution may be halved
 
     An intermediate level is just wide enough for the next level to have half the resolution, by the rule of
-    `choose_halvings`, and at least as wide as its texels. Index 0 is the unblurred level.
+    `choose_halvings`, and its standard deviation is at least one of its texels. Index 0 is the unblurred
+    level.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
@@ -107,7 +115,12 @@ def _add_intermediate_levels(
 
 
 def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
-    """Return the approximate number of texel reads of a chain of blurs, per texel of the full resolution."""
+    """Estimate the texel reads of a chain of blurs, per texel of the full resolution.
+
+    variance_mm2 : increasing variances of the levels [mm^2]
+    texels_per_mm : texel density of the atlas at full resolution
+    max_halvings : how often the resolution may be halved
+    """
     halvings = choose_halvings(np.array(variance_mm2), texels_per_mm, max_halvings)
     cost = 0.0
     for (before, after), halved in zip(pairwise([0.0, *variance_mm2]), halvings[1:], strict=True):

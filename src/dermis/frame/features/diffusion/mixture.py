@@ -1,4 +1,4 @@
-"""Profiles mixed by a map: blend weights over the atlas, and the light of each profile."""
+"""Profiles that are blended by a map: blend weights over the atlas, and the light of each profile."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _CACHE_SIZE = 4
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Textures for skin whose profile is mixed by a map from a first profile and one or two others.
+    """Textures for skin whose profile is blended by a map from a first profile and one or two others.
 
     uv_weights : texture of the blend weights of the other profiles over uv
-    entering : pyramids for the light that enters skin of each other profile
+    entering : one pyramid for each other profile: the light that enters, times its blend weight
     atlas_weights : textures of these blend weights over the atlas, one for each layout
-    sums : texture array: the first layer is the light by the first profile alone; two layers for each other
-        profile hold what it changes, by the blend weights where light leaves and where it enters
+    sums : texture array of exitance: layer 0 for the first profile alone, then two layers for each other profile
+        with its difference from the first: of all light, and of the light in its `entering` pyramid
     """
 
     uv_weights: Texture
@@ -50,7 +50,12 @@ class Mixture:
 def make_mixture(
     device: Device, uv_weights: Texture, entering: tuple[PyramidLevels, ...], layouts: int
 ) -> Mixture:
-    """Allocate the textures of a mixture for a number of atlas layouts."""
+    """Allocate the textures of a mixture of profiles.
+
+    uv_weights : texture of the blend weights over uv
+    entering : pyramids for the light that enters, one for each profile but the first
+    layouts : number of atlas layouts
+    """
     side, texel = entering[0].size, entering[0].texel
     atlas_weights = tuple(
         make_texture(device, (side, side), texel, name="shares of profiles") for _ in range(layouts)
@@ -61,12 +66,15 @@ def make_mixture(
 
 
 def sum_count(others: int) -> int:
-    """Return the number of layers of `Mixture.sums` for a number of other profiles."""
+    """Return the number of layers of `Mixture.sums`.
+
+    others : number of profiles besides the first
+    """
     return 1 + 2 * others
 
 
 def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Texture:
-    """Upload (h, w, 2) blend weights as a texture with all its mip levels."""
+    """Upload the (h, w, 2) blend weights of two profiles as a texture with all its mip levels."""
     height, width = weights.shape[:2]
     mips = mip_chain(np.pad(weights, ((0, 0), (0, 0), (0, 2))))
     texture = make_texture(device, (width, height), HALVES, mips=len(mips), use="map")
@@ -76,9 +84,11 @@ def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Textur
 
 
 def load_blend_weights(name: str) -> NDArray[np.float32]:
-    """Return the (h, w, 2) blend weights of an image file, which is read again only when it has changed.
+    """Return the (h, w, 2) blend weights in an image file, cached until the file changes.
 
-    Raises DermisError for a file that is missing or not such an image.
+    name : path of the image
+
+    Raises DermisError for a file that is missing or is not an image of blend weights.
     """
     path = checked_path(name, "a map of profiles")
     try:
@@ -95,9 +105,9 @@ def _load(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
 
 
 def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, index: int) -> None:
-    """Fill the blend weights over the atlas, gutters included.
+    """Declare the pass that resamples the blend weights from uv to the atlas, gutters included.
 
-    index : number of the layout
+    index : index of the atlas layout
     """
     into, texel = mixture.atlas_weights[index], mixture.entering[0].texel
     bindings: Bindings = {
@@ -112,10 +122,11 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, inde
 
 
 def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, other: int) -> None:
-    """Fill the unblurred level of another profile: all light that enters, times the profile's blend weight.
+    """Declare the pass that fills level 0 of another profile: the entering light times its blend weight.
 
-    index : number of the layout
-    other : number of the profile, 0 for the first of the others
+    levels : pyramid whose level 0 holds all light that enters
+    index : index of the atlas layout
+    other : index of the profile among those besides the first
     """
     entering, device, texel = mixture.entering[other], graph.device, levels.texel
     shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", other),), texel, texel)
@@ -126,9 +137,10 @@ def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, inde
 
 
 def draw(graph: Recorder, mixture: Mixture, index: int, target: Texture) -> None:
-    """Mix the sums of blurred light, and store the packed blend weights in the alpha channel.
+    """Declare the pass that blends the sums of all profiles; the alpha channel packs the blend weights.
 
-    index : number of the layout
+    index : index of the atlas layout
+    target : texture for the blended exitance
     """
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
     weights = mixture.atlas_weights[index]

@@ -1,4 +1,4 @@
-"""Diffusion profiles of skins, fitted again when pigments or layers change between frames."""
+"""Diffusion profiles of skin, fitted again when pigments or layers change between frames."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _CACHE_SIZE = 4  # the current skin, one to compare with, and two previous ones
 
 
 class SkinProfiles:
-    """Cache of the diffusion profiles of recent skins.
+    """Cache of the diffusion profiles of the last few skins.
 
-    A fit that starts from a similar profile is several times faster. Skin with pigments alone starts from
-    the published profile, so that a person's profile does not depend on the people before; skin with own
-    layers or structure starts from the last fit of the same kind.
+    A fit that starts from a similar profile is several times faster. Skin described by pigments alone starts
+    from the published profile, so that results do not depend on the people rendered before. Skin with layers
+    or a structure of its own starts from the last fit of skin with as many layers.
     """
 
     def __init__(self) -> None:
@@ -33,20 +33,22 @@ class SkinProfiles:
         self._current: tuple[Skin, GaussianSum] | None = None
 
     def profile(self, skin: Skin) -> GaussianSum:
-        """Return the diffusion profile of a skin, its first one if a map mixes several.
+        """Return the diffusion profile of a skin, or the first of those that a map blends.
 
-        Files are read again when the skin changes, not for each frame of the same skin.
+        Profile files are read again when the skin changes, not for each frame of the same skin.
 
-        Raises DermisError for pigments or layers with a profile that is not made of them.
+        Raises DermisError for pigments or layers whose profile was not computed from pigments or layers.
         """
         if self._current is None or self._current[0] is not skin:
             self._current = skin, self._load_or_fit(skin)
         return self._current[1]
 
     def mixture(self, skin: Skin) -> ProfileMix:
-        """Return all profiles of a skin, and the blend weights of all but the first; None without others.
+        """Return all profiles of a skin, and the blend weights of all but the first.
 
-        Raises DermisError for a map without other profiles, and for other profiles without a map.
+        For a single profile the weights are None.
+
+        Raises DermisError for a blend map without other profiles, and for other profiles without a blend map.
         """
         first = self.profile(skin)
         if not skin.other_profiles and skin.profile_map is None:
@@ -85,5 +87,5 @@ def _tissue(skin: Skin) -> tuple[object, ...]:
 
 
 def _kind(skin: Skin) -> tuple[object, ...]:
-    """Return a key that is equal for skins with similar profiles."""
+    """Return a key that is equal for skins whose profiles are good initial guesses for one another."""
     return skin.profile, skin.pigments and skin.pigments.structure, len(skin.layers)

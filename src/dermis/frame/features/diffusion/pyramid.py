@@ -1,4 +1,4 @@
-"""The blur pyramid: textures, formats and resolutions of its levels."""
+"""Blur pyramid: textures, formats and resolutions of its levels."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ MIN_WEIGHT = 1e-12
 class PyramidLevels:
     """Textures of the blur pyramid: unblurred light as level 0, its blurred levels, and scratch space.
 
-    stacks : one texture for each number of halvings, with a layer for each level of that resolution; its
-        first layer, but that of the full resolution, is the last finer level at half its resolution
-    first : level in the first layer of each stack
-    scratch : texture between the passes along u and v
-    size : texels along the side of the full resolution
+    stacks : one texture array for each resolution, finest first, with a layer for each of its levels; at coarser
+        resolutions, layer 0 is a reduced copy of the last level of the next finer resolution
+    first : index of the level in layer 0 of each stack
+    scratch : texture for light that is blurred along u but not yet along v
+    size : side of the atlas at full resolution [texels]
     texel : texture format
     """
 
@@ -42,14 +42,14 @@ class PyramidLevels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, k: int, halvings: int = 0) -> TextureView:
-        """Return a view of level k at one resolution."""
+        """Return a view of level k in the stack whose resolution is halved `halvings` times."""
         if (k, halvings) not in self._views:
             layer = k - self.first[halvings]
             self._views[k, halvings] = make_view(self.stacks[halvings], layer=layer)
         return self._views[k, halvings]
 
     def scratch_view(self, halvings: int = 0) -> TextureView:
-        """Return a view of the scratch texture at one resolution."""
+        """Return a view of the scratch texture at the resolution that is halved `halvings` times."""
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = make_view(self.scratch, mip=halvings)
         return self._views[-1, halvings]
@@ -61,11 +61,11 @@ class Blur:
 
     variance_mm2, weight : (k,) increasing variances [mm^2] and (k, 3) weights [-] of the Gaussians
     halvings : how often the resolution of each level is halved, starting with the unblurred level
-    scale : factor from irradiance to the values that the levels store
-    edge : what blurs read beyond a chart and its gutter: "repeated", "cleared" or "skipped"
+    scale : factor from irradiance to the texels of the levels
+    edge : texels that blurs read beyond a chart and its gutter: "repeated", "cleared" or "skipped"
     clear : irradiance that blurs read from empty texels when the edge is "cleared"
-    intermediate_levels : indices of levels without weight, which only serve as the source of others
-    weight_changes : (k, 3) differences of weights from the first profile, one array for each other profile
+    intermediate_levels : indices of levels without weight, which only serve as the source of wider blurs
+    weight_changes : (k, 3) difference of weights from the first profile, one array for each other profile
     """
 
     variance_mm2: Floats
@@ -79,12 +79,17 @@ class Blur:
 
     @property
     def profile_levels(self) -> tuple[int, ...]:
-        """Return the indices of all levels but the intermediate ones."""
+        """Return the indices of level 0 and of the levels that have weights in the profile."""
         return tuple(k for k in range(len(self.halvings)) if k not in self.intermediate_levels)
 
 
 def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> PyramidLevels:
-    """Allocate the pyramid for an atlas of size x size texels, in the texture format `texel`."""
+    """Allocate the textures of a blur pyramid.
+
+    size : side of the atlas at full resolution [texels]
+    halvings : how often the resolution of each level is halved, for each layout
+    texel : texture format
+    """
     ranges = levels_by_resolution(halvings)
     stacks = tuple(
         make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
@@ -97,7 +102,10 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Py
 
 
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
-    """Return the range of levels that are stored at each resolution, finest first."""
+    """Return the range of levels that each resolution stores, finest first.
+
+    A coarser resolution also stores a reduced copy of the last finer level. A range covers all layouts.
+    """
     coarsest = max(map(max, halvings))
     return tuple(
         range(
@@ -109,7 +117,7 @@ def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
 
 
 def half_precision_scale(texel: str, brightest: float) -> float:
-    """Return the factor that brings light into the range of half floats; 1 for 32-bit floats.
+    """Return the factor that brings irradiance into the range of half floats; 1 for 32-bit floats.
 
     texel : texture format of the levels
     brightest : sum of the irradiances of all lights; skin close to a light receives more
@@ -127,10 +135,12 @@ def choose_halvings(
     """Return how often the resolution of each level may be halved, starting with the unblurred level.
 
     variance_mm2 : (k,) increasing variances of the blurred levels [mm^2]
-    texels_per_mm : density of the atlas
+    texels_per_mm : texel density of the atlas at full resolution
+    max_halvings : how often any level may be halved
 
-    Texels twice as large need a blur four times as wide: the error in sparse parts of a map then stays the
-    same fraction of the image (docs/performance.md lists the errors).
+    A level is halved once the standard deviation of its source reaches a multiple of the squared texel side:
+    twice the texel side needs four times the blur. The error where texels are sparse then stays the same
+    fraction of the image (docs/performance.md lists the errors).
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):

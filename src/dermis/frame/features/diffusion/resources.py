@@ -1,4 +1,4 @@
-"""Resources of the diffusion: the blur pyramid, the blurs of each layout, and mixed profiles."""
+"""Resources of the diffusion: the blur pyramid, the blurs of each atlas layout, and blended profiles."""
 
 from __future__ import annotations
 
@@ -18,27 +18,33 @@ from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """Interface by which a technique chooses the blurs of an atlas."""
+    """Interface of a technique that chooses the formats and resolutions of its blurs."""
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Allocate the blur pyramid."""
+        """Allocate the blur pyramid for an atlas of side x side texels."""
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Return the split with intermediate levels of weight 0, and their indices."""
+        """Return the Gaussians with added ones of weight 0 that make blurs cheaper, and the levels of those.
+
+        edge : filter mode at the edges of charts
+        """
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, starting with the unblurred level."""
+        """Return how often the resolution of each level is halved, starting with the unblurred level.
+
+        edge : filter mode at the edges of charts
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Textures of the diffusion, and its blurs.
+    """Resources of the diffusion.
 
-    levels : the blur pyramid
-    blurs : the blurs of each layout, empty when no light is blurred
-    mixture : textures of profiles mixed by a map, None for a single profile
+    levels : textures of the blur pyramid, which all layouts use in turn
+    blurs : Gaussian blurs of each atlas layout, empty when no light is blurred
+    mixture : textures of profiles that are blended by a map, None for a single profile
     """
 
     levels: PyramidLevels
