@@ -11,7 +11,7 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 from rigged_head import write_rigged_head
 
-from dermis.formats.deformable_mesh import DeformableMesh, influences
+from dermis.formats.deformable_mesh import DeformableMesh, point_bone_influences
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person import Human
 from dermis.images.colour import decode_srgb_levels
@@ -137,7 +137,7 @@ def test_four_bones_are_those_that_miss_least() -> None:
     points = DeformableMesh(Human().head())
     rig, finer = points.rig, points.refinement
     assert finer is not None and rig.skeleton is not None
-    bone, bone_weight = influences(rig, finer)
+    bone, bone_weight = point_bone_influences(rig, finer)
     assert bone_weight.min() >= 0 and np.abs(bone_weight.sum(axis=1) - 1).max() < 1e-12
     control = np.zeros((len(rig.positions_mm), len(rig.skeleton.names)))
     np.add.at(control, (np.arange(len(control))[:, None], rig.skeleton.bone), rig.skeleton.weight)

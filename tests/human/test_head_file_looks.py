@@ -93,7 +93,7 @@ def test_hairs_are_closed_tubes_of_the_hairs_width() -> None:
     head = PERSON.head(subdivide=0)
     assert head.strands is not None
     fibres = FibreTubes.from_strands(head.strands, head.mesh, 100_000, 5)
-    places, normals = fibres.posed(head.mesh.points_mm)
+    places, normals = fibres.pose_vertices(head.mesh.points_mm)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
     rings = places.reshape(len(head.strands), -1, 3)[:, :3]
     middle = head.strands.knot_positions_mm(head.mesh, head.mesh.points_mm)[:, 0]

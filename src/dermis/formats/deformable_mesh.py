@@ -1,7 +1,7 @@
-"""Deformation of exported meshes: morph targets and bone weights of refined vertices.
+"""Deformation data of exported meshes: morph targets and bone weights of every vertex.
 
-Other programs use four bones per vertex. For vertices of a refined mesh these are chosen so that rotations
-move them to where the rotated control points would.
+Export formats allow four bones per vertex. For vertices of a subdivided mesh, bones and weights are fitted so
+that linear blend skinning moves a vertex to where subdivision of the skinned control mesh would place it.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _PRIOR_MM2 = 1.0  # penalty for deviations from the interpolated weights
 
 
 class VertexTarget(NamedTuple):
-    """Morph target of a mesh: displaced vertices, and their changes at weight 1.
+    """Morph target of a mesh, sparse: the vertices that change, and their changes at weight 1.
 
-    vertex : (n,)
-    delta_mm, normal : (n, 3) changes of position and normal
+    vertex : (n,) indices of the changed vertices
+    delta_mm, normal : (n, 3) changes of position [mm] and of the unit normal
     """
 
     vertex: Index
@@ -45,18 +45,18 @@ class VertexTarget(NamedTuple):
 
 @dataclass(frozen=True)
 class DeformableMesh:
-    """Vertices of a head's mesh, with morph targets and bone weights."""
+    """Mesh of a head with the morph targets and bone weights that its rig gives each vertex, for export."""
 
     head: Head
 
     @property
     def rig(self) -> Rig:
-        """Return the rig of the control points."""
+        """Return the head's rig, which acts on the control points."""
         return self.head.control
 
     @cached_property
     def refinement(self) -> csr_array | None:
-        """Return the matrix (q, p) from control points to mesh points, or None if they are the same."""
+        """Return the subdivision matrix (q, p), control points to mesh points; None without subdivision."""
         from scipy.sparse import csr_array
 
         stencils = self.rig.stencils
@@ -87,7 +87,7 @@ class DeformableMesh:
         return vertex_normals(self.positions_mm, mesh.point, mesh.triangles)
 
     def targets(self) -> Iterator[VertexTarget]:
-        """Yield each morph target."""
+        """Yield the morph targets in the order of the rig."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
             delta = self._refine(self._control_displacements(number))
@@ -98,7 +98,7 @@ class DeformableMesh:
             yield VertexTarget(vertex, delta_mm[vertex], normal[vertex])
 
     def _normal_changes(self, delta_mm: Floats) -> Floats:
-        """Return the changes of vertex normals due to displacements [mm], (v, 3)."""
+        """Return the changes of unit normals (v, 3) when vertices are displaced by `delta_mm` (v, 3) [mm]."""
         mesh, change = self.head.mesh, np.zeros_like(delta_mm)
         moves = np.asarray(delta_mm.any(axis=1))
         changed = moves[mesh.triangles].any(axis=1)
@@ -117,32 +117,32 @@ class DeformableMesh:
 
     @cached_property
     def bone_influences(self) -> tuple[Numbers, Floats]:
-        """Return four bones and weights of each vertex, (v, 4) each."""
-        bone, weight = influences(self.rig, self.refinement)
+        """Return the indices and the weights of four bones for each vertex, (v, 4) each."""
+        bone, weight = point_bone_influences(self.rig, self.refinement)
         dtype = np.uint8 if bone.max() < 256 else np.uint16
         point = self.head.mesh.point
         return bone[point].astype(dtype), weight[point].astype(np.float32)
 
     def _control_displacements(self, target: int) -> Doubles:
-        """Return displacements of the control points by a target, (p, 3) [mm]."""
+        """Return the displacements of the control points by a morph target at weight 1, (p, 3) [mm]."""
         targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
         part = targets.rows(target)
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
     def _refine(self, values: Doubles) -> Doubles:
-        """Return values at the points of the mesh (q, 3) from values at the control points (p, 3)."""
+        """Interpolate vectors at control points (p, 3) to the points of the subdivided mesh, (q, 3)."""
         return values if self.refinement is None else np.asarray(self.refinement @ values)
 
 
-def influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
-    """Return four bones and weights of each point of a mesh, (q, 4); weights sum to 1.
+def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
+    """Return four bone indices and weights for each of q mesh points, (q, 4) each; weights sum to 1.
 
-    refinement : (q, p) matrix from control points to points of the mesh, None if they are the same
+    refinement : (q, p) subdivision matrix from control points to mesh points; None without subdivision
 
-    Weights of control points are kept. A refined point may follow more than four bones, and the mean of
-    differently rotated points is not a rotation of their mean: the four bones and weights are chosen for the
-    smallest squared distance over rotations of each bone about any axis.
+    Without subdivision, the weights of the rig are kept. A subdivided point may depend on more than four
+    bones, and linear blend skinning does not commute with subdivision: the four bones and weights minimise
+    the squared distance to the subdivided point, averaged over rotations of each bone about any axis.
     """
     skeleton = rig.skeleton
     assert skeleton is not None
@@ -158,7 +158,7 @@ def influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
 
 
 def _bone_weights(skeleton: Skeleton) -> Doubles:
-    """Return the weight of each bone at each control point, (p, b)."""
+    """Return the weight of each of b bones at each of p control points, (p, b); rows sum to 1."""
     count = len(skeleton.bone)
     weights = np.zeros((count, len(skeleton.names)))
     np.add.at(weights, (np.arange(count)[:, None], skeleton.bone), skeleton.weight)
@@ -168,7 +168,11 @@ def _bone_weights(skeleton: Skeleton) -> Doubles:
 def _fit_weights(
     positions_mm: Doubles, skeleton: Skeleton, control_weights: Doubles, refinement: csr_array
 ) -> Doubles:
-    """Return weights (q, b) of refined points with at most four bones each."""
+    """Return bone weights (q, b) of subdivided points, at most four of them above 0 for each point.
+
+    control_weights : (p, b) bone weights of the control points
+    refinement : (q, p) subdivision matrix from control points to mesh points
+    """
     weights = np.asarray(refinement @ control_weights)
     weights[weights < _MIN_WEIGHT] = 0.0
     descendants = _descendants(skeleton)
@@ -196,7 +200,7 @@ def _fit_weights(
 
 
 def _descendants(skeleton: Skeleton) -> Doubles:
-    """Return a matrix (b, b) that is 1 where the second bone is the first or one of its descendants."""
+    """Return a matrix (b, b): element (i, j) is 1 where bone j is bone i or a descendant of it, else 0."""
     descendants = np.eye(len(skeleton.names))
     for bone, parent in enumerate(skeleton.parent.tolist()):
         if parent >= 0:
@@ -211,11 +215,14 @@ def _quadratic_error(
     refinement: csr_array,
     descendants: Doubles,
 ) -> tuple[Doubles, Doubles]:
-    """Return H (n, u, u) and g (n, u) of the squared error w H w - 2 g w of points by weights w [mm2].
+    """Return H (n, u, u) and g (n, u) of the squared error w H w - 2 g w [mm²] of skinned points.
 
-    control_motion : (p, b) fraction of each bone's rotation that each control point follows, also by its
-        descendants
-    descendants : (b, u) 1 where a candidate bone is another bone or one of its descendants
+    w are the weights of u candidate bones for each of n points.
+
+    control_motion : (p, b) fraction of each bone's rotation that each control point follows, as the sum of
+        the weights of the bone and of its descendants
+    refinement : (n, p) subdivision matrix from control points to the n points
+    descendants : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """
     points = np.asarray(refinement @ positions_mm)
     hessian = np.zeros((len(points), descendants.shape[1], descendants.shape[1]))
@@ -230,7 +237,10 @@ def _quadratic_error(
 
 
 def _best_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
-    """Return non-negative weights (n, u), at most four of them above 0, with sum 1 and the smallest error."""
+    """Return the weights w (n, u) that minimise w H w - 2 g w: non-negative, sum 1, at most four above 0.
+
+    hessian, gradient : H (n, u, u) and g (n, u), see `_quadratic_error`
+    """
     count, bones = gradient.shape
     smallest, best = np.full(count, np.inf), np.zeros(gradient.shape)
     for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, INFLUENCES + 1)):

@@ -1,4 +1,4 @@
-"""Loading of meshes and rigs from files of any unit, up axis and uv origin, with a disk cache."""
+"""Loading of meshes and rigs from files with any unit, up axis and uv origin, with a disk cache."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
 _CACHE_VERSION = 5  # increment when `load_rigged` returns other results for the same file
-_MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
-_TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
-_SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
-_NAMES = [
-    *_MESH,
+_MESH_FIELDS = [field.name for field in fields(Mesh) if field.name != "materials"]
+_TARGET_FIELDS = [field.name for field in fields(MorphTargets) if field.name != "names"]
+_SKELETON_FIELDS = [field.name for field in fields(Skeleton) if field.name != "names"]
+_ARRAY_NAMES = [
+    *_MESH_FIELDS,
     "outline",
     "metadata",
     "control",
-    *(f"target {name}" for name in _TARGETS),
-    *(f"bone {name}" for name in _SKELETON),
+    *(f"target {name}" for name in _TARGET_FIELDS),
+    *(f"bone {name}" for name in _SKELETON_FIELDS),
 ]
 _EMPTY = np.zeros(0, np.float32)
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -78,7 +78,7 @@ def load_rigged(
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
-    load = partial(_load, source, unit, v_origin, up, opaque, eye_groups)
+    load = partial(_load_uncached, source, unit, v_origin, up, opaque, eye_groups)
     is_glb = source.suffix.lower() == ".glb" and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
     if not data or b'"uri"' in data:  # parts of it are in other files
@@ -87,7 +87,7 @@ def load_rigged(
     return cached_rigged(data, repr((default_name, unit, v_origin, up, opaque, eye_groups)), load)
 
 
-def _load(
+def _load_uncached(
     source: Path,
     unit: float,
     v_origin: Origin,
@@ -95,7 +95,10 @@ def _load(
     opaque: tuple[str, ...],
     eye_groups: tuple[str, ...],
 ) -> RiggedMesh:
-    """Load mesh and rig without the disk cache."""
+    """Load mesh and rig without the disk cache; for the parameters see `load_rigged`.
+
+    unit : length of the file's unit [mm]
+    """
     with np.errstate(all="ignore"), parsing(source, "a mesh", *MALFORMED_DATA_ERRORS):
         mesh_file = read_mesh_file(source)
         part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
@@ -104,10 +107,10 @@ def _load(
         positions, normals = to_y_up(unit * part.positions, up).astype(np.float32), to_y_up(part.normals, up)
         uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
         check_arrays(positions, uv, part.triangles, source)
-        material, materials = _materials(mesh_file.parts, opaque, eye_groups, source)
+        material, materials = _triangle_materials(mesh_file.parts, opaque, eye_groups, source)
         used, corners = compact_vertices(part.triangles)
         vertices = select_vertices(part, used)
-        point = weld(np.column_stack((positions, _separation_numbers(mesh_file.parts)))[used])
+        point = weld(np.column_stack((positions, _weld_groups(mesh_file.parts)))[used])
         if mesh_file.is_deformable:
             point = split_points(point, vertices, to_head[:3, :3], source)
         arrays = positions[used], uv[used], corners, material, materials, normals[used], point
@@ -119,8 +122,8 @@ def _load(
     return RiggedMesh(mesh, rig)
 
 
-def _separation_numbers(parts: list[MeshPart]) -> Floats:
-    """Return a number for each vertex, (v,): only coincident vertices with the same number are welded."""
+def _weld_groups(parts: list[MeshPart]) -> Floats:
+    """Return a weld group for each vertex, (v,): coincident vertices of different groups are not welded."""
     numbers = [number if part.separate else 0 for number, part in enumerate(parts, start=1)]
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in parts])
 
@@ -133,10 +136,14 @@ def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
     return np.where(np.abs(flipped - clamped) <= UV_TOLERANCE, clamped, flipped)
 
 
-def _materials(
+def _triangle_materials(
     parts: list[MeshPart], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
 ) -> tuple[Ints, tuple[Material, ...]]:
-    """Return the material index of each triangle (f,) and the materials, in the order of the file."""
+    """Return the material index of each triangle (f,), and the materials in the order of the file.
+
+    opaque : names of groups that are not skin
+    eye_groups : names of groups that contain eyeballs
+    """
     unnamed = (source.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
     is_opaque = _match_groups(groups, opaque, "opaque", source)
@@ -156,7 +163,10 @@ def _materials(
 def _match_groups(
     groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
 ) -> list[bool]:
-    """Return whether each group is named by an option; an unknown name is refused."""
+    """Return for each group of triangles whether its name is in `names`; a name that no group has is refused.
+
+    option : argument of `load_rigged` with these names, for the error
+    """
     folded = {name.casefold() for name in names}
     unknown = folded - {name.casefold() for group in groups for name in group.names}
     if unknown:
@@ -167,36 +177,39 @@ def _match_groups(
 
 
 class RiggedMesh(NamedTuple):
-    """Mesh with the rig that deforms it, or None without a rig."""
+    """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed."""
 
     mesh: Mesh
     rig: Rig | None
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
-    """Return mesh and rig of a file from the disk cache, or load and cache them.
+    """Return mesh and rig of a file from the disk cache; without an entry, load and cache them.
 
-    data : content of the file; the mesh depends on no other files
-    options : text with all options for reading
+    data : bytes of the file; the mesh must not depend on other files
+    options : text with all options that influence the result, part of the cache key
+    load : reads the file
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
     digest.update(data)
-    return _from_arrays(load_or_make("meshes", digest.hexdigest()[:40], _NAMES, lambda: _to_arrays(load())))
+    return _from_arrays(
+        load_or_make("meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _to_arrays(load()))
+    )
 
 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
-    """Return mesh and rig as arrays by name; missing parts are empty arrays."""
+    """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
     mesh, rig = rigged
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
-    arrays = {name: getattr(mesh, name) for name in _MESH} | {"outline": mesh.outline.points_mm}
-    rig_arrays: Arrays = dict.fromkeys((name for name in _NAMES if name not in arrays), _EMPTY)
+    arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
+    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY)
     if rig is not None:
         metadata |= {"targets": list(rig.targets.names), "bones": None}
         rig_arrays["control"] = rig.positions_mm
-        rig_arrays |= _prefixed_fields(rig.targets, "target", _TARGETS)
+        rig_arrays |= _prefixed_fields(rig.targets, "target", _TARGET_FIELDS)
     if rig is not None and rig.skeleton is not None:
         metadata["bones"] = list(rig.skeleton.names)
-        rig_arrays |= _prefixed_fields(rig.skeleton, "bone", _SKELETON)
+        rig_arrays |= _prefixed_fields(rig.skeleton, "bone", _SKELETON_FIELDS)
     encoded = np.frombuffer(json.dumps(metadata).encode(), np.uint8)
     return arrays | rig_arrays | {"metadata": encoded}
 
@@ -209,21 +222,23 @@ def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[st
 def _from_arrays(arrays: Arrays) -> RiggedMesh:
     metadata = json.loads(arrays["metadata"].tobytes())
     materials = [Material(**one | {"colour": tuple(one["colour"])}) for one in metadata["materials"]]
-    mesh = Mesh(**{name: arrays[name] for name in _MESH}, materials=tuple(materials))
+    mesh = Mesh(**{name: arrays[name] for name in _MESH_FIELDS}, materials=tuple(materials))
     vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
     if "targets" not in metadata:
         return RiggedMesh(mesh, None)
-    values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGETS}
+    values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGET_FIELDS}
     values["rest"] = values["rest"] if len(arrays["target rest"]) else None
     targets = MorphTargets(tuple(metadata["targets"]), **values)  # type: ignore[arg-type]
     if metadata["bones"] is None:
         return RiggedMesh(mesh, Rig(arrays["control"], targets))
-    skeleton = Skeleton(tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON})
+    skeleton = Skeleton(
+        tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON_FIELDS}
+    )
     return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton))
 
 
 def is_eye_name(names: Sequence[str]) -> bool:
-    """Return whether a group is an eyeball or a part of one, such as Eye_L, sclera or Std_Cornea_R.
+    """Return whether the names of a group denote an eyeball or a part of one: Eye_L, sclera, Std_Cornea_R.
 
     names : of the group, its material first; the first name with a known word decides
 

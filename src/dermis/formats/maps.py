@@ -1,4 +1,4 @@
-"""Loading of maps of a head from picture files."""
+"""Loading of a head's maps from picture files: colour, normals, height, roughness, labels."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAX_SIDE = 8192
 """Largest number of texels along a side, which every device supports."""
 _GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
-Load = Callable[[PathLike], Numbers]
+MapLoader = Callable[[PathLike], Numbers]
 _MAX_PARALLEL_TEXELS = MAX_PIXELS  # of all maps together, so that they can be decoded in parallel
 _MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is faster than decoding
 _CACHE_VERSION = 1  # increment when the same files result in other maps
@@ -45,7 +45,7 @@ def check_finite(path: PathLike, values: A) -> A:
 
 
 def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[[Any], Floats]) -> Floats:
-    """Convert a picture to (H, W, *shape) in strips of rows, to limit memory."""
+    """Convert a picture (H, W, ...) to an array (H, W, *shape) in strips of rows, to limit memory."""
     converted = np.empty((*image.shape[:2], *shape), np.float32)
     for rows in strips(image):
         converted[rows] = convert(image[rows])
@@ -53,8 +53,8 @@ def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[
 
 
 def colour_map(path: PathLike) -> Floats:
-    """Return a colour map (H, W, 3), linear Rec. 709."""
-    image = _read(path, "a colour map")
+    """Read a colour map (H, W, 3), linear Rec. 709."""
+    image = _read_picture(path, "a colour map")
     if image.shape[2] < 3:
         refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
     image = image[..., :3]
@@ -64,12 +64,12 @@ def colour_map(path: PathLike) -> Floats:
 
 
 def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
-    """Return a height map (H, W) [mm]; the steps of 8-bit maps are smoothed.
+    """Read a height map (H, W) [mm]; the quantisation steps of 8-bit maps are smoothed.
 
-    relief_mm : height of the full scale
+    relief_mm : height difference between black and white [mm]
     """
-    image = _read(path, "a height map")
-    grey = _grey(path, "a height map", image)
+    image = _read_picture(path, "a height map")
+    grey = _grey_levels(path, "a height map", image)
     height = smooth_quantisation(grey) if image.dtype == np.uint8 else grey
     with np.errstate(over="ignore"):
         height *= relief_mm
@@ -77,12 +77,13 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 
 
 def mixture_map(path: PathLike) -> Floats:
-    """Return fractions (H, W, 2) of two further profiles in a mixture, 0 to 1, together at most 1.
+    """Read a map (H, W, 2) of the fractions of two additional diffusion profiles, each 0 to 1, sum at most 1.
 
-    They are red and green of a colour picture, or grey and 0.
+    A colour picture gives the fractions in red and green; a grey picture gives the first, and the second is
+    0.
     """
     role = "a map of profiles"
-    image = _to_unit_range(_read(path, role))
+    image = _to_unit_range(_read_picture(path, role))
     fractions = np.zeros((*image.shape[:2], 2), np.float32)
     channels = 2 if image.shape[2] >= 3 and _channel_difference(image) > _GREY_TOLERANCE else 1
     fractions[..., :channels] = image[..., :channels]
@@ -91,24 +92,30 @@ def mixture_map(path: PathLike) -> Floats:
 
 
 def scalar_map(path: PathLike, role: str) -> Floats:
-    """Return a map (H, W) of values from 0 to 1, without sRGB conversion [-]."""
-    return _check_unit_range(path, role, _grey(path, role, _read(path, role)))
+    """Read a grey map (H, W) of values from 0 to 1, without sRGB conversion [-].
+
+    role : description of the map for errors
+    """
+    return _check_unit_range(path, role, _grey_levels(path, role, _read_picture(path, role)))
 
 
 def label_map(path: PathLike) -> Bytes:
-    """Return a map (H, W) of 8-bit labels."""
-    image = _read(path, "a map of labels")
+    """Read a map (H, W) of 8-bit labels."""
+    image = _read_picture(path, "a map of labels")
     if image.dtype != np.uint8 or image.shape[2] != 1:
         refuse(path, "labels in 8-bit grey", f"got {image.dtype} x {image.shape[2]}", "Save it as such")
     return np.asarray(image[..., 0], np.uint8)
 
 
 def slope_map(path: PathLike, normal_y: str) -> Floats:
-    """Return the slopes (H, W, 2) of a normal map with components in 0..1 or -1..1.
+    """Read a normal map and return the slopes of the surface (H, W, 2).
 
-    Texels whose normal does not point outwards are flat.
+    The components of the normals may be stored in 0..1 or -1..1. Texels whose normal does not point outwards
+    get slope 0.
+
+    normal_y : "up" or "down", see `load_maps`
     """
-    image = _read(path, "a normal map")
+    image = _read_picture(path, "a normal map")
     if image.shape[2] < 3:
         refuse(path, "a normal map with red, green and blue", "it is grey", "Pass a height map as height")
     image = image[..., :3]
@@ -127,7 +134,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
 
 
 def _normal_statistics(normals: Floats) -> Doubles:
-    """Return number of texels, number of outward unit vectors, and the sum of z over both."""
+    """Return (4,): numbers of all texels and of outward unit normals, and the sums of z over these sets."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
     outward = (np.abs(length - 1) < 0.15) & (z > 0)
@@ -135,14 +142,18 @@ def _normal_statistics(normals: Floats) -> Doubles:
 
 
 def _check_normals(path: PathLike, texels: float, outward: float, z: float, outward_z: float) -> None:
-    """Refuse pictures that are not normal maps, in which few texels are outward unit vectors."""
+    """Refuse a picture that is no tangent-space normal map: too few texels are outward unit normals.
+
+    texels, outward : numbers of all texels and of outward unit normals
+    z, outward_z : sums of the z components over all texels and over outward unit normals
+    """
     # A quarter suffices, as the rest may be empty space between uv islands.
     if outward < 0.25 * texels or outward_z < 0.7 * outward:
         actual = f"its mean blue is {(z / texels + 1) / 2:.2f} and its colours are not unit vectors"
         refuse(path, "a tangent-space normal map, which looks light blue", actual, "Check which map this is")
 
 
-def _read(path: PathLike, role: str) -> Pixels:
+def _read_picture(path: PathLike, role: str) -> Pixels:
     width, height = read_size(path)
     if max(width, height) > MAX_SIDE:
         expected = f"{role} of at most {MAX_SIDE} texels a side"
@@ -151,7 +162,7 @@ def _read(path: PathLike, role: str) -> Pixels:
     return check_finite(path, image) if image.dtype == np.float32 else image
 
 
-def _grey(path: PathLike, role: str, image: Pixels) -> Floats:
+def _grey_levels(path: PathLike, role: str, image: Pixels) -> Floats:
     """Return a grey picture (H, W) scaled to [0, 1]; RGB is accepted if its channels are equal."""
     if image.shape[2] > 1:
         difference = max(_channel_difference(image[rows]) for rows in strips(image))
@@ -209,7 +220,7 @@ def load_maps(
         refuse(height, "a height map with height_mm, the mm per grey level, above 0", actual, advice)
     if normal is not None and normal_y not in ("up", "down"):
         refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Use the other if bumps look like dents")
-    roles: dict[str, tuple[PathLike | None, str, Load]] = {  # largest first
+    roles: dict[str, tuple[PathLike | None, str, MapLoader]] = {  # largest first
         "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
         "colour": (colour, "colour", colour_map),
         "normal": (normal, f"normal {normal_y}", partial(slope_map, normal_y=normal_y)),
@@ -235,10 +246,11 @@ def _texel_count(path: PathLike) -> int:
     return width * height
 
 
-def _cached_map(path: PathLike | None, parameters: str, load: Load) -> Any:
+def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
     """Return the map of a picture file, from the disk cache if the file is large; None without a file.
 
-    parameters : text with everything that the map depends on besides the file
+    parameters : cache key besides the file: text of the map's role and options
+    load : reads the map from the file
     """
     if path is None:
         return None

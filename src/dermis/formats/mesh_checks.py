@@ -1,4 +1,4 @@
-"""Checks of meshes and rigs from files; each error says how to fix the file."""
+"""Checks of meshes and rigs from files; each error says how to correct the file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 def check_mesh(mesh: Mesh, culprit: object) -> None:
     """Refuse a mesh that cannot be rendered as skin.
 
-    culprit : named in the message, usually the file
+    culprit : source of the mesh for errors, usually its file
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
     triangles, edges of more than two triangles, and a mesh without skin.
@@ -45,11 +45,12 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
 def check_arrays(
     positions: NDArray[np.floating], uv: NDArray[np.floating], triangles: NDArray[np.integer], culprit: object
 ) -> None:
-    """Refuse arrays from which no `Mesh` can be built.
+    """Refuse positions, uv and triangles from which no valid `Mesh` can be built.
 
     positions : (v, 3) [mm]
     uv : (v, 2)
-    triangles : (f, 3)
+    triangles : (f, 3) vertex indices
+    culprit : source of the mesh for errors, usually its file
     """
     if len(triangles) == 0:
         refuse(culprit, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
@@ -73,7 +74,7 @@ def _check_finite(name: str, values: NDArray[np.floating], culprit: object, item
 
 
 def check_rig(rig: Rig, culprit: object) -> None:
-    """Refuse a rig whose numbers are not finite."""
+    """Refuse a rig with displacements, weights or matrices that are not finite."""
     _check_finite("displacements of targets", rig.targets.delta_mm, culprit, "of them")
     if rig.targets.rest is not None:
         _check_finite("weights of targets", rig.targets.rest, culprit, "of them")
@@ -83,7 +84,7 @@ def check_rig(rig: Rig, culprit: object) -> None:
 
 
 def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
-    """Refuse parts with too many triangles or vertices before they are joined."""
+    """Refuse mesh parts with too many triangles or vertices in total, before they are joined."""
     triangles = sum(len(part.triangles) for part in parts)
     limits.check_limit(culprit, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
     vertices = sum(len(part.positions) for part in parts)
@@ -140,10 +141,10 @@ def _check_skin(mesh: Mesh, culprit: object) -> None:
 
 
 def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> None:
-    """Refuse a head that is not 100 to 1000 mm high, usually because its unit was not set.
+    """Refuse a head that is not 100 to 1000 mm high, usually because the unit of its file was not set.
 
-    culprit : the file, named in the message
-    unit_mm : the unit with which the file was read [mm]; None for that of its format
+    culprit : the file, for errors
+    unit_mm : unit with which the file was read [mm]; None for the default of its format
     """
     height = float(mesh.size_mm[1])
     if HEAD_HEIGHT_MM[0] <= height <= HEAD_HEIGHT_MM[1]:

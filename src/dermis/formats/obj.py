@@ -1,4 +1,4 @@
-"""OBJ files: checks of their text before parsing, groups, and maps of their materials."""
+"""OBJ files: checks of their text before parsing, groups of faces, and maps of their materials."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILI
 _GROUP_LINE = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
 _MAX_LINE, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
-_ZERO = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
+_ZERO_INDEX = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
 _GROUP_OR_FACE = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _RELIEF_ROLES = ("normal", "height")
 _SAMPLES_PER_SIDE = 256  # texels that are compared along a side
-_ROLES = {
+_MAP_ROLES = {
     "map_kd": "colour",
     "map_ks": "specular",
     "map_pr": "roughness",
@@ -47,7 +47,7 @@ _ROLES = {
     "bump": "bump",
 }
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
-_OPTION = re.compile(
+_TEXTURE_OPTION = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|mm\s+\S+\s+\S+"
@@ -56,11 +56,11 @@ _OPTION = re.compile(
 )
 _NUMBER_PATTERN = re.compile(_NUMBER)
 _MAX_MTL_LINE = 4096  # characters
-_LIBRARY = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
+_LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
 
 def read_obj_text(path: Path) -> str:
-    """Return the text of a .obj file with line feeds as line ends.
+    """Return the text of a .obj file, with Windows line ends replaced by line feeds.
 
     Raises DermisError when it cannot be read or is too large.
     """
@@ -69,7 +69,7 @@ def read_obj_text(path: Path) -> str:
 
 
 def join_continued_lines(path: Path, text: str) -> str:
-    """Return the text with continued lines joined, and without comments after numbers.
+    """Return the text of an OBJ file with continued lines joined, and without comments at the ends of lines.
 
     Raises DermisError for overlong lines, and for too many vertices.
     """
@@ -92,7 +92,7 @@ def _check_lines(path: Path, data: Bytes) -> None:
 
 
 def face_groups(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the names of `usemtl` and `g` of each face."""
+    """Yield the current names of `usemtl` and `g` for each face of an OBJ text."""
     current = {"usemtl": "", "g": ""}
     for line in _GROUP_OR_FACE.finditer(text):
         if line[1] == "f":
@@ -102,7 +102,9 @@ def face_groups(text: str) -> Iterator[tuple[str, str]]:
 
 
 def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
-    """Return the text with each pair of `usemtl` and `g` as a numbered `usemtl`, and the pairs of names.
+    """Replace each pair of `usemtl` and `g` names by a `usemtl` with a number; return the text and the pairs.
+
+    trimesh would rename the groups otherwise.
 
     Raises DermisError for too many pairs.
     """
@@ -122,7 +124,10 @@ def number_groups(path: Path, text: str) -> tuple[str, list[tuple[str, str]]]:
 
 
 def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
-    """Return the number of corners of each face of each group; the text has groups by number.
+    """Return the numbers of corners of the faces of each group.
+
+    text : of the OBJ file, with group numbers from `number_groups`
+    groups : number of groups
 
     Raises DermisError for relative indices, for indices of 0, and for too many corners.
     """
@@ -136,7 +141,7 @@ def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
         if "-" in face:
             actual = "it has negative ones"
             refuse(path, "absolute indices in faces", actual, "Export it again, in Blender")
-        if (" 0" in face or "/0" in face or "\t0" in face) and _ZERO.search(face):
+        if (" 0" in face or "/0" in face or "\t0" in face) and _ZERO_INDEX.search(face):
             refuse(path, "faces by indices from 1", "it has a 0", limits.DAMAGED_ADVICE)
         count = len(face.split())
         current.append(count)
@@ -150,12 +155,18 @@ def face_corner_counts(path: Path, text: str, groups: int) -> list[Index]:
 
 
 def read_obj(path: Path) -> MeshFile:
-    """Read the parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
+    """Read a .obj file, one mesh part per pair of `usemtl` and `g`.
+
+    Colours are Kd of its .mtl, taken as linear.
+    """
     return parse_obj(path, read_obj_text(path))
 
 
 def parse_obj(path: Path, text: str) -> MeshFile:
-    """Parse the text of a .obj file as `read_obj` does."""
+    """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
+
+    path : of the file, for errors and to find its .mtl
+    """
     text = join_continued_lines(path, text)
     materials = read_materials(path, text).materials
     colours = {name: parse_colour(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
@@ -184,12 +195,12 @@ def obj_maps(
 ) -> tuple[Maps, str]:
     """Return the maps of the skin's material, and a note about maps that could not be used.
 
-    They are map_Kd, norm, map_Bump or bump, map_Ks and map_Pr. A bump map may contain normals, as many
-    programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square root of
-    the roughness m.
+    The statements map_Kd, norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals,
+    as many programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
+    root of the roughness m.
 
-    opaque : groups that are not skin
-    overridden : roles of maps that are set otherwise
+    opaque : names of groups that are not skin
+    overridden : roles of maps that the caller sets otherwise; those of the file are not read
     height_mm, normal_y : see `load_maps`
     """
     text = read_obj_text(path)
@@ -217,7 +228,7 @@ def obj_maps(
 
 
 def _checked_texel_count(file: Path, remaining: int) -> int:
-    """Return the number of texels of a picture after checking it against the remaining limit."""
+    """Return the number of texels of a picture after checking it against the number still allowed."""
     width, height = read_size(file)
     if width * height > remaining:
         expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
@@ -235,7 +246,10 @@ def _unused_files_note(path: Path, faults: list[str]) -> str:
 def _load_map(
     role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
-    """Load the map in a file by its role; reliefs are scaled by the factor of their material."""
+    """Load the map in a file; the result has its role as key. Heights and slopes are scaled by -bm.
+
+    role : "bump" for a file with heights or normals, which is found out from its colours
+    """
     if role == "bump":
         role = "height" if _is_grey(file) else "normal"
     if role not in _RELIEF_ROLES:
@@ -247,7 +261,7 @@ def _load_map(
 
 
 def _is_grey(file: Path) -> bool:
-    """Return whether the channels of a picture agree up to JPEG artefacts; large pictures are sampled."""
+    """Return whether a picture is grey up to JPEG artefacts; large pictures are subsampled."""
     picture = read_image(file)
     step = max(min(picture.shape[:2]) // _SAMPLES_PER_SIDE, 1)
     samples = picture[::step, ::step, :3].astype(float)
@@ -256,7 +270,10 @@ def _is_grey(file: Path) -> bool:
 
 
 def _skin_material(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
-    """Return the material with the most faces among groups named skin, or among all groups."""
+    """Return the material with textures that covers most faces, in groups named skin if there are any.
+
+    opaque : names of groups to leave out
+    """
     faces = Counter(face_groups(text))
     excluded = {name.casefold() for name in opaque}
     counted = {names: count for names, count in faces.items() if not excluded & set(map(str.casefold, names))}
@@ -270,12 +287,12 @@ def _skin_material(text: str, materials: dict[str, MtlMaterial], opaque: Collect
 
 @dataclass(frozen=True)
 class Texture:
-    """Picture referenced by a material.
+    """Picture that a material of an .mtl file references.
 
     key : statement that references it, such as map_Kd
-    name : of the file
-    factor : by which its values are multiplied (-bm) [-]
-    transformed : whether it is scaled, shifted or made turbulent (-s, -o, -t)
+    name : file name as written
+    factor : option -bm, by which the map is multiplied [-]
+    transformed : whether the picture has a scale, an offset or turbulence (-s, -o, -t)
     """
 
     key: str
@@ -286,26 +303,30 @@ class Texture:
 
 @dataclass
 class MtlMaterial:
-    """Material with its Kd as written and its pictures by role; "bump" is a relief of either kind."""
+    """Material of an .mtl file.
+
+    kd : diffuse colour as written
+    textures : pictures by role; "bump" may contain heights or normals
+    """
 
     kd: list[str] = field(default_factory=list)
     textures: dict[str, Texture] = field(default_factory=dict)
 
 
 @dataclass
-class Library:
-    """Materials of an OBJ file by name, and names of missing .mtl files."""
+class MaterialLibrary:
+    """Materials of an OBJ file by name, and the names of .mtl files that do not exist."""
 
     materials: dict[str, MtlMaterial] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
 
 
-def read_materials(path: Path, text: str) -> Library:
+def read_materials(path: Path, text: str) -> MaterialLibrary:
     """Read the .mtl files that an OBJ file references.
 
-    text : of the OBJ file
+    path, text : of the OBJ file
     """
-    library, remaining = Library(), limits.MAX_MTL_BYTES
+    library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
     for listed in library_names(text)[: limits.MAX_LIBRARIES]:
         found = find_referenced_file(path, listed)
         names = [listed] if found else listed.split(".mtl ")[: limits.MAX_LIBRARIES]
@@ -331,15 +352,19 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key.lower() == "kd":
             current.kd = value.split()
-        elif key.lower() in _ROLES and value.strip():
-            current.textures[_ROLES[key.lower()]] = _parse_texture(key, value.strip())
+        elif key.lower() in _MAP_ROLES and value.strip():
+            current.textures[_MAP_ROLES[key.lower()]] = _parse_texture(key, value.strip())
     return materials
 
 
 def _parse_texture(key: str, statement: str) -> Texture:
-    """Parse a statement with options; the name of the file extends to the end of the line."""
+    """Parse a texture statement of an .mtl file; its file name extends to the end of the line.
+
+    key : statement, such as map_Kd
+    statement : text after the key, options first
+    """
     factor, transformed, start = 1.0, False, 0
-    while option := _OPTION.match(statement, start):
+    while option := _TEXTURE_OPTION.match(statement, start):
         factor = float(option["factor"] or factor)
         if option["transform"]:
             default = 1.0 if option["transform"] in "sS" else 0.0
@@ -353,5 +378,5 @@ def _parse_texture(key: str, statement: str) -> Texture:
 
 
 def library_names(text: str) -> list[str]:
-    """Return the names in `mtllib` lines, each once."""
-    return list(dict.fromkeys(line[1].strip() for line in _LIBRARY.finditer(text)))
+    """Return the .mtl file names in the `mtllib` lines of an OBJ text, without duplicates."""
+    return list(dict.fromkeys(line[1].strip() for line in _LIBRARY_LINE.finditer(text)))

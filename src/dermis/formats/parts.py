@@ -1,6 +1,6 @@
-"""Parts of mesh files: groups of triangles in file units, with uv as in the file.
+"""Parts of mesh files: one group of triangles each, with the units and the uv of the file.
 
-trimesh parses OBJ and PLY. It would rename groups, so they are numbered in the text first.
+trimesh parses OBJ and PLY. As it would rename groups, their names are replaced by numbers in the text first.
 """
 
 from __future__ import annotations
@@ -25,42 +25,43 @@ GREY: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Return whether a file is glTF by its suffix."""
+    """Return whether the suffix of a file is that of glTF, .glb or .gltf."""
     return Path(path).suffix.lower() in (".glb", ".gltf")
 
 
 def default_unit_mm(path: str | Path) -> float:
-    """Return the unit of a file format [mm]: 1000 for glTF, which is in metres, else 1."""
+    """Return the default length unit of a file format [mm]: 1000 for glTF, which is in metres, else 1."""
     return 1000.0 if is_gltf(path) else 1.0
 
 
 @dataclass(frozen=True)
 class MaterialGroup:
-    """Group of triangles with the name of its material or mesh first, then other names, and a colour.
+    """Names and colour of a group of triangles.
 
-    colour : diffuse, linear [-]
+    names : of the material if it has one, then of the mesh or OBJ group
+    colour : diffuse reflectance, linear [-]
     """
 
     names: tuple[str, ...]
     colour: Colour = GREY
 
     def name_contains(self, word: str) -> bool:
-        """Return whether a word is part of one of the names."""
+        """Return whether a lower-case word occurs in one of the names."""
         return any(word in name.casefold() for name in self.names)
 
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles of one group at rest, in the units and v direction of the file.
+    """Triangles of one group in the rest pose, with the units and the v direction of the file.
 
     positions : (v, 3)
     uv : (v, 2), or None
     normals : (v, 3), or None
-    triangles : (f, 3)
-    targets : by name, displaced vertices (n,) of a morph target and displacements (n, 3) at weight 1
-    bone, weight : (v, k) bones of each vertex and weights that sum to 1; None without bones
+    triangles : (f, 3) vertex indices
+    targets : morph targets by name: displaced vertices (n,), and their displacements (n, 3) at weight 1
+    bone, weight : (v, k) bones of each vertex, and weights that sum to 1; None without bones
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    separate : whether its vertices are not welded to coincident vertices of other parts
+    separate : whether its vertices must not be welded to coincident vertices of other parts
     """
 
     group: MaterialGroup
@@ -77,10 +78,10 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class Bones:
-    """Bones of a file, parents before children.
+    """Bone hierarchy of a file, parents before children.
 
-    parent : (b,) index of the parent, -1 for a root
-    local, world : (b, 4, 4) from each bone's space to its parent's and to the file's, at rest
+    parent : (b,) index of each bone's parent, -1 for a root
+    local, world : (b, 4, 4) transforms at rest from a bone's space to its parent's, and to that of the file
     """
 
     names: tuple[str, ...]
@@ -91,9 +92,9 @@ class Bones:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """Content of a mesh file.
+    """Geometry and bones of a mesh file.
 
-    weights : default weights of morph targets by name, where they are not 0
+    weights : default weights of morph targets by name, without those of weight 0
     """
 
     parts: list[MeshPart]
@@ -109,7 +110,12 @@ class MeshFile:
 def trimesh_parts(
     data: bytes, kind: str, groups: list[MaterialGroup], **options: object
 ) -> Iterator[MeshPart]:
-    """Yield the meshes that trimesh reads from `data`, with the groups that their materials number."""
+    """Parse a file with trimesh and yield its meshes as parts.
+
+    kind : format of the data, "obj" or "ply"
+    groups : of the parts; the material names in the data are indices of this list
+    options : for trimesh
+    """
     from io import BytesIO
 
     import trimesh
@@ -127,7 +133,7 @@ def trimesh_parts(
 
 
 def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
-    """Return a trimesh mesh as a part."""
+    """Convert a trimesh mesh to a `MeshPart`."""
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
@@ -145,23 +151,23 @@ def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
 
 
 def to_floats(values: Numbers) -> Doubles:
-    """Convert values to floats; integers become fractions of the largest value of their type."""
+    """Convert an array to floats; integers are divided by the largest value of their type."""
     scale = np.iinfo(values.dtype.str).max if values.dtype.kind in "iu" else 1
     return np.asarray(values / scale, dtype=np.float64)
 
 
 def parse_colour(numbers: Sequence[float | str]) -> Colour:
-    """Return the first three numbers, clamped to [0, 1]."""
+    """Return red, green and blue from the first three numbers, clamped to [0, 1]."""
     r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
     return (r, g, b)
 
 
 def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
-    """Return the pairs of triangles that are halves of quads, (q, 2); empty if the order is unknown.
+    """Return the pairs of triangles that are halves of quads, (q, 2); empty if they cannot be identified.
 
-    corner_counts : (n,) number of corners of each face of the file
-    triangles : (f, 3) triangulated faces, one face after the other, or triangles first, then the first halves
-        of all quads, the second halves, and all other polygons
+    corner_counts : (n,) number of corners of each polygon of the file
+    triangles : (f, 3) triangulated polygons, either in the order of the file, or all triangles first, then
+        the first halves of all quads, their second halves, and all other polygons
     """
     none, count = np.empty((0, 2), dtype=np.int64), int((corner_counts == 4).sum())
     if count == 0 or int((corner_counts - 2).sum()) != len(triangles):
@@ -177,7 +183,10 @@ def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
 
 
 def ply_corner_counts(metadata: Mapping[str, Any]) -> Index:
-    """Return the number of corners of each face from trimesh's metadata of a .ply file; empty for others."""
+    """Return the number of corners of each polygon of a .ply file; empty for other formats.
+
+    metadata : of the mesh that trimesh read
+    """
     data = metadata.get("_ply_raw", {}).get("face", {}).get("data")
     properties = data.dtype.names if isinstance(data, np.ndarray) else data
     for name in ("vertex_index", "vertex_indices"):

@@ -1,4 +1,4 @@
-"""Reading of mesh files of all formats; PLY files."""
+"""Reading of mesh files by format, with the reader of PLY files."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Up = Literal["y", "z"]
 
 
 def check_ply(path: Path, data: bytes) -> bytes:
-    """Return the header of a PLY file after checking its numbers of elements and properties.
+    """Return the header of a PLY file after checking its counts of elements and properties.
 
-    data : the whole file
+    data : bytes of the whole file
 
     Raises DermisError for an invalid header.
     """
@@ -50,7 +50,10 @@ def check_ply(path: Path, data: bytes) -> bytes:
 
 
 def _check_element(path: Path, line: list[bytes], remaining_bytes: int) -> None:
-    """Refuse an element count that is too large for a mesh or for the size of the file."""
+    """Refuse an "element" line of a PLY header with an implausible count for a mesh or for the file size.
+
+    line : words of the line
+    """
     name, count = (line[1].decode("latin-1"), line[2]) if len(line) == 3 else ("", b"")
     if not (count.isdigit() and len(count) < 12):
         actual = f"got {b' '.join(line)[:80]!r}"
@@ -60,7 +63,11 @@ def _check_element(path: Path, line: list[bytes], remaining_bytes: int) -> None:
 
 
 def read_ply(path: Path) -> MeshFile:
-    """Read a .ply file; uv are vertex properties s, t or u, v or texture_u, texture_v, or face properties."""
+    """Read a .ply file.
+
+    uv are read from the vertex properties s, t or u, v or texture_u, texture_v, or from the face property
+    texcoord.
+    """
     data = read_file(path, "a PLY file", limits.MAX_FILE_BYTES)
     header = check_ply(path, data)
     # uv coordinates by face corner require split vertices, for which the file's normals may be wrong;
@@ -80,7 +87,7 @@ READERS: dict[str, Callable[[Path], MeshFile]] = {
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
-    """Join all parts into one; normals are NaN where the file has none."""
+    """Join mesh parts into one; vertices without normals get NaN."""
     uv = [_part_uv(part, source) for part in parts]
     for part, part_uv in zip(parts, uv, strict=True):
         check_arrays(part.positions, part_uv, part.triangles, source)
@@ -104,7 +111,12 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
-    """Return a part with some of its vertices, and with their targets and bones."""
+    """Return a mesh part with a subset of its vertices, their morph targets and bones.
+
+    used : (n,) indices of the vertices to keep
+
+    Triangles, uv and normals are not changed.
+    """
     number = np.full(len(part.positions), -1)
     number[used] = np.arange(len(used))
     targets = {
@@ -130,7 +142,7 @@ def _part_normals(part: MeshPart) -> Doubles:
 
 
 def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
-    """Stack arrays of any width vertically, padded with 0; None if one is None."""
+    """Stack arrays (n, k) vertically, padded with 0 to the largest k; None if one of them is None."""
     present = [array for array in arrays if array is not None]
     if len(present) < len(arrays):
         return None
@@ -150,7 +162,10 @@ def _part_uv(part: MeshPart, source: Path) -> Doubles:
 
 
 def read_mesh_file(source: Path) -> MeshFile:
-    """Read a mesh file of any format; errors of its reader become a DermisError."""
+    """Read a mesh file of any supported format, without parts that have no triangles.
+
+    Raises DermisError for every fault of the file.
+    """
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         actual = f"the suffix is {source.suffix!r}"
@@ -172,5 +187,8 @@ def read_mesh_file(source: Path) -> MeshFile:
 
 
 def to_y_up(vectors: Doubles, up: Up) -> Doubles:
-    """Return vectors (v, 3) with Y up: for z-up, -Y, Blender's front, becomes +Z."""
+    """Rotate vectors (v, 3) of a file with up axis `up` to Y up.
+
+    A z-up head faces -Y, as in Blender; this direction becomes +Z.
+    """
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))

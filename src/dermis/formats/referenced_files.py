@@ -1,4 +1,4 @@
-"""Files referenced by a mesh file, in its own folder or below it."""
+"""Files referenced by a mesh file; only those in the folder of the mesh file or below it are read."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer pa
 
 
 def find_referenced_file(path: Path, name: str) -> Path | None:
-    """Return an existing file by its name relative to the folder of `path`, or None.
+    """Return the existing file that a mesh file references by name, or None.
 
-    Windows separators are accepted. If the name leads elsewhere, its last part is searched in the folder.
+    path : of the mesh file
+    name : relative to its folder; Windows separators are accepted
+
+    A name outside the folder is reduced to its last component, which is searched in the folder.
     """
     named = PureWindowsPath(name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):
@@ -25,7 +28,7 @@ def find_referenced_file(path: Path, name: str) -> Path | None:
 
 
 def resolve_uri(path: Path, uri: str) -> Path:
-    """Return the path of a relative reference in a glTF file, whether the file exists or not.
+    """Return the path of a file that a glTF file references by a relative URI; it need not exist.
 
     Raises DermisError for a file outside the folder, also through a link.
     """
@@ -38,7 +41,7 @@ def resolve_uri(path: Path, uri: str) -> Path:
 
 
 def _resolve_below(folder: Path, name: PureWindowsPath) -> Path | None:
-    """Return the resolved path of a name below a folder, or None if it is invalid or elsewhere."""
+    """Return the resolved path of a name relative to a folder, or None if it is invalid or leads outside."""
     if len(str(name)) > _MAX_PATH_LENGTH:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Rigs of mesh points from the targets and bones of vertices in a file."""
+"""Construction of rigs for the welded points of a mesh from morph targets and bones of a file's vertices."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ _MIN_DISPLACEMENT_MM = 1e-4  # rounding errors of vertices that do not move
 
 
 def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
-    """Return point indices (v,) in which coincident vertices that move differently are separate points.
+    """Return point indices (v,) in which coincident vertices become separate points if they move differently.
 
-    point : (v,) point of each vertex, welded by position
-    linear : (3, 3) from the file's space to mm
+    point : (v,) index of the point of each vertex, welded by position
+    part : vertices with their morph targets and bone weights
+    linear : (3, 3) matrix from the file's space to the head's [mm]
 
-    Raises DermisError for too many such vertices at one position.
+    Raises DermisError if too many vertices at one position move differently.
     """
     remaining = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
@@ -43,7 +44,11 @@ def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) 
 
 
 def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
-    """Return whether a target separates vertices `first` and `second`, (n,)."""
+    """Return for each pair of vertices whether some morph target moves them apart, (n,).
+
+    first, second : (n,) vertex indices of the pairs
+    linear : (3, 3) matrix from the file's space to the head's [mm]
+    """
     apart, delta = np.zeros(len(first), bool), np.zeros((len(part.positions), 3))
     for vertex, delta_of_vertex in part.targets.values():
         delta[vertex] = delta_of_vertex @ linear.T
@@ -53,7 +58,10 @@ def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles
 
 
 def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
-    """Return whether vertices `first` and `second` have different bone weights, (n,)."""
+    """Return for each pair of vertices whether their bone weights differ, (n,).
+
+    first, second : (n,) vertex indices of the pairs
+    """
     if part.bone is None or part.weight is None:
         return np.zeros(len(first), bool)
     bones = np.concatenate([part.bone[first], part.bone[second]], axis=1)
@@ -71,12 +79,13 @@ def build_rig(
     to_head: Doubles,
     culprit: object,
 ) -> Rig | None:
-    """Return the rig of a mesh's points, or None without targets and bones.
+    """Return the rig of a mesh's points; None for a file without morph targets and bones.
 
-    positions_mm : (v, 3) in the head's space
-    part : all used vertices of the file, (v,)
-    weights : default weights of targets
-    to_head : (4, 4) from the file's space to the head's [mm]
+    positions_mm : (v, 3) vertices in the head's space
+    point : (v,) index of the point of each vertex
+    part : the same vertices with their morph targets and bone weights, in the file's space
+    weights : default weights of morph targets by name
+    to_head : (4, 4) matrix from the file's space to the head's [mm]
 
     Raises DermisError for bones with a scale of 0.
     """
@@ -84,14 +93,19 @@ def build_rig(
         return None
     _, first = np.unique(point, return_index=True)
     point_positions = np.ascontiguousarray(positions_mm[first])
-    skeleton = None if bones is None else _skeleton(part, bones, first, to_head, culprit)
-    return Rig(point_positions, _targets(part, point, first, weights, to_head), skeleton)
+    skeleton = None if bones is None else _point_skeleton(part, bones, first, to_head, culprit)
+    return Rig(point_positions, _point_targets(part, point, first, weights, to_head), skeleton)
 
 
-def _targets(
+def _point_targets(
     part: MeshPart, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
 ) -> MorphTargets:
-    """Return the targets of points, which move like the `first` of their vertices."""
+    """Return the morph targets of the p points of a mesh.
+
+    point : (v,) index of the point of each vertex
+    first : (p,) first vertex of each point, whose displacement the point gets
+    weights : default weights by target name
+    """
     if not part.targets:
         return no_targets()
     is_first = np.zeros(len(point), bool)
@@ -114,8 +128,13 @@ def _targets(
     )
 
 
-def _skeleton(part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culprit: object) -> Skeleton:
-    """Return the skeleton of points, which have the weights of the `first` of their vertices."""
+def _point_skeleton(
+    part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culprit: object
+) -> Skeleton:
+    """Return the skeleton of the p points of a mesh.
+
+    first : (p,) first vertex of each point, whose bone weights the point gets
+    """
     assert part.bone is not None and part.weight is not None
     bone = np.zeros((len(first), INFLUENCES), np.int32)
     weight = np.zeros((len(first), INFLUENCES), np.float32)

@@ -1,4 +1,4 @@
-"""Sample heads and environments, downloaded once and verified by hash."""
+"""Sample heads and environments, downloaded once and verified by their hashes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DATA_VARIABLE = "DERMIS_DATA"
 
 @dataclass(frozen=True)
 class SampleFile:
-    """File of a sample: name, public URL and expected hash."""
+    """File of a sample: its name, public URL and expected SHA-256."""
 
     name: str
     url: str
@@ -31,14 +31,14 @@ class SampleFile:
 
 @dataclass(frozen=True)
 class Sample:
-    """Description of a sample.
+    """Files, licence and units of a sample.
 
-    kind : "head" is a mesh with maps, "environment" a latitude-longitude picture
-    folder : of its files below DERMIS_DATA or below the cache
+    kind : "head" for a mesh with maps, "environment" for a latitude-longitude picture
+    folder : name of its folder below DERMIS_DATA, or below the cache
     files : by role: mesh, colour, specular, normal, height, licence, or environment
-    licence, attribution : of its authors
+    licence, attribution : terms of use, and the authors to credit
     unit_mm : length of one unit of the mesh [mm]
-    v_origin : edge of the maps where v = 0
+    v_origin : edge of the maps where v = 0, "top" or "bottom"
     height_mm : relief of one grey level of the 8-bit height map [mm]
     """
 
@@ -76,7 +76,7 @@ def fetch(name: str) -> dict[str, Path]:
 
     Raises DermisError for an unknown sample, without network, and for files with another hash.
     """
-    sample = _find(name)
+    sample = _find_sample(name)
     paths = {role: _folder(sample) / file.name for role, file in sample.files.items()}
     missing = [role for role, file in sample.files.items() if not _has_known_hash(paths[role], file)]
     if missing and _data_folder():
@@ -91,11 +91,11 @@ def is_available(name: str) -> bool:
 
     name : a key of `SAMPLES`
     """
-    sample = _find(name)
+    sample = _find_sample(name)
     return all(_has_known_hash(_folder(sample) / file.name, file) for file in sample.files.values())
 
 
-def _find(name: str) -> Sample:
+def _find_sample(name: str) -> Sample:
     if name not in SAMPLES:
         refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them")
     return SAMPLES[name]
@@ -111,7 +111,7 @@ def _folder(sample: Sample) -> Path:
 
 
 def _has_known_hash(path: Path, file: SampleFile) -> bool:
-    """Return whether a file exists and has the expected hash."""
+    """Return whether a file exists and has the SHA-256 of the sample."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader
@@ -123,7 +123,7 @@ def _has_known_hash(path: Path, file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _sha256(path: Path, size: int, mtime_ns: int) -> str:
-    """Return the hash of a file, computed once for each size and modification time."""
+    """Return the SHA-256 of a file; the result is cached for its size and modification time."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -133,7 +133,7 @@ def _download(sample: Sample, roles: list[str]) -> None:
 
     folder = _folder(sample)
     for count, role in enumerate(roles):
-        file, progress = sample.files[role], _Progress(sample.files[role].name)
+        file, progress = sample.files[role], _DownloadProgress(sample.files[role].name)
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
         try:
             make_private_folder(folder)
@@ -146,8 +146,8 @@ def _download(sample: Sample, roles: list[str]) -> None:
             progress.stop()
 
 
-class _Progress:
-    """Progress bar on stderr with the interface that pooch expects."""
+class _DownloadProgress:
+    """Progress bar of a download on stderr, with the interface that pooch expects."""
 
     def __init__(self, name: str) -> None:
         from rich.console import Console
@@ -166,7 +166,7 @@ class _Progress:
         self._bars.reset(self._task)
 
     def close(self) -> None:
-        """Do nothing: pooch calls it only after success, so `stop` stops the bar."""
+        """Do nothing: pooch calls it only after success, so `stop` removes the bar instead."""
 
     def stop(self) -> None:
         if self._bars.live.is_started:

@@ -1,4 +1,4 @@
-"""Limits of mesh files, above those of any head, that keep loading to seconds and two gigabytes."""
+"""Size limits of mesh files: larger than any head, yet files load in seconds and within two gigabytes."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ MAX_BONES = 2048
 MAX_TARGETS = 4096
 MAX_CHANNELS = 1 << 14
 """Largest number of curves of an animation clip."""
-MAX_ACCESSOR_NUMBERS = 1 << 27
-"""Largest number of values read from accessors; each use of an accessor counts, as 512 at least."""
+MAX_ACCESSOR_COMPONENTS = 1 << 27
+"""Largest number of accessor components that are read; each use of an accessor counts, as 512 or more."""
 MAX_JSON_VALUES = 1 << 21
 """Largest number of values in the JSON of a glTF file."""
 MAX_MTL_BYTES = 4 << 20
@@ -38,6 +38,10 @@ MAX_LIBRARIES = 64
 
 
 def check_limit(culprit: object, count: int, limit: int, items: str, advice: str) -> None:
-    """Refuse more than `limit` items."""
+    """Raise the error for a file with more than `limit` objects of one kind.
+
+    culprit : the file, for the error
+    count, items : number of the objects, and a plural noun for them
+    """
     if count > limit:
         refuse(culprit, f"at most {limit:,} {items}", f"it has {count:,}", advice)

@@ -1,4 +1,4 @@
-"""Animation clips of glTF files."""
+"""Reading of animation clips from glTF files."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ from dermis.formats.gltf.rigs import target_names
 from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_CHANNELS, check_limit
 from dermis.mesh.rotations import slerp
 
-_WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
+_COMPONENT_COUNTS = {"translation": 3, "rotation": 4, "scale": 3}
 Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
 _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
-    """Curve that animates `path` of the named nodes, or "weights" of the named morph targets."""
+    """Animated property of several nodes or morph targets, with the curve of its values.
+
+    path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
+    names : (m,) of the nodes or of the morph targets
+    """
 
     path: str
     names: tuple[str, ...]
@@ -32,30 +36,32 @@ class AnimationTrack(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """Animation clip of a file."""
+    """Animation clip of a glTF file: its name and its tracks."""
 
     name: str
     tracks: tuple[AnimationTrack, ...]
 
 
-class _Keys(NamedTuple):
+class _Keyframes(NamedTuple):
     times_s: Doubles
     values: Doubles
     kind: Interpolation
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's clips; clips without a name are numbered."""
-    return _names(read_document(path))
+    """Return the names of a file's animation clips; a clip without a name is called "clip" and its index."""
+    return _document_clip_names(read_document(path))
 
 
 def read_clip(path: Path, name: str | None) -> Animation:
-    """Read a clip of a .glb or .gltf file; without a name, its only clip.
+    """Read an animation clip of a .glb or .gltf file.
+
+    name : of the clip; None for the only clip of the file
 
     Raises DermisError for a missing or damaged clip.
     """
     document = read_document(path)
-    names = _names(document)
+    names = _document_clip_names(document)
     if not names:
         refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
     if name is None and len(names) > 1:
@@ -65,31 +71,31 @@ def read_clip(path: Path, name: str | None) -> Animation:
         refuse(path, f"one of its clips ({', '.join(names)})", f"got {name!r}", "Correct the name")
     index = 0 if name is None else names.index(name)
     with parsing(f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS):
-        return Animation(names[index], tuple(_tracks(document, index, names[index])))
+        return Animation(names[index], tuple(_read_tracks(document, index, names[index])))
 
 
-def _names(document: Document) -> tuple[str, ...]:
+def _document_clip_names(document: Document) -> tuple[str, ...]:
     clips = document.items("animations")
     return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
 
 
-def _tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
-    """Return the tracks of a clip; curves of the same kind with the same keys are merged."""
+def _read_tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
+    """Return the tracks of a clip; channels with equal path, interpolation and key times share one track."""
     clip, nodes = document.item("animations", index), read_nodes(document)
     culprit = f"{document.path}: clip {name!r}"
     check_limit(culprit, len(clip["channels"]), MAX_CHANNELS, "channels", "Export it again")
-    groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
+    groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
         target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
-        if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
+        if "node" not in target or target["path"] not in (*_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
         _check_node(nodes, target["node"], culprit)
         sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
             tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
-        keys = _read_keys(document, sampler, _WIDTH[target["path"]], culprit)
+        keys = _read_keys(document, sampler, _COMPONENT_COUNTS[target["path"]], culprit)
         rotations = keys.values[:, _VALUE] if keys.kind == "CUBICSPLINE" else keys.values
         if target["path"] == "rotation" and not rotations.any(axis=-1).all():
             refuse(culprit, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
@@ -108,7 +114,8 @@ def _weight_track(
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
-    known : names of targets by mesh, extended by this function
+    culprit : clip and channel, named in errors
+    known : names of morph targets by mesh index; this function adds those of the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in known:
@@ -122,15 +129,18 @@ def _weight_track(
     return AnimationTrack("weights", names, curve)
 
 
-def _merge_tracks(path: str, members: list[tuple[str, _Keys]]) -> AnimationTrack:
+def _merge_tracks(path: str, members: list[tuple[str, _Keyframes]]) -> AnimationTrack:
     keys = members[0][1]
     values = np.stack([own.values for _, own in members], axis=-2)
     curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")
     return AnimationTrack(path, tuple(name for name, _ in members), curve)
 
 
-def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
-    """Read times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
+def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keyframes:
+    """Read times (k,) and values (k, n) of a sampler; values of a cubic spline are (k, 3, n) with tangents.
+
+    width : n, number of components per key
+    """
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in get_args(Interpolation):
         kinds = ", ".join(get_args(Interpolation))
@@ -146,17 +156,17 @@ def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _
         early = int(np.flatnonzero(np.diff(times) < 0)[0])
         actual = f"key {early + 1} at {times[early + 1]:g} s comes after {times[early]:g} s"
         refuse(culprit, "keys in temporal order", actual, DAMAGED_ADVICE)
-    return _Keys(times, values.reshape(shape), kind)
+    return _Keyframes(times, values.reshape(shape), kind)
 
 
 @dataclass(frozen=True, eq=False)
 class AnimationCurve:
-    """Interpolated values over time, for several channels with the same keys.
+    """Values as functions of time for m nodes that have the same keys, with n components each.
 
-    times_s : (k,) of the keys, increasing
-    values : (k, m, n); for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
+    times_s : (k,) times of the keys, not decreasing [s]
+    values : (k, m, n) at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
     kind : interpolation between keys
-    is_rotation : whether the values are quaternions (n = 4), which are interpolated spherically
+    is_rotation : whether the values are quaternions (n = 4), for which "LINEAR" is spherical interpolation
 
     Source: glTF 2.0, appendix C.
     """
@@ -167,7 +177,7 @@ class AnimationCurve:
     is_rotation: bool = False
 
     def sample(self, seconds: float) -> Doubles:
-        """Return the values at a time, (m, n); constant before the first and after the last key."""
+        """Return the values at a time [s], (m, n); constant before the first and after the last key."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):

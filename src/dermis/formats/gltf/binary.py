@@ -1,4 +1,4 @@
-"""Binary buffer of a glTF file that is being written, with its views and accessors."""
+"""Construction of the binary buffer of an exported glTF file, with buffer views and accessors."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ VERTICES, INDICES = 34962, 34963
 """Targets of buffer views."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
 """Sampler with mip levels and without repetition."""
-_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
-_KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_COMPONENT_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+_ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _MAX_SHORT_COUNT = 65535  # the value 65535 itself means primitive restart
 
 
 @dataclass
 class BufferBuilder:
-    """Growing buffer with its views and accessors."""
+    """Binary buffer of an exported glTF file, which grows, with its buffer views and accessors."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
@@ -32,7 +32,10 @@ class BufferBuilder:
     _zero_accessors: dict[int, int] = field(default_factory=dict)
 
     def add_view(self, data: bytes, target: int | None = None) -> int:
-        """Append bytes to the buffer and return the index of their buffer view."""
+        """Append bytes to the buffer and return the index of their buffer view.
+
+        target : `VERTICES` or `INDICES`; None for data that is neither
+        """
         self.data += b"\0" * (-len(self.data) % 4)
         entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
         self.views.append(entry if target is None else entry | {"target": target})
@@ -40,9 +43,11 @@ class BufferBuilder:
         return len(self.views) - 1
 
     def add_accessor(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
-        """Append rows (n, k) of float32 or unsigned integers and return the index of their accessor.
+        """Append n elements of k components, (n, k), and return the index of their accessor.
 
-        bounded : store the smallest and largest value of each column
+        rows : float32 or unsigned integers
+        target : `VERTICES` or `INDICES`; None for data that is neither
+        bounded : store the minimum and the maximum of each component, which glTF requires for positions
         """
         values = _little_endian(rows)
         bounds = _bounds(values) if bounded else {}
@@ -50,17 +55,20 @@ class BufferBuilder:
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
     def add_triangles(self, index: Numbers, count: int) -> int:
-        """Append corners (f, 3) of triangles and return the index of their accessor.
+        """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 
-        count : number of vertices
+        count : number of vertices of the primitive, which decides the integer type
         """
         return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
 
     def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
-        """Append arrays (count, 3) that are mostly 0, sparse or dense, and return their accessors.
+        """Append arrays (count, 3) that are mostly 0, and return the indices of their accessors.
 
-        row : (m,) indices of rows that are not 0, increasing
-        columns : their values, (m, 3) for each array
+        They are stored as sparse accessors, or densely if that is smaller.
+
+        row : (m,) increasing indices of the rows that are not 0, equal for all arrays
+        columns : the values of these rows, (m, 3) for each array
+        count : number of vertices
         """
         if not len(row):
             return [self._zero_accessor(count)] * len(columns)
@@ -68,7 +76,7 @@ class BufferBuilder:
         if len(row) * (12 + index.itemsize) >= 12 * count:
             return [self._dense_accessor(row, values, count) for values in columns]
         indices = {"bufferView": self.add_view(_little_endian(index).tobytes())}
-        indices["componentType"] = _TYPES[_little_endian(index).dtype.str]
+        indices["componentType"] = _COMPONENT_TYPES[_little_endian(index).dtype.str]
         accessors = []
         for values in columns:
             stored = _little_endian(values)
@@ -81,7 +89,7 @@ class BufferBuilder:
         return accessors
 
     def _zero_accessor(self, count: int) -> int:
-        """Return an accessor of `count` zeros, which is shared and takes no space in the buffer."""
+        """Return the index of an accessor of zero vectors (count, 3), which takes no space in the buffer."""
         if count not in self._zero_accessors:
             zeros = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
             self._zero_accessors[count] = self._append_accessor(zeros, {"min": [0.0] * 3, "max": [0.0] * 3})
@@ -93,13 +101,16 @@ class BufferBuilder:
         return self.add_accessor(dense, VERTICES, bounded=True)
 
     def _append_accessor(self, values: Numbers, entries: FrozenTree) -> int:
-        layout = {"componentType": _TYPES[values.dtype.str], "type": _KINDS[values.shape[1]]}
+        layout = {
+            "componentType": _COMPONENT_TYPES[values.dtype.str],
+            "type": _ELEMENT_TYPES[values.shape[1]],
+        }
         self.accessors.append({"count": len(values), **layout, **entries})
         return len(self.accessors) - 1
 
 
 def _little_endian(rows: Numbers) -> Numbers:
-    """Return rows in the byte order of glTF."""
+    """Return a contiguous array in little-endian byte order, which glTF requires."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
 
@@ -108,12 +119,15 @@ def _bounds(values: Numbers) -> dict[str, list[float]]:
 
 
 def _index_dtype(count: int) -> str:
-    """Return the smallest type of indices of so many vertices."""
+    """Return the smallest integer type for indices of `count` vertices."""
     return "<u2" if count <= _MAX_SHORT_COUNT else "<u4"
 
 
 def resolve_textures(value: Any, textures: Mapping[str, int]) -> Any:
-    """Return a JSON tree in which picture names, {"index": name}, are replaced by texture indices."""
+    """Return a JSON tree in which references {"index": picture name} become glTF texture indices.
+
+    textures : texture index by picture name
+    """
     if isinstance(value, Mapping):
         return {
             key: textures[item] if key == "index" and item in textures else resolve_textures(item, textures)
@@ -123,7 +137,7 @@ def resolve_textures(value: Any, textures: Mapping[str, int]) -> Any:
 
 
 def glb_bytes(tree: FrozenTree, binary: bytes | bytearray) -> bytes:
-    """Return the bytes of a .glb file with a JSON tree and one buffer."""
+    """Return the bytes of a .glb file that contains a JSON tree and one binary buffer."""
     text = json.dumps(tree, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     body = bytes(binary) + b"\0" * (-len(binary) % 4)

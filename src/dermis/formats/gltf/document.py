@@ -1,6 +1,6 @@
 """Access to the JSON tree and the buffers of .glb and .gltf files.
 
-Accessors may be strided, sparse, and hold integers that represent fractions.
+Strided and sparse accessors, and normalised integers, are decoded.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dermis.base.errors import refuse
 from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, parsing, read_file
 from dermis.formats.parts import to_floats
 from dermis.formats.referenced_files import resolve_uri
-from dermis.formats.size_limits import MAX_ACCESSOR_NUMBERS, MAX_FILE_BYTES, MAX_JSON_VALUES, check_limit
+from dermis.formats.size_limits import MAX_ACCESSOR_COMPONENTS, MAX_FILE_BYTES, MAX_JSON_VALUES, check_limit
 
 Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
@@ -27,10 +27,10 @@ FrozenTree = Mapping[str, Any]
 
 _MAGIC = 0x46546C67
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
-_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_MIN_READ_COST = 512  # numbers to which the overhead of reading an accessor corresponds
-_LISTS = [
+_COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_MIN_READ_COST = 512  # components whose decoding takes as long as the overhead of an accessor
+_TOP_LEVEL_ARRAYS = [
     "accessors",
     "animations",
     "buffers",
@@ -48,34 +48,34 @@ _LISTS = [
 
 @dataclass
 class Document:
-    """Content of a glTF file.
+    """JSON tree and binary data of a glTF file, with access to its accessors.
 
-    tree : its JSON
-    binary : binary chunk of a .glb file
+    tree : JSON of the file
+    binary : binary chunk of a .glb file, empty for a .gltf file
     """
 
     path: Path
     tree: Tree
     binary: bytes = b""
     _buffers: dict[int, bytes] = field(default_factory=dict)
-    _numbers_read: int = 0
+    _accessor_components: int = 0
 
     def items(self, key: str) -> list[Tree]:
-        """Return the list of objects under a key, empty if the file has none."""
+        """Return a top-level array of the JSON tree, such as "nodes"; empty if the file has none."""
         listed: list[Tree] = self.tree.get(key, [])
         return listed
 
     def item(self, key: str, index: object) -> Tree:
-        """Return an object by key and index.
+        """Return the object with an index in a top-level array of the JSON tree, such as "meshes".
 
         Raises ValueError for an invalid index.
         """
         return self.items(key)[checked_index(index, len(self.items(key)), key)]
 
     def read_buffer(self, index: int) -> bytes:
-        """Return the bytes of a buffer, wherever it is stored."""
+        """Return the bytes of a buffer from the .glb file, a data URI or another file."""
         if index not in self._buffers:
-            self._buffers[index] = self._read(self.item("buffers", index).get("uri"))
+            self._buffers[index] = self._read_uri(self.item("buffers", index).get("uri"))
         return self._buffers[index]
 
     def read_view(self, index: int) -> memoryview:
@@ -88,19 +88,22 @@ class Document:
         return data
 
     def read_values(self, index: int) -> Numbers:
-        """Return the values of an accessor as stored, (n, k), with sparse values applied."""
+        """Return n elements of k components of an accessor in their stored type, (n, k)."""
         accessor = self.item("accessors", index)
-        kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
+        kind, width = (
+            np.dtype(_COMPONENT_TYPES[accessor["componentType"]]),
+            _COMPONENT_COUNTS[accessor["type"]],
+        )
         shape = _checked_size(accessor["count"]), width
-        self._numbers_read += max(shape[0] * width, _MIN_READ_COST)
-        if self._numbers_read > MAX_ACCESSOR_NUMBERS:
+        self._accessor_components += max(shape[0] * width, _MIN_READ_COST)
+        if self._accessor_components > MAX_ACCESSOR_COMPONENTS:
             actual = f"accessor {index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
-            limit = f"accessors of at most {MAX_ACCESSOR_NUMBERS / 1e6:.0f} million numbers"
+            limit = f"accessors of at most {MAX_ACCESSOR_COMPONENTS / 1e6:.0f} million numbers"
             refuse(self.path, limit, actual, advice)
         if "bufferView" in accessor:
             stride = _checked_size(self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0))
-            values = self._rows(accessor, shape, kind, stride)
+            values = self._view_array(accessor, shape, kind, stride)
         else:
             values = np.zeros(shape, kind)
         if "sparse" not in accessor:
@@ -108,7 +111,10 @@ class Document:
         return self._with_sparse(values, accessor["sparse"])
 
     def read_floats(self, index: int) -> Doubles:
-        """Return the values of an accessor as floats, (n, k); normalised integers become fractions."""
+        """Return n elements of k components of an accessor as floats, (n, k).
+
+        Normalised integers are decoded to [0, 1] or [-1, 1].
+        """
         values = self.read_values(index)
         if not self.item("accessors", index).get("normalized", False):
             return values.astype(np.float64)
@@ -118,18 +124,19 @@ class Document:
         count = _checked_size(sparse["count"])
         if count > len(values):
             raise ValueError(f"{count} of {len(values)} values are listed as sparse")
-        index_type = np.dtype(_TYPES[sparse["indices"]["componentType"]])
-        index = self._rows(sparse["indices"], (count, 1), index_type).ravel()
+        index_type = np.dtype(_COMPONENT_TYPES[sparse["indices"]["componentType"]])
+        index = self._view_array(sparse["indices"], (count, 1), index_type).ravel()
         result = values.copy()
-        result[index] = self._rows(sparse["values"], (count, values.shape[1]), values.dtype)
+        result[index] = self._view_array(sparse["values"], (count, values.shape[1]), values.dtype)
         return result
 
-    def _rows(
+    def _view_array(
         self, location: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
     ) -> Numbers:
-        """Return numbers (n, k) at a location in a buffer view.
+        """Return an array of `shape` (n, k) and type `kind` from a buffer view.
 
-        stride : distance of rows [byte], 0 if they are contiguous
+        location : JSON object with "bufferView" and "byteOffset"
+        stride : distance between the starts of rows [byte]; 0 if they are contiguous
         """
         data, start = self.read_view(location["bufferView"]), _checked_size(location.get("byteOffset", 0))
         size = kind.itemsize
@@ -137,7 +144,7 @@ class Document:
             return np.zeros(shape, kind)
         return np.ndarray(shape, kind, data, start, (stride or size * shape[1], size))
 
-    def _read(self, uri: str | None) -> bytes:
+    def _read_uri(self, uri: str | None) -> bytes:
         if uri is None:
             return self.binary
         remaining = MAX_FILE_BYTES - sum(map(len, self._buffers.values()))
@@ -152,7 +159,9 @@ class Document:
 
 
 def checked_index(index: object, count: int, kind: str) -> int:
-    """Return an index after checking it against the number of items.
+    """Return an index after checking that it is an integer from 0 to `count` - 1.
+
+    kind : plural noun for the indexed objects, for the error
 
     Raises ValueError for an invalid index.
     """
@@ -186,14 +195,14 @@ def read_document(path: Path) -> Document:
 
 
 def _parse_tree(path: Path, text: bytes) -> Tree:
-    """Parse the JSON of a file and check that its lists contain objects."""
+    """Parse the JSON of a file and check that its top-level arrays contain objects."""
     values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
     advice = "Export it with fewer nodes, materials or clips"
     check_limit(path, values, MAX_JSON_VALUES, "values in its JSON", advice)
     tree = parse_json(text, path, "a glTF file")
     if not isinstance(tree, dict):
         raise ValueError("its JSON is not an object")
-    for key in _LISTS:
+    for key in _TOP_LEVEL_ARRAYS:
         listed = tree.get(key, [])
         if not (isinstance(listed, list) and all(isinstance(one, dict) for one in listed)):
             raise ValueError(f"its {key} are not a list of objects")
@@ -201,7 +210,7 @@ def _parse_tree(path: Path, text: bytes) -> Tree:
 
 
 def _chunks(data: bytes) -> list[tuple[int, bytes]]:
-    """Return kind and content of each chunk in reverse order, so that the first of a kind is used."""
+    """Return type and bytes of the chunks of a .glb file, last first: in a dict the first of a type wins."""
     chunks, offset = [], 12
     while offset + 8 <= len(data):
         length, kind = struct.unpack_from("<II", data, offset)

@@ -1,4 +1,4 @@
-"""Maps and eyes embedded in glTF files."""
+"""Reading of skin maps and eye parameters that are stored in glTF files."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
 def embedded_maps(path: Path) -> Tree:
-    """Return options for `load_maps` from the pictures in a .glb or .gltf file, {} without pictures.
+    """Return keyword arguments of `load_maps` from the pictures in a .glb or .gltf file, {} without pictures.
 
-    Base colour and normal map are those of the skin's material. For files written by this package, the
-    material's extras list all maps, and the normal map is used only if it is not computed from the height
-    map.
+    They are the base colour and the normal map of the skin's material. Files written by this package also
+    store all maps in the material's extras; then the normal map is used only if the extras refer to it, as it
+    may be computed from the height map for other programs.
 
     Raises DermisError when the file is damaged.
     """
     document = read_document(path)
     with parsing(path, "valid textures", *MALFORMED_DATA_ERRORS):
-        options = _maps(document)
+        options = _map_options(document)
     texels = 0
     for picture in (one for one in options.values() if isinstance(one, EmbeddedPicture) or is_file(str(one))):
         width, height = read_size(picture)
@@ -42,7 +42,7 @@ def embedded_maps(path: Path) -> Tree:
     return options
 
 
-def _maps(document: Document) -> Tree:
+def _map_options(document: Document) -> Tree:
     materials = document.items("materials") or [{}]
     skin = next((one for one in materials if "skin" in one.get("name", "").lower()), materials[0])
 
@@ -50,7 +50,7 @@ def _maps(document: Document) -> Tree:
         if reference is None or reference.get("texCoord", 0) != 0:
             return None
         source = document.item("textures", reference["index"]).get("source")
-        return None if source is None else _picture(document, source)
+        return None if source is None else _embedded_picture(document, source)
 
     options: Tree = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
     extras = skin.get("extras", {}).get("dermis")
@@ -64,7 +64,7 @@ def _maps(document: Document) -> Tree:
 
 
 def _checked_relief(height_mm: object) -> float | None:
-    """Return the relief of one grey level in a file, after checking it [mm]."""
+    """Return the relief of one grey level of an embedded 8-bit height map [mm], after checking its range."""
     if height_mm is None:
         return None
     number = height_mm if isinstance(height_mm, int | float) and not isinstance(height_mm, bool) else 0
@@ -73,7 +73,7 @@ def _checked_relief(height_mm: object) -> float | None:
     return float(number)
 
 
-def _picture(document: Document, source: int) -> EmbeddedPicture | Path | None:
+def _embedded_picture(document: Document, source: int) -> EmbeddedPicture | Path | None:
     image = document.item("images", source)
     name = f"{document.path}, image {image.get('name', source)}"
     if "bufferView" in image:
@@ -89,7 +89,7 @@ def _picture(document: Document, source: int) -> EmbeddedPicture | Path | None:
 
 
 def embedded_eye_look(path: Path) -> EyeLook:
-    """Return the eye parameters of the person in a .glb or .gltf file, or the default.
+    """Return the eye parameters in the person description of a .glb or .gltf file, or the defaults.
 
     Raises DermisError for invalid parameters.
     """

@@ -1,4 +1,4 @@
-"""Materials of exported glTF heads, for other programs, with all maps for this package."""
+"""Materials of exported glTF heads: standard ones for other programs, with all dermis maps in the extras."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 from dermis.specular.hair import ETA
 
-_IOR = {"KHR_materials_ior": {"ior": 1.4}}
-EYE, EYE_NORMAL = "eye", "eye normal"
+_SKIN_IOR = {"KHR_materials_ior": {"ior": 1.4}}
+EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 """Names of the pictures of an eye."""
-_TEARS = 0.15  # perceptual roughness of the tear film
-_COAT = 0.52  # of glTF's clear coat, which reflects 0.04 at normal incidence; eyes reflect 0.021
+_TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
+_CLEARCOAT_FACTOR = 0.52  # of glTF's clear coat, which reflects 0.04 at normal incidence; eyes reflect 0.021
 _HAIR_ROUGHNESS = 0.45
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
@@ -29,11 +29,11 @@ _DEFAULT_ROUGHNESS = 0.8
 
 @dataclass(frozen=True)
 class SkinAdditions:
-    """Additions to the material of skin.
+    """Properties that an export adds to the glTF material of skin.
 
-    surface : members of its pbrMetallicRoughness, which replace its base colour texture
-    extensions, extras : by name
-    pictures : PNG files by the names that textures reference: {"index": name}
+    surface : members for `pbrMetallicRoughness`; if there are any, they replace the base colour texture
+    extensions, extras : members for the material's `extensions` and `extras`, by name
+    pictures : PNG files by name; textures reference them as {"index": name}
     """
 
     surface: FrozenTree = field(default_factory=dict)
@@ -41,8 +41,11 @@ class SkinAdditions:
     extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def applied_to(self, material: FrozenTree) -> Tree:
-        """Return a material with the additions; a replaced colour picture is kept in the extras."""
+    def apply_to(self, material: FrozenTree) -> Tree:
+        """Return a glTF material with these properties.
+
+        A base colour texture that `surface` replaces moves to the extras.
+        """
         extended = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface = dict(material["pbrMetallicRoughness"])
         extras = {**material.get("extras", {}), **self.extras}
@@ -55,9 +58,11 @@ class SkinAdditions:
 
 
 def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
-    """Return PNG files by name, and references {"index": name} by role for this package.
+    """Return PNG files of a skin's maps by name, and the entries of the material's extras by map role.
 
-    slopes : (n, n, 2) of the relief for other programs, if `maps` has a height map and no normals
+    The extras reference pictures as {"index": name}; `embedded_maps` reads them.
+
+    slopes : (n, n, 2) of the relief, written as normal map for other programs if `maps` has none
     """
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
@@ -90,8 +95,11 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
 def surface_material(
     material: Material, pictures: Mapping[str, bytes], roles: FrozenTree, roughness: float
 ) -> Tree:
-    """Return a glTF material whose textures reference pictures by name: {"index": name}.
+    """Return the glTF material of skin or of another opaque surface.
 
+    Its textures reference pictures by name, as {"index": name}.
+
+    roles : entries of the extras of skin, see `skin_pictures`
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
@@ -108,38 +116,42 @@ def surface_material(
     gltf: Tree = {"name": name, "pbrMetallicRoughness": surface}
     if "normal" in pictures:
         gltf["normalTexture"] = {"index": "normal"}
-    return gltf | {"extensions": _IOR, "extras": {"dermis": dict(roles)}}
+    return gltf | {"extensions": _SKIN_IOR, "extras": {"dermis": dict(roles)}}
 
 
 def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
-    """Return the PNG files of an eyeball by name."""
-    return {EYE: colours_png(eyes.colour), EYE_NORMAL: encode_png(_to_bytes(0.5 * eyes.normal + 0.5))}
+    """Return the colour map and the normal map of an eyeball as PNG files by name."""
+    return {
+        EYE_PICTURE: colours_png(eyes.colour),
+        EYE_NORMAL_PICTURE: encode_png(_to_bytes(0.5 * eyes.normal + 0.5)),
+    }
 
 
 def eye_material(material: Material) -> Tree:
-    """Return the material of a painted eyeball with a clear coat as tear film.
+    """Return the glTF material of a textured eyeball, whose tear film is a clear coat.
 
-    The surface below the coat has other normals, and is specular only in programs without clear coat.
+    Its normal map applies to the surface below the coat, which is specular only in programs without clear
+    coat.
     """
-    surface = _base_material(material, _TEARS) | {"baseColorTexture": {"index": EYE}}
+    surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]
-    coat = {"clearcoatFactor": _COAT, "clearcoatRoughnessFactor": _TEARS}
+    coat = {"clearcoatFactor": _CLEARCOAT_FACTOR, "clearcoatRoughnessFactor": _TEAR_FILM_ROUGHNESS}
     return {
         "name": material.name,
         "pbrMetallicRoughness": surface,
-        "normalTexture": {"index": EYE_NORMAL},
+        "normalTexture": {"index": EYE_NORMAL_PICTURE},
         "extensions": {"KHR_materials_clearcoat": coat, "KHR_materials_specular": {"specularFactor": 0.0}},
     }
 
 
 def hair_material(name: str) -> Tree:
-    """Return the material of hairs, with a picture of the same name."""
+    """Return the glTF material of hairs, whose colours are in the picture called `name`."""
     surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGHNESS}
     return {"name": name, "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_ior": {"ior": ETA}}}
 
 
 def colours_png(linear: Floats) -> bytes:
-    """Return a PNG file of linear colours (h, w, 3)."""
+    """Encode linear colours (h, w, 3) as an sRGB PNG file."""
     return encode_png(encode_srgb8(linear))
 
 
@@ -149,7 +161,7 @@ def _base_material(material: Material, roughness: float) -> Tree:
 
 
 def _normal_colours(slopes: Floats) -> Bytes:
-    """Return slopes as a tangent-space normal map (h, w, 3), green up."""
+    """Return the tangent-space normal map (h, w, 3) of slopes (h, w, 2) as 8-bit colours, green up."""
     normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return _to_bytes(0.5 * normal + 0.5)

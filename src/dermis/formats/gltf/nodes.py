@@ -15,13 +15,14 @@ from dermis.mesh.rotations import quaternion_matrix
 
 @dataclass(frozen=True)
 class Nodes:
-    """All nodes of a file.
+    """Node hierarchy of a file: n nodes with their transforms at rest.
 
-    names : (n,) unique
-    parent : (n,) -1 for a root
-    order : (n,) parents before children
-    local, world : (n, 4, 4) to the parent's space and to the scene's, at rest
-    scene_nodes : nodes of the scene, in the order of their meshes; None for a file without scenes
+    names : (n,) unique names
+    parent : (n,) index of each node's parent, -1 for a root
+    order : (n,) node indices, parents before children
+    local, world : (n, 4, 4) transforms at rest from a node's space to its parent's, and to the scene's
+    scene_nodes : indices of the nodes of the scene, in the order in which meshes are read; None without
+        scenes
     """
 
     names: tuple[str, ...]
@@ -32,7 +33,7 @@ class Nodes:
     scene_nodes: tuple[int, ...] | None
 
     def ancestors(self, node: int) -> list[int]:
-        """Return a node, its parent and so on up to the root."""
+        """Return the indices of a node, its parent and so on up to the root."""
         path = [node]
         while self.parent[path[-1]] >= 0:
             path.append(self.parent[path[-1]])
@@ -46,8 +47,8 @@ def read_nodes(document: Document) -> Nodes:
     """
     nodes = document.items("nodes")
     check_limit(document.path, len(nodes), MAX_NODES, "nodes", "Export the head alone")
-    names, parent = node_names(nodes), _parents(nodes)
-    order = _order(document, names, parent)
+    names, parent = node_names(nodes), _node_parents(nodes)
+    order = _parents_first(document, names, parent)
     local = np.array([_local_matrix(node) for node in nodes]).reshape(-1, 4, 4)
     world, depth = local.copy(), [0] * len(nodes)
     for index in order:
@@ -60,7 +61,7 @@ def read_nodes(document: Document) -> Nodes:
 
 
 def node_names(nodes: list[Tree]) -> tuple[str, ...]:
-    """Return unique names of nodes: their own, with a number appended to duplicates."""
+    """Return unique names of nodes: those of the file, with a number appended to repeated ones."""
     names: dict[str, None] = {}
     counts: dict[str, int] = {}
     for index, node in enumerate(nodes):
@@ -72,7 +73,7 @@ def node_names(nodes: list[Tree]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _parents(nodes: list[Tree]) -> tuple[int, ...]:
+def _node_parents(nodes: list[Tree]) -> tuple[int, ...]:
     parent = [-1] * len(nodes)
     for index, node in enumerate(nodes):
         for child in node.get("children", []):
@@ -82,7 +83,7 @@ def _parents(nodes: list[Tree]) -> tuple[int, ...]:
     return tuple(parent)
 
 
-def _order(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) -> tuple[int, ...]:
+def _parents_first(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) -> tuple[int, ...]:
     children: dict[int, list[int]] = {}
     for index, own_parent in enumerate(parent):
         children.setdefault(own_parent, []).append(index)
@@ -97,7 +98,7 @@ def _order(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) 
 
 
 def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
-    """Return the nodes of the scene, the last child of each first."""
+    """Return the indices of the scene's nodes, parents before children; None for a file without scenes."""
     if "scenes" not in document.tree:
         return None
     pending = list(document.item("scenes", document.tree.get("scene", 0)).get("nodes", []))
@@ -111,7 +112,7 @@ def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | Non
 
 
 def _local_matrix(node: Tree) -> Doubles:
-    """Return the matrix (4, 4) from a node's space to its parent's."""
+    """Return the matrix (4, 4) from a node's space to its parent's space."""
     matrix = np.eye(4)
     if "matrix" in node:
         matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T

@@ -1,4 +1,4 @@
-"""Primitives of exported glTF heads: one per material, and hairs as thin three-sided tubes."""
+"""Primitives of exported glTF heads: triangles of each material, and hairs as thin three-sided tubes."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _TINY = 1e-9
 
 
 class PrimitiveSource(Protocol):
-    """Geometry that is written as a glTF primitive."""
+    """Geometry that can be written as a glTF primitive with morph targets."""
 
     def primitive(self, binary: BufferBuilder) -> Tree:
-        """Return the glTF primitive without material and morph targets."""
+        """Append vertices and triangles to the buffer; return the primitive without material and targets."""
         ...
 
     def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
-        """Return the accessors of a morph target by attribute."""
+        """Append a morph target to the buffer, and return its accessor indices by attribute name."""
         ...
 
 
@@ -44,8 +44,9 @@ class PrimitiveSource(Protocol):
 class SurfacePrimitive:
     """Triangles of one material, with the vertices that they use.
 
-    faces : (f,) triangles of the mesh
-    eye : index of the eye whose uv layout is used for a painted eyeball; -1 for none
+    points : the whole mesh
+    faces : (f,) indices of the triangles
+    eye : index of the eye whose uv layout a textured eyeball uses; -1 for other surfaces
     """
 
     points: DeformableMesh
@@ -58,11 +59,15 @@ class SurfacePrimitive:
 
     @cached_property
     def vertices(self) -> Ints:
-        """Return the used vertices of the mesh in file order, (v,)."""
+        """Return the indices of the mesh vertices that the triangles use, (v,), increasing."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def primitive(self, binary: BufferBuilder) -> Tree:
-        """Return the glTF primitive; its extras tell whether it has quads and separate points."""
+        """Append vertices and triangles to the buffer; return the primitive without material and targets.
+
+        Its extras record whether triangles form quads, and whether points are not shared with other
+        primitives.
+        """
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
@@ -74,7 +79,7 @@ class SurfacePrimitive:
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
     def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
-        """Return the accessors of position and normal displacements."""
+        """Append position and normal displacements to the buffer; return accessors by attribute name."""
         used = np.flatnonzero(np.isin(target.vertex, self.vertices, assume_unique=True))
         row = np.searchsorted(self.vertices, target.vertex[used])
         columns = [to_metres(target.delta_mm[used]), target.normal[used]]
@@ -88,14 +93,14 @@ class SurfacePrimitive:
         return eye_uv(head.mesh.positions[self.vertices] @ frame[:3, :3].T + frame[:3, 3])
 
     def _has_quads(self) -> bool:
-        """Return whether each two consecutive triangles are the halves of a quad."""
+        """Return whether triangles 0 and 1, 2 and 3, and so on are the halves of quads."""
         mesh = self._head.mesh
         other = np.full(len(mesh.triangles), -1)
         other[mesh.quads[:, 0]] = mesh.quads[:, 1]
         return len(self.faces) % 2 == 0 and bool((other[self.faces[::2]] == self.faces[1::2]).all())
 
     def _is_separate(self) -> bool:
-        """Return whether the triangles share no points with other triangles."""
+        """Return whether the triangles share no points with triangles of other materials."""
         mesh = self._head.mesh
         others = np.delete(np.arange(len(mesh.triangles)), self.faces)
         own_points, other_points = (mesh.point[mesh.triangles[part]] for part in (self.faces, others))
@@ -104,7 +109,7 @@ class SurfacePrimitive:
 
 @dataclass(frozen=True, eq=False)
 class HairPrimitive:
-    """Hairs as tubes, coloured by a picture with one row."""
+    """Hairs as tubes; their colours are the texels of a picture with one row."""
 
     points: DeformableMesh
     fibres: FibreTubes
@@ -114,8 +119,11 @@ class HairPrimitive:
         return replace(self.points.head.mesh, positions=self.points.positions_mm).points_mm
 
     def primitive(self, binary: BufferBuilder) -> Tree:
-        """Return the glTF primitive; its extras make this package skip it when reading."""
-        positions, normals = self.fibres.posed(self._rest)
+        """Append vertices and triangles to the buffer; return the primitive without material and targets.
+
+        Its extras mark it as hair, which `read_gltf` skips.
+        """
+        positions, normals = self.fibres.pose_vertices(self._rest)
         _, uv = self.fibres.colours()
         attributes = _attributes(binary, positions, normals.astype(np.float32), uv)
         attributes |= _bone_attributes(
@@ -125,7 +133,7 @@ class HairPrimitive:
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
-        """Return the accessor of position displacements; normals do not change."""
+        """Append position displacements to the buffer and return their accessor; normals do not change."""
         delta, mesh = np.zeros_like(self._rest), self.points.head.mesh
         delta[mesh.point[target.vertex]] = target.delta_mm
         vertex, displacement = self.fibres.displacements_at(self._rest, delta)
@@ -134,7 +142,7 @@ class HairPrimitive:
 
 
 def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
-    """Convert lengths from millimetres to the unit of glTF."""
+    """Convert lengths from millimetres to metres, the unit of glTF."""
     return (positions_mm.astype(np.float64) * _METRES_PER_MM).astype(np.float32)
 
 
@@ -151,7 +159,10 @@ def _attributes(
 def _bone_attributes(
     binary: BufferBuilder, points: DeformableMesh, vertex: NDArray[np.integer]
 ) -> dict[str, int]:
-    """Return the accessors of joints and weights of vertices, none without a skeleton."""
+    """Append joints and weights of vertices to the buffer, and return their accessors; {} without a skeleton.
+
+    vertex : (v,) indices of the vertices in the mesh
+    """
     if points.rig.skeleton is None:
         return {}
     bone, weight = points.bone_influences
@@ -163,9 +174,9 @@ def _bone_attributes(
 
 @dataclass(frozen=True, eq=False)
 class FibreTubes:
-    """Rigid tubes around hairs, which rotate with the quads of their roots.
+    """Tubes around n hairs with m vertices each; a tube is rigid and follows the skin quad at its root.
 
-    mesh : with the quads
+    mesh : skin on which the hairs grow
     """
 
     strands: Strands
@@ -173,7 +184,11 @@ class FibreTubes:
 
     @classmethod
     def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knots: int) -> FibreTubes:
-        """Return tubes of the first hairs, widened to cover as much as all hairs, with fewer knots."""
+        """Return tubes for at most `max_hairs` hairs with `knots` knots each.
+
+        They are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
+        accordingly.
+        """
         count = min(len(strands), max_hairs)
         width_factor = len(strands) / count
         roots = Roots(strands.roots.quad[:count], strands.roots.position[:count])
@@ -194,7 +209,7 @@ class FibreTubes:
 
     @property
     def vertices_per_hair(self) -> int:
-        """Return the number of vertices of a hair: rings at all knots and one at the tip."""
+        """Return the number of vertices of a hair: a ring at each knot, and a single vertex at the tip."""
         return _SIDES * (self._knots - 1) + 1
 
     @property
@@ -204,7 +219,7 @@ class FibreTubes:
 
     @property
     def root_vertices(self) -> Intp:
-        """Return the mesh vertex nearest to each root, (n,)."""
+        """Return the index of the mesh vertex nearest to each root, (n,)."""
         nearest = quad_weights(self.strands.roots.position).argmax(axis=1)
         first, second = self.mesh.quads[self.strands.roots.quad].T
         corners = np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second, 1]])
@@ -212,7 +227,7 @@ class FibreTubes:
 
     @cached_property
     def _rings(self) -> tuple[Doubles, Doubles]:
-        """Return vertex positions relative to the roots [mm] and unit normals, (n, m, 3) each."""
+        """Return tube vertices relative to the roots [mm] and normals, (n, m, 3) each, in root frames."""
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _TINY)
@@ -230,16 +245,21 @@ class FibreTubes:
         all_positions = np.concatenate([*positions, knots[:, -1:]], axis=1)
         return all_positions, np.concatenate([*normals, tangent[:, -1:]], axis=1)
 
-    def posed(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-        """Return positions [mm] and normals of all vertices, (n m, 3) each, for mesh points (p, 3)."""
+    def pose_vertices(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+        """Return the tube vertices [mm] and their normals, (n m, 3) each, on a posed skin.
+
+        points_mm : (p, 3) points of the posed mesh
+        """
         root, frame = root_frames(self.mesh, self.strands.roots, points_mm)
         offsets, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._rings)
         return (root[:, None] + offsets).reshape(-1, 3), normals.reshape(-1, 3)
 
     def displacements_at(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
-        """Return moving vertices (n,) and their displacements (n, 3) [mm] for moving mesh points.
+        """Return the tube vertices that move when the skin is displaced.
 
-        points_mm, delta_mm : (p, 3) points of the mesh and their displacements
+        They are vertex indices (k,) and displacements (k, 3) [mm].
+
+        points_mm, delta_mm : (p, 3) points of the mesh at rest, and their displacements
         """
         first, second = self.mesh.quads[self.strands.roots.quad].T
         corners = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
@@ -255,7 +275,7 @@ class FibreTubes:
         return vertex.ravel(), delta[moving].reshape(-1, 3)
 
     def triangles(self) -> Index:
-        """Return the vertices of the triangles, (f, 3)."""
+        """Return the vertex indices of the tubes' triangles, (f, 3)."""
         side, following = np.arange(_SIDES), (np.arange(_SIDES) + 1) % _SIDES
         faces = list[Index]()
         for k in range(self._knots - 2):
@@ -268,7 +288,7 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a row of linear colours (1, c, 3), and uv (n m, 2) of each vertex in it."""
+        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_ALBEDO * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

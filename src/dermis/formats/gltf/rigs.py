@@ -1,4 +1,4 @@
-"""Morph targets, bones and skin weights of glTF files."""
+"""Reading of morph targets, bones and skin weights from glTF files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BATCH = 1 << 16  # vertices
 
 
 class SkinInfluences(NamedTuple):
-    """Bones and weights of vertices; the weights of each vertex sum to 1.
+    """Bones that move each vertex, and their weights, which sum to 1.
 
     bone, weight : (v, 4)
     """
@@ -33,10 +33,10 @@ class SkinInfluences(NamedTuple):
 
 @dataclass(frozen=True)
 class Armature:
-    """Bones of a scene.
+    """Bones of a glTF scene: joints of skins, and animated nodes.
 
-    bone_of_node : index of the bone by node
-    static_bone : root bone for meshes that follow no other bone
+    bone_of_node : bone index by node index
+    static_bone : index of the added root bone for meshes that no bone moves; None without such meshes
     """
 
     bones: Bones
@@ -44,19 +44,22 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
-        """Return the bone of a mesh without skin: that of its node or of the nearest ancestor."""
+        """Return the bone that moves a mesh without skin: that of its node, else of the nearest ancestor."""
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)
 
 
 def read_armature(document: Document, nodes: Nodes) -> Armature | None:
-    """Return the bones of a scene, or None: joints, animated nodes above meshes, and all their ancestors."""
+    """Return the bones of a scene, or None if nothing in it can move.
+
+    Bones are joints of skins, animated nodes that carry meshes, and the ancestors of both.
+    """
     meshes = [k for k in nodes.scene_nodes or () if "mesh" in document.items("nodes")[k]]
     skinned = [k for k in meshes if "skin" in document.items("nodes")[k]]
     rigid = [k for k in meshes if k not in set(skinned)]
-    joints = {joint for k in skinned for joint in _skin(document, k)["joints"]}
+    joints = {joint for k in skinned for joint in _node_skin(document, k)["joints"]}
     mesh_ancestors = {node for k in rigid for node in nodes.ancestors(k)}
-    moving = joints | (_animated(document) & mesh_ancestors)
+    moving = joints | (_animated_nodes(document) & mesh_ancestors)
     bone_nodes = {node for k in moving for node in nodes.ancestors(k)}
     if not bone_nodes:
         return None
@@ -73,20 +76,20 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones below a new root at the origin."""
+    """Return the bones below an additional root bone at the origin, for meshes that no bone moves."""
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)
     local, world = (np.concatenate([np.eye(4)[None], one]) for one in (bones.local, bones.world))
     return Bones((name, *bones.names), parent, local, world)
 
 
-def _animated(document: Document) -> set[int]:
+def _animated_nodes(document: Document) -> set[int]:
     channels = [channel for clip in document.items("animations") for channel in clip["channels"]]
     targets = [channel["target"] for channel in channels]
     return {target["node"] for target in targets if target["path"] in _NODE_PATHS and "node" in target}
 
 
-def _skin(document: Document, node: int) -> Tree:
+def _node_skin(document: Document, node: int) -> Tree:
     skin = document.item("skins", document.items("nodes")[node]["skin"])
     joints = skin["joints"]
     check_limit(document.path, len(joints), MAX_BONES, "joints of a skin", "Export it with fewer")
@@ -98,11 +101,15 @@ def _skin(document: Document, node: int) -> Tree:
 def read_influences(
     document: Document, nodes: Nodes, armature: Armature, node: int, primitive: Tree
 ) -> tuple[SkinInfluences, Doubles]:
-    """Return bones and weights of a skinned primitive, and the rest matrix of each vertex, (v, 4, 4).
+    """Return bones and weights of a skinned primitive, and the rest skinning matrix of each vertex.
+
+    The skinning matrices (v, 4, 4) map mesh space to scene space.
+
+    node : index of the node with the skin
 
     Raises DermisError for invalid weights and joints.
     """
-    skin, attributes = _skin(document, node), primitive["attributes"]
+    skin, attributes = _node_skin(document, node), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in attributes))
     culprit = f"{document.path}: {nodes.names[node]!r}"
     check_limit(culprit, 4 * count, MAX_INFLUENCES, "joints of a vertex", "Export it with fewer")
@@ -140,7 +147,10 @@ def _check_weights(document: Document, name: str, joint: Index, weight: Doubles,
 
 
 def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:
-    """Return the four largest weights of each vertex, normalised to sum 1, and their joints, (v, 4) each."""
+    """Return the joints of the four largest weights of each vertex, and these weights, (v, 4) each.
+
+    The weights are normalised to sum 1.
+    """
     if weight.shape[1] > INFLUENCES:
         order = np.argsort(-weight, axis=1, kind="stable")[:, :INFLUENCES]
         joint, weight = np.take_along_axis(joint, order, axis=1), np.take_along_axis(weight, order, axis=1)
@@ -151,10 +161,10 @@ def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles
 
 
 class VertexDisplacements(NamedTuple):
-    """Vertices displaced by a morph target, and displacements at weight 1.
+    """Vertices that a morph target displaces, and their displacements at weight 1.
 
-    vertex : (n,)
-    delta : (n, 3)
+    vertex : (n,) indices of the displaced vertices
+    delta : (n, 3) displacements in the units of the file
     """
 
     vertex: Index
@@ -162,7 +172,11 @@ class VertexDisplacements(NamedTuple):
 
 
 def target_names(mesh: Tree) -> tuple[str, ...]:
-    """Return the names of a mesh's targets from its extras, as most programs write them, else "target N"."""
+    """Return the names of a mesh's morph targets.
+
+    They are "targetNames" of its extras, which most programs write; a target without a name is called
+    "target" and its index.
+    """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
     listed = extras.get("targetNames") if isinstance(extras, dict) else None
@@ -176,12 +190,12 @@ def target_names(mesh: Tree) -> tuple[str, ...]:
 def read_targets(
     document: Document, mesh: Tree, names: tuple[str, ...], primitive: Tree, count: int
 ) -> dict[str, VertexDisplacements]:
-    """Return the displacements of a primitive's vertices by target name, in the mesh's space.
+    """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
-    names : of the mesh's targets
+    names : of the morph targets of the mesh
     count : number of vertices of the primitive
 
-    Raises DermisError for another number of displacements, and for values that are not finite.
+    Raises DermisError if the number of displacements is not `count`, and for values that are not finite.
     """
     displacements: dict[str, VertexDisplacements] = {}
     for name, target in zip(names, primitive.get("targets", []), strict=False):
@@ -200,7 +214,7 @@ def read_targets(
 
 
 def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
-    """Return the default weights of targets in the scene by name, where they are not 0.
+    """Return the default weights of the scene's morph targets by name, without those of weight 0.
 
     Weights of a node override those of its mesh. Targets with the same name in several meshes are one target;
     the first weight is used.
@@ -223,7 +237,10 @@ def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
 def apply_targets(
     positions: Doubles, targets: Mapping[str, VertexDisplacements], weights: Mapping[str, float]
 ) -> Doubles:
-    """Return positions (v, 3) displaced by targets with given weights."""
+    """Return positions (v, 3) displaced by morph targets.
+
+    weights : by target name; missing ones are 0
+    """
     result = positions
     for name, target in targets.items():
         if weights.get(name):

@@ -1,4 +1,4 @@
-"""Triangles of a glTF scene, with targets, bones and weights."""
+"""Reading of the triangles of a glTF scene, with morph targets and skin weights."""
 
 from __future__ import annotations
 
@@ -43,20 +43,21 @@ _SUPPORTED_EXTENSIONS = (
 
 
 def read_gltf(path: Path) -> MeshFile:
-    """Read the scene of a .glb or .gltf file at rest: joints at their nodes, targets at default weights.
+    """Read the scene of a .glb or .gltf file in its rest pose.
 
-    A mesh with a skin is transformed by its joints, independently of its own node.
+    Joints have the transforms of their nodes, and morph targets their default weights. A mesh with a skin is
+    transformed by its joints, independently of its own node.
     """
     document = read_document(path)
     _refuse_extensions(document)
     nodes = read_nodes(document)
     armature, weights = read_armature(document, nodes), default_weights(document, nodes)
-    parts = list(_Reader(document, nodes, armature, weights).parts())
+    parts = list(_SceneReader(document, nodes, armature, weights).parts())
     return MeshFile(parts, armature.bones if armature else None, weights)
 
 
 def _refuse_extensions(document: Document) -> None:
-    """Refuse files that require extensions with encoded geometry."""
+    """Refuse a file that requires unsupported extensions, such as compressed geometry."""
     required = map(str, document.items("extensionsRequired"))
     unsupported = [name for name in required if not name.startswith(_SUPPORTED_EXTENSIONS)]
     if unsupported:
@@ -65,8 +66,11 @@ def _refuse_extensions(document: Document) -> None:
 
 
 @dataclass
-class _Reader:
-    """Reader of the primitives of a scene."""
+class _SceneReader:
+    """Reader of the primitives of a glTF scene as mesh parts.
+
+    weights : default weights of morph targets by name
+    """
 
     document: Document
     nodes: Nodes
@@ -74,7 +78,7 @@ class _Reader:
     weights: dict[str, float]
 
     def parts(self) -> Iterator[MeshPart]:
-        """Yield the parts of the scene while checking their total size."""
+        """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
         counts = dict.fromkeys(_MAX_COUNTS, 0)
         for part in self._all_parts():
             displaced = sum(len(vertex) for vertex, _ in part.targets.values())
@@ -85,7 +89,10 @@ class _Reader:
             yield part
 
     def _check_count(self, name: str, count: int) -> None:
-        """Refuse a scene that is too large before all of it is built; each instance of a mesh counts."""
+        """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
+
+        name : of the limit, a key of `_MAX_COUNTS`
+        """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
 
@@ -93,37 +100,40 @@ class _Reader:
         nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
         meshes = [k for k in scene_nodes if "mesh" in nodes[k]]
         for node in meshes:
-            yield from self._mesh(self.document.item("meshes", nodes[node]["mesh"]), node)
+            yield from self._mesh_parts(self.document.item("meshes", nodes[node]["mesh"]), node)
         if not meshes:  # a file with meshes but without nodes
             for mesh in self.document.items("meshes"):
-                yield from self._mesh(mesh, None)
+                yield from self._mesh_parts(mesh, None)
 
-    def _mesh(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
+    def _mesh_parts(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
             has_triangles = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
             if has_triangles and _own_extras(primitive).get("hair") is not True:
-                yield self._part(mesh, names, primitive, node)
+                yield self._scene_part(mesh, names, primitive, node)
 
-    def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
-        """Return a primitive transformed by its node or by the joints of its skin."""
-        part, targets = self._untransformed(mesh, names, primitive)
+    def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
+        """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
+
+        names : of the morph targets of the mesh
+        """
+        part, targets = self._read_primitive(mesh, names, primitive)
         if node is None:
-            return _transformed(part, targets, np.eye(4))
+            return _transform_part(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
             influences, matrices = read_influences(self.document, self.nodes, self.armature, node, primitive)
             return _skin_part(part, targets, influences, matrices)
-        transformed = _transformed(part, targets, _nearest_rigid(self.nodes.world[node]))
+        transformed = _transform_part(part, targets, _nearest_rigid(self.nodes.world[node]))
         bone = self.armature.bone_for_node(self.nodes, node) if self.armature else None
         if bone is None:
             return transformed
         count = len(part.positions)
         return replace(transformed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
-    def _untransformed(
+    def _read_primitive(
         self, mesh: Tree, names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """Return a primitive in mesh space with targets at default weights, and all its targets."""
+        """Return a primitive in mesh space with morph targets at default weights, and all morph targets."""
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
@@ -139,7 +149,7 @@ class _Reader:
         extras = _own_extras(primitive)
         corner_counts = np.full(len(triangles) // 2 if extras.get("quads") is True else 0, 4)
         return MeshPart(
-            self._group(mesh, primitive),
+            self._material_group(mesh, primitive),
             displaced,
             uv,
             normals,
@@ -149,7 +159,10 @@ class _Reader:
         ), targets
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
-        """Return the corners of a primitive's triangles, (f, 3)."""
+        """Return the vertex indices of a primitive's triangles, (f, 3); strips and fans are expanded.
+
+        count : number of vertices of the primitive
+        """
         index = np.arange(count)
         if "indices" in primitive:
             corners = self.document.item("accessors", primitive["indices"])["count"]
@@ -164,7 +177,7 @@ class _Reader:
         strip[1::2] = strip[1::2, ::-1]
         return strip
 
-    def _group(self, mesh: Tree, primitive: Tree) -> MaterialGroup:
+    def _material_group(self, mesh: Tree, primitive: Tree) -> MaterialGroup:
         material: Tree = {}
         if "material" in primitive:
             material = self.document.item("materials", primitive["material"])
@@ -174,14 +187,17 @@ class _Reader:
 
 
 def _own_extras(primitive: Tree) -> Tree:
-    """Return what this package stored in the extras of a primitive."""
+    """Return the "dermis" entry of a primitive's extras, which exports of this package write, else {}."""
     extras = primitive.get("extras")
     own = extras.get("dermis") if isinstance(extras, dict) else None
     return own if isinstance(own, dict) else {}
 
 
-def _transformed(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
-    """Return a part transformed by `matrix` (4, 4); reflections flip the orientation of triangles."""
+def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
+    """Return a mesh part and its morph targets transformed by `matrix` (4, 4).
+
+    Reflections reverse the vertex order of triangles, so that they still face outwards.
+    """
     linear = matrix[:3, :3]
     return replace(
         part,
@@ -193,7 +209,10 @@ def _transformed(part: MeshPart, targets: dict[str, VertexDisplacements], matrix
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """Return the nearest rigid matrix if the deviation is only rounding, as with scales of 1.0000001."""
+    """Return the nearest rigid transform of a matrix (4, 4) that deviates from one only by rounding.
+
+    Other matrices are returned unchanged. Exporters write scales such as 1.0000001.
+    """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:
         return matrix
@@ -206,7 +225,10 @@ def _nearest_rigid(matrix: Doubles) -> Doubles:
 def _skin_part(
     part: MeshPart, targets: dict[str, VertexDisplacements], influences: SkinInfluences, matrices: Doubles
 ) -> MeshPart:
-    """Return a part whose vertices are transformed by one matrix each, (v, 4, 4)."""
+    """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
+
+    matrices : (v, 4, 4) skinning matrices at rest
+    """
     if len(influences.bone) != len(part.positions):
         raise ValueError(f"{len(part.positions)} vertices have {len(influences.bone)} joints")
     linear = matrices[:, :3, :3]
@@ -228,10 +250,10 @@ def _skin_part(
 
 
 def _normal_matrix(linear: Doubles) -> Doubles:
-    """Return the matrices (..., 3, 3) that transform normals for the linear part of transforms.
+    """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
-    They are scaled to preserve the length of normals. Cofactors are used because they are also valid for
-    singular transforms.
+    They are scaled so that a uniform scale preserves the length of normals. Cofactors are used because they
+    are also valid for singular transforms.
     """
     rows = [linear[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)

@@ -42,24 +42,24 @@ def encode_head(
     eyes: EyeTextures | None = None,
     additions: SkinAdditions | None = None,
 ) -> bytes:
-    """Encode a head as a .glb file in metres, with one primitive per material, targets and a skin.
+    """Encode a head as a .glb file in metres: one primitive per material, with morph targets and a skin.
 
-    Hairs become thin tubes, which this package does not read back. The result is deterministic.
+    Hairs become thin tubes, which this package does not read back. Equal heads give identical bytes.
 
     roughness : Beckmann's m of skin without a roughness map [-]
-    weights : of morph targets at rest, in addition to the head's own
-    slopes : (n, n, 2) of the relief for programs that read no height map
-    notes : extras of the file
-    eyes : pictures of the eyes; None for a uniform colour
-    additions : to the material of skin
+    weights : default weights of morph targets by name, which override those of the rest pose
+    slopes : (n, n, 2) of the relief, written as normal map for programs that read no height map
+    notes : extras of the file's asset
+    eyes : maps of the eyeballs; None for eyes in a uniform colour
+    additions : properties to add to the material of skin
     """
     binary, points = BufferBuilder(), DeformableMesh(head)
     pictures, roles = skin_pictures(head.maps, slopes)
     pictures |= {} if additions is None else additions.pictures
-    parts, materials = _parts(points, pictures, roles, roughness, eyes)
+    parts, materials = _primitive_sources(points, pictures, roles, roughness, eyes)
     if additions is not None:
         materials = [
-            additions.applied_to(material) if "dermis" in material.get("extras", {}) else material
+            additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
             for material in materials
         ]
     images = [
@@ -67,14 +67,14 @@ def encode_head(
         for name, data in pictures.items()
     ]
     textures = {name: index for index, name in enumerate(pictures)}
-    nodes, roots, skins = _nodes(head, binary)
+    nodes, roots, skins = _gltf_nodes(head, binary)
     tree = {
         "asset": _asset(head, notes),
         "extensionsUsed": sorted({name for material in materials for name in material.get("extensions", {})}),
         "scene": 0,
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
-        "meshes": [_mesh(points, binary, parts, weights or {})],
+        "meshes": [_gltf_mesh(points, binary, parts, weights or {})],
         "skins": skins,
         "materials": [resolve_textures(material, textures) for material in materials],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
@@ -87,14 +87,18 @@ def encode_head(
     return glb_bytes({key: value for key, value in tree.items() if value != []}, binary.data)
 
 
-def _parts(
+def _primitive_sources(
     points: DeformableMesh,
     pictures: dict[str, bytes],
     roles: FrozenTree,
     roughness: float,
     eyes: EyeTextures | None,
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
-    """Return sources of primitives and their materials, and add pictures of eyes and hairs."""
+    """Return the geometry of each glTF primitive and the material of each, in the same order.
+
+    pictures : PNG files by name; those of eyes and hairs are added
+    roles : entries of the extras of skin, see `skin_pictures`
+    """
     head = points.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
@@ -121,12 +125,15 @@ def _asset(head: Head, notes: FrozenTree | None) -> Tree:
     return asset | ({"extras": dict(notes)} if notes else {})
 
 
-def _mesh(
+def _gltf_mesh(
     points: DeformableMesh, binary: BufferBuilder, parts: list[PrimitiveSource], weights: Mapping[str, float]
 ) -> Tree:
-    """Return the glTF mesh, with one primitive per part whose material has the same index."""
+    """Return the glTF mesh with its primitives, morph targets and default weights.
+
+    parts : geometry of each primitive; the material of a primitive has the same index
+    """
     primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
-    mesh: Tree = {"name": _name(points.head), "primitives": primitives}
+    mesh: Tree = {"name": _mesh_name(points.head), "primitives": primitives}
     names, rest = points.rig.targets.names, points.rig.targets.rest
     if not names:
         return mesh
@@ -138,31 +145,31 @@ def _mesh(
     return mesh | {"weights": values, "extras": {"targetNames": list(names)}}
 
 
-def _name(head: Head) -> str:
-    """Return the name of the mesh, which must differ from the names of bones."""
+def _mesh_name(head: Head) -> str:
+    """Return a name for the mesh that no bone has."""
     name = Path(head.name).stem or "head"
     return f"{name} mesh" if name in head.bones else name
 
 
-def _nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """Return all nodes, the indices of root nodes, and the skin; bones first, the mesh last."""
+def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
+    """Return all glTF nodes, bones first and the mesh last, the indices of root nodes, and the skin."""
     skeleton = head.control.skeleton
     if skeleton is None:
-        return [{"name": _name(head), "mesh": 0}], [0], []
-    nodes, inverse_bind = _bones(skeleton)
+        return [{"name": _mesh_name(head), "mesh": 0}], [0], []
+    nodes, inverse_bind = _bone_nodes(skeleton)
     roots = np.flatnonzero(skeleton.parent < 0).tolist()
     if len(roots) > 1:  # the joints of a skin need a common root
-        nodes.append({"name": f"{_name(head)} bones", "children": roots})
+        nodes.append({"name": f"{_mesh_name(head)} bones", "children": roots})
         roots = [len(nodes) - 1]
     skin = {"joints": list(range(len(skeleton.names))), "skeleton": roots[0]}
     rows = inverse_bind.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
     skin["inverseBindMatrices"] = binary.add_accessor(rows)
-    nodes.append({"name": _name(head), "mesh": 0, "skin": 0})
+    nodes.append({"name": _mesh_name(head), "mesh": 0, "skin": 0})
     return nodes, [*roots, len(nodes) - 1], [skin]
 
 
-def _bones(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
-    """Return bone nodes in metres, and the inverse bind matrices (b, 4, 4)."""
+def _bone_nodes(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
+    """Return the glTF nodes of b bones in metres, and their inverse bind matrices (b, 4, 4)."""
     to_file = np.diag([_METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     scaled_up, scaled_down = (np.diag([factor] * 3 + [1.0]) for factor in (size, 1.0 / size))
@@ -176,7 +183,7 @@ def _bones(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
 
 
 def _node_transform(matrix: Doubles) -> Tree:
-    """Return the transform of a node, as a translation if it is one."""
+    """Return the transform of a glTF node: "translation" for a pure translation, else "matrix"."""
     if np.abs(matrix[:3, :3] - np.eye(3)).max() < 1e-9:
         return {"translation": [float(x) for x in matrix[:3, 3]]}
     return {"matrix": [float(x) for x in matrix.T.ravel()]}

@@ -1,1 +1,1 @@
-"""Motion from files: animation clips, facial captures and mesh sequences."""
+"""Motion from files: animation clips, facial captures and sequences of meshes."""

@@ -1,4 +1,4 @@
-"""Facial captures: matching of blend shape names to targets, and rotations of head and eyes."""
+"""Facial captures: blend shape names are matched to morph targets, and head and eye rotations to bones."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ _HEAD_FRACTION = 0.5  # of a head rotation; the neck bones rotate by the rest
 
 @dataclass(frozen=True, eq=False)
 class CaptureSamples:
-    """Frames of a capture.
+    """Blend shape weights and bone angles of the k frames of a facial capture.
 
-    times_s : (k,) not decreasing
-    names : (n,) of the blend shapes
-    weights : (k, n) of the blend shapes
-    angles : (k, 3) by name of a bone of the head [degrees]
-    unused_names : names of angles for which the head has no bone
+    times_s : (k,) times of the frames, not decreasing [s]
+    names : (n,) names of the blend shapes
+    weights : (k, n) weights of the blend shapes
+    angles : Euler angles (k, 3) of bones of the head, by bone name [degrees]
+    unused_names : columns of angles for which the head has no bone
     """
 
     times_s: Doubles
@@ -49,7 +49,10 @@ class CaptureSamples:
 
 
 def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head) -> Clip:
-    """Return the clip of a capture for a head, with linear interpolation.
+    """Return a facial capture as a clip for a head, linearly interpolated between frames.
+
+    culprit : the capture's file, for errors
+    name : of the clip
 
     Raises DermisError when no name matches the head.
     """
@@ -77,7 +80,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
-    """Raise the error of a motion whose names do not match the head."""
+    """Raise the error for a motion none of whose names is a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
@@ -85,7 +88,7 @@ def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
 
 
 def frame_rate(times: Doubles) -> float | None:
-    """Return the frame rate of nearly evenly spaced times, rounded to a common rate, or None."""
+    """Return the frame rate of times (k,) [s], rounded to a common rate; None if they are unevenly spaced."""
     steps = np.diff(times)
     steps = steps[steps > 0]
     if len(steps) == 0:
@@ -98,7 +101,10 @@ def frame_rate(times: Doubles) -> float | None:
 
 
 def check_weights(culprit: object, names: Sequence[str], values: Doubles) -> None:
-    """Refuse weights (n,) that are not numbers of a plausible size."""
+    """Refuse blend shape weights (n,) that are NaN or implausibly large.
+
+    names : (n,) of the blend shapes, for errors
+    """
     invalid = ~(np.abs(values) <= MAX_WEIGHT)
     if invalid.any():
         expected = f"numbers from -{MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
@@ -107,7 +113,10 @@ def check_weights(culprit: object, names: Sequence[str], values: Doubles) -> Non
 
 
 def check_size(culprit: object, frames: int, names: int) -> None:
-    """Refuse captures with too many frames or columns."""
+    """Refuse a capture with too many frames or too many columns.
+
+    frames, names : numbers of frames and of columns read so far
+    """
     if frames > MAX_FRAMES or names > MAX_NAMES:
         expected = f"at most {MAX_FRAMES:,} frames of {MAX_NAMES} numbers"
         actual = f"it has more ({frames:,} of {names:,} so far)"
@@ -120,9 +129,9 @@ def _short_list(names: Sequence[str]) -> str:
 
 
 def match_targets(names: Iterable[str], targets: Sequence[str]) -> dict[str, str]:
-    """Return the matching target of the head by name; names without a match are omitted.
+    """Return the head's morph target for each blend shape name; names without a match are omitted.
 
-    EyeBlinkLeft, eyeBlink_L and blendShape1.eye_blink_left match eyeBlinkLeft; an identical name has
+    EyeBlinkLeft, eyeBlink_L and blendShape1.eye_blink_left all match eyeBlinkLeft; an identical name has
     priority.
     """
     exact, folded, plain = (
@@ -137,7 +146,7 @@ def match_targets(names: Iterable[str], targets: Sequence[str]) -> dict[str, str
 
 
 def _plain_name(name: str) -> str:
-    """Return a name without its prefix, in lower case, with its side as a word."""
+    """Return a blend shape name for comparison: lower case, no prefix, and "left" or "right" for L or R."""
     last = name.rpartition(".")[2]
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)
     name_with_side = f"{side[1]}{_SIDE_LETTERS[side[2].lower()]}" if side else last
@@ -146,10 +155,10 @@ def _plain_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class RotationBones:
-    """Bones of a skeleton that rotate head and eyes.
+    """Bones of a skeleton to which rotations of a capture's head and eyes are applied.
 
-    head : fraction of the head rotation by bone; empty without such a bone
-    eyes : bone by "left" and "right"
+    head : fraction of the head's rotation by bone name; empty if there is neither a head nor a neck bone
+    eyes : name of the eye bone for "left" and "right"
     """
 
     head: Mapping[str, float]
@@ -157,11 +166,11 @@ class RotationBones:
 
 
 def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
-    """Find the bones named head, neck and eye, with any prefixes of programs.
+    """Find the head, neck and eye bones of a skeleton by name; prefixes of common programs are ignored.
 
-    Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 above the head are necks;
-    LeftEye and eye.L are eyes. The head takes half of a rotation and the necks the other half; one alone
-    takes all of it.
+    Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
+    ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
+    necks the other half; a skeleton with only one of them applies all of it there.
     """
     if skeleton is None:
         return RotationBones({}, {})
@@ -183,18 +192,21 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
 
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
-    """Return angles (k, 3) of each bone [degrees] that rotate the head by quaternions (k, 4)."""
+    """Return Euler angles (k, 3) [degrees] of head and neck bones that rotate the head.
+
+    The bones together perform the rotations, quaternions (k, 4), of a capture.
+    """
     parts = bones.head.items()
     return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}
 
 
 def unwrap_degrees(degrees: Doubles) -> Doubles:
-    """Return angles (k, 3) without jumps by full turns."""
+    """Return angles (k, 3) [degrees] without jumps of 360 between consecutive frames."""
     return np.asarray(np.unwrap(degrees, axis=0, period=360.0))
 
 
 def rotation_quaternions(matrices: Sequence[Doubles]) -> Doubles:
-    """Return the rotations of matrices (4, 4) as quaternions (k, 4), without scale and reflection."""
+    """Return the rotations of k matrices (4, 4) as quaternions (k, 4); scale and reflection are removed."""
     linear = np.array(matrices)[:, :3, :3]
     left, _, right = np.linalg.svd(linear)
     rotations = left @ right
@@ -220,7 +232,7 @@ def _ancestors(skeleton: Skeleton, bone: int) -> set[int]:
 
 
 def _bone_words(name: str) -> tuple[list[str], str]:
-    """Return the words of a bone's name without numbers and prefixes, and its side."""
+    """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
     sides = [_SIDES[word] for word in words if word in _SIDES]

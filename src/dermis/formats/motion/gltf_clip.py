@@ -1,4 +1,4 @@
-"""Animation clips of glTF files as motion of a head."""
+"""Loading of glTF animation clips as motion of a head."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dermis.mesh.rotations import matrix_quaternion, quaternion_matrix
 from dermis.mesh.skeleton import Skeleton
 
 
-class _Transforms(NamedTuple):
-    """Translations (n, 3), rotations (n, 4) and scales (n, 3) of bones relative to their parents."""
+class _BoneTransforms(NamedTuple):
+    """Translations (n, 3), rotations (n, 4) and scales (n, 3) of n bones relative to their parents."""
 
     translation: Doubles
     rotation: Doubles
@@ -27,7 +27,12 @@ class _Transforms(NamedTuple):
 
 
 class _UsedTrack(NamedTuple):
-    """Curve with its used columns, and the index of the bone or target that each column moves."""
+    """Animation curve, restricted to the bones or morph targets that the head has.
+
+    path : "translation", "rotation", "scale" or "weights"
+    columns : indices of the used channels of the curve
+    indices : index of the animated bone or morph target of each of these channels
+    """
 
     path: str
     curve: AnimationCurve
@@ -36,11 +41,11 @@ class _UsedTrack(NamedTuple):
 
 
 def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
-    """Load a clip of a .glb or .gltf file for a head with nodes or targets of the same names.
+    """Load a clip of a .glb or .gltf file for a head whose bones or morph targets have the names of the clip.
 
-    Components of bone transforms that the clip does not animate keep their rest values.
+    Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 
-    name : of the clip; required if there are several
+    name : of the clip; required if the file has several
 
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
@@ -55,14 +60,14 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
 
     def sample(seconds: float) -> Pose:
         weights = np.zeros(len(targets))
-        transforms = None if rest is None else _Transforms(*(array.copy() for array in rest))
+        transforms = None if rest is None else _BoneTransforms(*(array.copy() for array in rest))
         for path_kind, curve, columns, indices in used_tracks:
             values = curve.sample(seconds)
             if path_kind == "weights":
                 weights[indices] = values[0, columns]
             elif transforms is not None and indices:
                 getattr(transforms, path_kind)[indices] = values[columns]
-        matrices = [] if transforms is None else list(_matrices(transforms))
+        matrices = [] if transforms is None else list(_bone_matrices(transforms))
         weight_of_target = dict(zip(targets, weights.tolist(), strict=True))
         if len(weights) and not np.abs(weights).max() <= MAX_WEIGHT:
             actual = f"got {weights[np.argmax(np.abs(weights))]:g} at {seconds:g} s"
@@ -76,7 +81,7 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
 
 
 def _used_names(tracks: list[AnimationTrack], known: tuple[str, ...]) -> list[str]:
-    """Return the names that tracks animate and the head has."""
+    """Return the animated names of tracks that are in `known`, the bones or morph targets of the head."""
     return [name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in known]
 
 
@@ -85,18 +90,18 @@ def _used_track(track: AnimationTrack, names: list[str]) -> _UsedTrack:
     return _UsedTrack(track.path, track.curve, columns, [names.index(track.names[k]) for k in columns])
 
 
-def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _Transforms:
-    """Return translations, rotations and scales of bones at rest."""
+def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
+    """Return translations, rotations and scales at rest of the named bones."""
     local = skeleton.local[[skeleton.index[name] for name in bones]]
     linear = local[:, :3, :3]
     scale = np.linalg.norm(linear, axis=1)
     scale[np.linalg.det(linear) < 0, 0] *= -1
     rotation = np.where(scale[:, None] == 0, np.eye(3), linear / np.where(scale == 0, 1, scale)[:, None])
-    return _Transforms(local[:, :3, 3].copy(), matrix_quaternion(rotation), scale)
+    return _BoneTransforms(local[:, :3, 3].copy(), matrix_quaternion(rotation), scale)
 
 
-def _matrices(transforms: _Transforms) -> Doubles:
-    """Return the matrices (n, 4, 4) of transforms: scale, then rotation, then translation."""
+def _bone_matrices(transforms: _BoneTransforms) -> Doubles:
+    """Return the bone matrices (n, 4, 4): scale first, then rotation, then translation."""
     matrices = quaternion_matrix(transforms.rotation)
     matrices[:, :3, :3] *= transforms.scale[:, None, :]
     matrices[:, :3, 3] = transforms.translation

@@ -1,4 +1,4 @@
-"""Captures of Live Link Face: CSV files of ARKit blend shapes and angles of head and eyes."""
+"""Captures of Live Link Face: CSV files of ARKit blend shape weights and rotations of head and eyes."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.rotations import angles_matrix, matrix_quaternion
 
-_TIME, _COUNT = "timecode", "blendshapecount"
-_PARTS = ("head", "lefteye", "righteye")
-_ANGLES = {f"{part}{angle}" for part in _PARTS for angle in ("pitch", "yaw", "roll")}
+_TIME_COLUMN, _COUNT_COLUMN = "timecode", "blendshapecount"
+_ROTATED_OBJECTS = ("head", "lefteye", "righteye")
+_ANGLE_COLUMNS = {f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")}
 _TIMECODE = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,4}(?:\.\d{1,12})?)")
-_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
+_TIMECODE_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
 _APP_RATE = 60.0
 _DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
 
 
 class _Timecode(NamedTuple):
-    """Timecode as whole seconds and additional frames."""
+    """Timecode of a frame: whole seconds since midnight, and frames after the last whole second."""
 
     seconds: int
     frames: float
 
 
-class _Table(NamedTuple):
-    """Names of the columns, times [s] and values (k, n) of the rows."""
+class _CaptureTable(NamedTuple):
+    """Numeric columns of a capture: n column names, and times [s] and values (k, n) of k rows."""
 
     names: list[str]
     times_s: Doubles
@@ -65,8 +65,8 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
 
     Raises DermisError for a file with other columns or invalid lines, which it names.
     """
-    table = _read(path, fps)
-    shapes = [k for k, name in enumerate(table.names) if name.casefold() not in _ANGLES]
+    table = _read_table(path, fps)
+    shapes = [k for k, name in enumerate(table.names) if name.casefold() not in _ANGLE_COLUMNS]
     bones = find_rotation_bones(head.control.skeleton)
     angles, unused = _bone_angles(table, bones)
     names = tuple(table.names[k] for k in shapes)
@@ -74,7 +74,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     return capture_clip(path, path.stem, samples, head)
 
 
-def _read(path: Path, fps: float | None) -> _Table:
+def _read_table(path: Path, fps: float | None) -> _CaptureTable:
     expected = "a CSV of Live Link Face"
     reader = csv.reader(io.StringIO(read_text(path, expected, MAX_CLIP_BYTES), newline=""))
     with parsing(path, expected, csv.Error):
@@ -83,7 +83,7 @@ def _read(path: Path, fps: float | None) -> _Table:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
         _check_header(f"{path}, line {reader.line_num}", header)
         folded = [name.casefold() for name in header]
-        columns = [k for k, name in enumerate(folded) if name not in (_TIME, _COUNT, "")]
+        columns = [k for k, name in enumerate(folded) if name not in (_TIME_COLUMN, _COUNT_COLUMN, "")]
         lines: list[int] = []
         codes: list[_Timecode] = []
         rows: list[Doubles] = []
@@ -91,13 +91,13 @@ def _read(path: Path, fps: float | None) -> _Table:
             culprit = f"{path}, line {reader.line_num}"
             _check_row(culprit, header, row)
             lines.append(reader.line_num)
-            codes.append(_timecode(culprit, row[folded.index(_TIME)]))
-            rows.append(_numbers(culprit, header, row, columns))
+            codes.append(_timecode(culprit, row[folded.index(_TIME_COLUMN)]))
+            rows.append(_row_values(culprit, header, row, columns))
             check_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
     times = _row_times(path, lines, codes, fps)
-    return _Table([header[k] for k in columns], times, np.array(rows))
+    return _CaptureTable([header[k] for k in columns], times, np.array(rows))
 
 
 def _has_text(row: Sequence[str]) -> bool:
@@ -112,17 +112,17 @@ def _check_row(culprit: str, header: Sequence[str], row: Sequence[str]) -> None:
 def _check_header(culprit: str, header: Sequence[str]) -> None:
     check_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
-    if _TIME not in folded:
+    if _TIME_COLUMN not in folded:
         actual = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
         refuse(culprit, "a column Timecode", actual, "Export it from Live Link Face as it is")
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:
         refuse(culprit, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
-    if not set(folded) - {_TIME, _COUNT}:
+    if not set(folded) - {_TIME_COLUMN, _COUNT_COLUMN}:
         refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
 
 
-def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], columns: Sequence[int]) -> Doubles:
+def _row_values(culprit: str, header: Sequence[str], row: Sequence[str], columns: Sequence[int]) -> Doubles:
     values = np.zeros(len(columns))
     for index, column in enumerate(columns):
         try:
@@ -143,8 +143,13 @@ def _timecode(culprit: str, cell: str) -> _Timecode:
 
 
 def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
-    """Return the time of each row [s]; timecodes continue after midnight."""
-    rate = fps or _rate(codes)
+    """Return the time of each row [s]; times continue to increase when the timecode passes midnight.
+
+    lines : line number of each row in the file, for errors
+    codes : timecode of each row
+    fps : frame rate of the timecode; None to estimate it
+    """
+    rate = fps or _timecode_rate(codes)
     times = np.array([code.seconds + code.frames / rate for code in codes])
     days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
     times += _DAY_S * days
@@ -157,20 +162,23 @@ def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps
     return times
 
 
-def _rate(codes: Sequence[_Timecode]) -> float:
-    """Return the lowest common frame rate above the largest frame number, if a full second was recorded."""
+def _timecode_rate(codes: Sequence[_Timecode]) -> float:
+    """Estimate the frame rate of timecodes: the lowest common rate above the largest frame number.
+
+    If no full second was recorded, the rate is at least that of the app, 60.
+    """
     largest = max(int(code.frames) for code in codes)
     seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(codes))
-    fitting = [rate for rate in _RATES if rate > largest] or [float(largest + 1)]
+    fitting = [rate for rate in _TIMECODE_RATES if rate > largest] or [float(largest + 1)]
     return fitting[0] if seconds_advance else max(_APP_RATE, fitting[0])
 
 
-def _bone_angles(table: _Table, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone [degrees], and names of columns for which the head has no bone."""
+def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
+    """Return angles (k, 3) by bone name [degrees], and the angle columns for which the head has no bone."""
     columns = {name.casefold(): k for k, name in enumerate(table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []
-    for part in _PARTS:
+    for part in _ROTATED_OBJECTS:
         part_columns = {angle: columns.get(f"{part}{angle}") for angle in ("pitch", "yaw", "roll")}
         if all(column is None for column in part_columns.values()):
             continue

@@ -27,17 +27,23 @@ from dermis.formats.motion.captures import (
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 
-_SECONDS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
-_SHAPES = ("blendshapes", "face_blendshapes", "faceBlendshapes")
-_MATRIX = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
+_TIME_KEYS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
+_SHAPE_KEYS = ("blendshapes", "face_blendshapes", "faceBlendshapes")
+_MATRIX_KEYS = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
 _NEUTRAL = "_neutral"  # score of the neutral face, not a blend shape
 _MAX_TIME = 1e15  # milliseconds
 _MAX_MATRIX_VALUE = 1e6
 _ADVICE = "Correct or remove the line"
 
 
-class _Row(NamedTuple):
-    """Frame with weights (k,) of some columns (k,)."""
+class _CapturedFrame(NamedTuple):
+    """Blend shape weights of one captured frame.
+
+    line : line number in the file
+    seconds : time of the frame [s]
+    columns, weights : (n,) indices of the blend shapes of the frame, and their weights
+    matrix : (4, 4) facial transformation; None if the frame has none
+    """
 
     line: int
     seconds: float
@@ -59,7 +65,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     Raises DermisError for a file without frames, and for invalid lines, which it names.
     """
     columns: dict[str, int] = {}
-    rows = list(_rows(path, fps, columns))
+    rows = list(_captured_frames(path, fps, columns))
     if not rows:
         refuse(path, "lines of JSON with blend shapes", "there are none", "Record it again")
     _check_order(path, rows)
@@ -78,49 +84,56 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     return capture_clip(path, path.stem, samples, head)
 
 
-def _rows(path: Path, fps: float | None, columns: dict[str, int]) -> Iterator[_Row]:
-    """Yield the frames that have blend shapes.
+def _captured_frames(path: Path, fps: float | None, columns: dict[str, int]) -> Iterator[_CapturedFrame]:
+    """Yield the frames in which a face was found, those with blend shapes.
 
-    columns : index by name of a blend shape; new names are added
+    columns : column index by blend shape name; names that are not in it are added
     """
     count = 0
     for number, line in enumerate(io.StringIO(read_text(path, "lines of JSON", MAX_CLIP_BYTES)), start=1):
         if line.strip():
-            row = _row(f"{path}, line {number}", number, line, fps, columns)
+            row = _parse_frame(f"{path}, line {number}", number, line, fps, columns)
             count += len(row.columns) > 0
             check_size(path, count, len(columns))
             if len(row.columns):
                 yield row
 
 
-def _row(culprit: str, number: int, line: str, fps: float | None, columns: dict[str, int]) -> _Row:
+def _parse_frame(
+    culprit: str, number: int, line: str, fps: float | None, columns: dict[str, int]
+) -> _CapturedFrame:
     record = parse_json(line, culprit, "an object in JSON")
     if not isinstance(record, dict):
         refuse(culprit, "an object in JSON", f"got {line.strip():.40}", _ADVICE)
-    shapes = next((record[key] for key in _SHAPES if key in record), None)
+    shapes = next((record[key] for key in _SHAPE_KEYS if key in record), None)
     if shapes is None:
         actual = f"it has {', '.join(record) or 'nothing'}"
         refuse(culprit, "blendshapes", actual, _ADVICE)
-    matrix = next((record[key] for key in _MATRIX if record.get(key) is not None), None)
-    seconds = _seconds(culprit, number, record, fps)
-    scores = _scores(culprit, shapes)
+    matrix = next((record[key] for key in _MATRIX_KEYS if record.get(key) is not None), None)
+    seconds = _frame_seconds(culprit, number, record, fps)
+    scores = _shape_scores(culprit, shapes)
     indices = np.array([columns.setdefault(name, len(columns)) for name in scores], np.intp)
     weights = np.fromiter(scores.values(), np.float64, len(scores))
     check_weights(culprit, list(scores), weights)
-    return _Row(number, seconds, indices, weights, None if matrix is None else _matrix(culprit, matrix))
+    return _CapturedFrame(
+        number, seconds, indices, weights, None if matrix is None else _facial_transformation(culprit, matrix)
+    )
 
 
-def _seconds(culprit: str, number: int, record: Mapping[str, object], fps: float | None) -> float:
-    for key, scale in _SECONDS.items():
+def _frame_seconds(culprit: str, number: int, record: Mapping[str, object], fps: float | None) -> float:
+    for key, scale in _TIME_KEYS.items():
         if key in record:
             return scale * quantities.checked_number(f"{culprit}: {key}", record[key], -_MAX_TIME, _MAX_TIME)
     if fps is None:
-        refuse(culprit, f"a time ({', '.join(_SECONDS)})", "it has none", "Set the frame rate (fps)")
+        refuse(culprit, f"a time ({', '.join(_TIME_KEYS)})", "it has none", "Set the frame rate (fps)")
     return (number - 1) / fps
 
 
-def _scores(culprit: str, shapes: object) -> dict[str, float]:
-    """Return scores by name from either form."""
+def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
+    """Return the score of each blend shape by name.
+
+    shapes : {name: score}, or MediaPipe's list of {"categoryName", "score"}
+    """
     if isinstance(shapes, list):
         categories = [item if isinstance(item, dict) else {} for item in shapes]
         names = [item.get("categoryName", item.get("category_name")) for item in categories]
@@ -135,8 +148,11 @@ def _scores(culprit: str, shapes: object) -> dict[str, float]:
     return {name: score for name, score in shapes.items() if name != _NEUTRAL}
 
 
-def _matrix(culprit: str, value: object) -> Doubles:
-    """Return a matrix (4, 4) with the translation in its last column, from rows or columns."""
+def _facial_transformation(culprit: str, value: object) -> Doubles:
+    """Return a facial transformation (4, 4), which may be stored by rows or by columns, nested or flat.
+
+    The column with the translation is the last one of the result.
+    """
     flat = isinstance(value, list) and not any(isinstance(row, list) for row in value)
     shape = (16,) if flat else (4, 4)
     matrix = quantities.checked_array(
@@ -147,8 +163,11 @@ def _matrix(culprit: str, value: object) -> Doubles:
     return matrix.T if matrix[3, :3].any() and not matrix[:3, 3].any() else matrix
 
 
-def _fill_matrices(rows: list[_Row]) -> list[Doubles]:
-    """Return a matrix for each frame: where it has none, that of the last frame before it, or the first."""
+def _fill_matrices(rows: list[_CapturedFrame]) -> list[Doubles]:
+    """Return the facial transformation of each frame; one without gets that of the nearest earlier frame.
+
+    Frames before the first transformation get the first one.
+    """
     last = next(row.matrix for row in rows if row.matrix is not None)
     matrices = []
     for row in rows:
@@ -157,7 +176,7 @@ def _fill_matrices(rows: list[_Row]) -> list[Doubles]:
     return matrices
 
 
-def _check_order(path: Path, rows: list[_Row]) -> None:
+def _check_order(path: Path, rows: list[_CapturedFrame]) -> None:
     for before, after in pairwise(rows):
         if after.seconds < before.seconds:
             actual = f"{after.seconds:g} s comes after {before.seconds:g} s"

@@ -31,31 +31,33 @@ SUFFIXES = (".obj", ".ply")
 DEFAULT_RATE = 30.0
 _FRAME_TOLERANCE = 1e-6
 _SIZE_RANGE = (0.33, 3.0)
-_NUMBER = re.compile(r"%0?\d*d")
+_NUMBER_FIELD = re.compile(r"%0?\d*d")
 _VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
 _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 
 def is_sequence(path: Path) -> bool:
-    """Return whether a path is a folder, a pattern, or a mesh file that could be one frame."""
-    is_pattern = bool(_NUMBER.search(path.name)) or "*" in path.name
+    """Return whether a path is a folder, a pattern (face_%05d.obj) or a mesh file, which could be a frame."""
+    is_pattern = bool(_NUMBER_FIELD.search(path.name)) or "*" in path.name
     return is_pattern or _is_folder(path) or path.suffix.lower() in SUFFIXES
 
 
 def frame_files(path: Path) -> list[Path]:
-    """Return the files of a folder, or of a pattern such as face_%05d.obj or face_*.obj, by number.
+    """Return the mesh files in a folder, or those that match a pattern, sorted by the number in their names.
 
-    Raises DermisError when there are none, or of several formats.
+    path : folder, or pattern such as face_%05d.obj or face_*.obj
+
+    Raises DermisError when there are no files, or files of several formats.
     """
     if _is_folder(path):
         files = [one for one in path.iterdir() if one.suffix.lower() in SUFFIXES]
-    elif _NUMBER.search(path.name):
-        before, after = _NUMBER.split(path.name, maxsplit=1)
+    elif _NUMBER_FIELD.search(path.name):
+        before, after = _NUMBER_FIELD.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
-        files = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _folder_files(path.parent) if shape.fullmatch(one.name)]
     elif "*" in path.name:
         shape = re.compile(fnmatch.translate(path.name))
-        files = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _folder_files(path.parent) if shape.fullmatch(one.name)]
     else:
         files = [path]
     kinds = sorted({file.suffix.lower() for file in files})
@@ -75,10 +77,12 @@ def frame_files(path: Path) -> list[Path]:
 def load_sequence(
     path: Path, head: Head, fps: float | None = None, unit_mm: float | None = None, up: Up = "y"
 ) -> Clip:
-    """Load mesh files as a clip for a head with the same topology and vertex order.
+    """Load a sequence of mesh files, one per frame, as a clip for a head with the same topology.
+
+    The vertices of the files must have the order of the head's file.
 
     fps : frame rate, by default 30
-    unit_mm, up : of the files, see `load_head`
+    unit_mm, up : unit [mm] and up axis of the files, see `load_head`
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
@@ -103,7 +107,7 @@ def load_sequence(
 
 @dataclass(eq=False)
 class _FrameCache:
-    """Positions of the head's points in each file, with a cache of the last few files."""
+    """Point positions of a head in the frames of a sequence, read on demand; three frames are cached."""
 
     files: Sequence[Path]
     head: Head
@@ -111,11 +115,11 @@ class _FrameCache:
     _first: FrameVertices | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        """Create the cache."""
+        """Create `positions`, the cached version of `_read_positions`."""
         self.positions = lru_cache(maxsize=3)(self._read_positions)
 
     def _read_positions(self, index: int) -> Floats:
-        """Return the positions of the head's points in a frame, (n, 3) [mm]."""
+        """Return the positions of the head's control points in a frame, (n, 3) [mm]."""
         file = self.files[index]
         vertices = self.reader.read(file)
         self._first = self._first or vertices
@@ -154,7 +158,7 @@ class _FrameCache:
             refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
 
 
-def _listed(folder: Path) -> list[Path]:
+def _folder_files(folder: Path) -> list[Path]:
     return list(folder.iterdir()) if _is_folder(folder) else []
 
 
@@ -166,17 +170,17 @@ def _is_folder(path: Path) -> bool:
 
 
 def _by_number(file: Path) -> tuple[int, str]:
-    """Return the sort key of a file by the last number in its name."""
+    """Return the sort key of a file: the last number in its name, then the name."""
     numbers = re.findall(r"\d+", file.stem)
     return int(numbers[-1]) if numbers else -1, file.name
 
 
 class FrameVertices(NamedTuple):
-    """Vertices of a file in the order of its `Mesh`.
+    """Vertices of one mesh file, without those that no triangle uses.
 
     positions_mm : (v, 3)
-    triangles : (f, 3)
-    uv : (v, 2) as in the file
+    triangles : (f, 3) vertex indices
+    uv : (v, 2) with the v direction of the file
     """
 
     positions_mm: Floats
@@ -185,7 +189,12 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """OBJ file without its positions: hash of all other lines, and the `v` line of each vertex."""
+    """Everything but the positions of an OBJ file, to recognise files that differ only in positions.
+
+    digest : hash of all lines except `v` and `vn`
+    lines : number of `v` lines
+    line : (v,) index of the `v` line of each vertex
+    """
 
     digest: bytes
     lines: int
@@ -194,12 +203,12 @@ class _ObjPattern(NamedTuple):
 
 @dataclass
 class FrameReader:
-    """Reader of mesh files with the same topology.
+    """Reader of the mesh files of a sequence, which have the same topology.
 
-    Of OBJ files that differ from the first one only in positions, only the positions are parsed, which is 20
-    times as fast.
+    If an OBJ file differs from the first one only in positions, only these are parsed, which is 20 times as
+    fast.
 
-    unit_mm : length of the files' unit [mm], None for that of the format
+    unit_mm : length of the files' unit [mm]; None for the default of the format
     up : up axis of the files
     """
 
@@ -209,7 +218,7 @@ class FrameReader:
     _pattern: _ObjPattern | None = field(default=None, init=False)
 
     def read(self, path: Path) -> FrameVertices:
-        """Return the vertices of a file.
+        """Return the vertices of a mesh file.
 
         Raises `DermisError` when it is missing, damaged or not a mesh, or has no uv.
         """
@@ -217,37 +226,40 @@ class FrameReader:
         if self._pattern is not None and self._first is not None and is_file(path):
             positions = _parse_positions(read_file(path, "an OBJ file", MAX_FILE_BYTES), self._pattern)
             if positions is not None:
-                positions_mm = self._in_head(unit * positions)
+                positions_mm = self._to_head_axes(unit * positions)
                 check_arrays(positions_mm, self._first.uv, self._first.triangles, path)
                 return self._first._replace(positions_mm=positions_mm)
-        vertices = self._parsed(path, unit)
+        vertices = self._parse_vertices(path, unit)
         if self._first is None:
             self._first = vertices
             self._pattern = _read_pattern(path) if path.suffix.lower() == ".obj" else None
         return vertices
 
-    def _parsed(self, path: Path, unit: float) -> FrameVertices:
+    def _parse_vertices(self, path: Path, unit: float) -> FrameVertices:
         with np.errstate(all="ignore"), parsing(path, "a mesh", *MALFORMED_DATA_ERRORS):
             part = join_parts(read_mesh_file(path).parts, path)
-            positions = self._in_head(unit * part.positions)
+            positions = self._to_head_axes(unit * part.positions)
             assert part.uv is not None
             check_arrays(positions, part.uv, part.triangles, path)
         used, corners = compact_vertices(part.triangles)
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
-    def _in_head(self, positions: Doubles) -> Floats:
+    def _to_head_axes(self, positions: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # infinite positions are refused later
             return to_y_up(positions, self.up).astype(np.float32)
 
 
 def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
-    """Return the numbers of the `v` lines, and a hash of all other lines except normals."""
+    """Return the coordinates of the `v` lines as text, and a hash of all other lines except `vn`."""
     others = _NORMAL_LINE.sub(b"", _VERTEX_LINE.sub(b"", data))
     return _VERTEX_LINE.findall(data), hashlib.sha256(others).digest()
 
 
 def _read_pattern(path: Path) -> _ObjPattern:
-    """Return the pattern of an OBJ file, by parsing it with line numbers as positions."""
+    """Return the pattern of an OBJ file.
+
+    The file is parsed with the index of each `v` line as x coordinate, which shows the line of each vertex.
+    """
     data = read_file(path, "an OBJ file", MAX_FILE_BYTES)
     positions, digest = _split_vertex_lines(data)
     count = iter(range(len(positions)))
@@ -259,7 +271,10 @@ def _read_pattern(path: Path) -> _ObjPattern:
 
 
 def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) in file units, or None if other lines differ from the pattern."""
+    """Return the vertex positions (v, 3) of an OBJ file in its units, or None if it does not fit the pattern.
+
+    data : bytes of the file
+    """
     rows, digest = _split_vertex_lines(data)
     if len(rows) != pattern.lines or digest != pattern.digest:
         return None
