@@ -157,7 +157,7 @@ class Surface:
 
         across : position across the brow, from its lower edge, -1, to its upper edge, 1
         """
-        x, y = brows.outline(across).T
+        x, y = brows.brow_outline(across).T
         return self.at_mm[[self.frontmost(*each) for each in zip(x, y, strict=True)]]
 
     def apex(self, name: str) -> int:

@@ -13,7 +13,7 @@ from dermis import Human
 from dermis.human import lids
 from dermis.human.lids import fit_lid_targets, fit_lids, gaze_axes
 from dermis.human.makehuman import morphed_points_mm
-from dermis.human.model import _sockets, build_head
+from dermis.human.model import _eye_sockets, build_head
 from dermis.human.movement import expression_targets
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, radial_distances_mm
@@ -115,10 +115,10 @@ def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) ->
 
 
 def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
-    from dermis.human.model import _sockets
+    from dermis.human.model import _eye_sockets
 
     places = morphed_points_mm({})
-    moved = np.abs(fit_lids(places, _sockets(places)) - places).max(axis=1)
+    moved = np.abs(fit_lids(places, _eye_sockets(places)) - places).max(axis=1)
     middle = places[lid_rings()].reshape(2, -1, 3).mean(axis=1)
     far = np.linalg.norm(places[:, None] - middle, axis=-1).min(axis=1)
     assert moved[far > 32].max() == 0.0 and moved.max() > 2.0
@@ -140,7 +140,7 @@ def test_lids_follow_who_has_another_head() -> None:
 def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     """Compare with a correction of both eyes for each target; blinks move the other eye's inner corner."""
     places = morphed_points_mm(Human.drawn(3).weights())
-    sockets = _sockets(places)
+    sockets = _eye_sockets(places)
     found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
     targets = expression_targets()
     for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):

@@ -19,7 +19,7 @@ EXPRESSIONS: Registry[Weights] = Registry(
 
 
 def expression(name: str) -> dict[str, float]:
-    """Return the weights of all targets of an expression, as `Pose` takes them.
+    """Return the morph target weights of a named expression as a mapping that `dermis.Pose` accepts.
 
     Raises DermisError for an unknown name.
     """
@@ -27,12 +27,15 @@ def expression(name: str) -> dict[str, float]:
 
 
 def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of targets without duplicates; "mouthSmile" is expanded to left and right."""
+    """Return names of morph targets without duplicates; names without a side become left and right targets.
+
+    "mouthSmile" becomes "mouthSmileLeft" and "mouthSmileRight".
+    """
     return tuple(dict.fromkeys(target for name in names for target in expand_sides(name)))
 
 
 def expand_sides(name: str) -> tuple[str, ...]:
-    """Return the left and the right target of a pair, or the target itself."""
+    """Return the left and the right target for a name without side, or the name itself if it has no sides."""
     return tuple(f"{name}{side}" for side in SIDES) if f"{name}Left" in _arkit_names() else (name,)
 
 

@@ -33,12 +33,12 @@ _ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
 """Rise of the floor of the inner corner for each row while the eye is open."""
-_UPPER, _LOWER = slice(1, 12), slice(13, 28)  # rows of lid_rings.csv
+_UPPER, _LOWER = slice(1, 12), slice(13, 28)  # rows of lid_rings.csv that hold the upper and the lower lid
 _OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
 """Overlap of closed upper lids over the lower lids."""
 _SLIDING_ROWS = 6  # rows of quads around the lids that may slide over the eye
 _BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
-_RINGS, _EDGE, _CREST = 4, 1, 2  # columns of lid_rings.csv
+_RINGS, _EDGE, _CREST = 4, 1, 2  # number of columns of lid_rings.csv, and indices of two of them
 FORWARD = np.array([0.0, 0.0, 1.0])
 """Viewing direction of the eyes in rest pose."""
 _LID_TARGET_PREFIXES = "eyeBlink", "eyeLook", "eyeSquint", "eyeWide"
@@ -46,10 +46,10 @@ Doubles = NDArray[np.float64]
 
 
 class EyeSocket(NamedTuple):
-    """Eye of a person in the published data.
+    """Position and size of an eyeball of a person in MakeHuman's data.
 
-    centre : (3,) of the published eyeball [mm]
-    size : relative to the average eye
+    centre : (3,) centre of the published eyeball [mm]
+    size : radius relative to the published average eyeball [-]
     """
 
     centre: Points
@@ -57,12 +57,13 @@ class EyeSocket(NamedTuple):
 
 
 class LidSide(NamedTuple):
-    """Points of the eyelids of one eye and the skin around them.
+    """Indices and weights of the control points that move with the eyelids of one eye.
 
-    rings : (r,) points of the lids, see lid_rings.csv
-    point : (n,) points of the lids and of the skin around them
-    weights : (n, r) by which each point follows the displacements of `rings`
-    contact, clearances_mm : (c,) points that slide over the eye, and their minimum distances from it
+    rings : (r,) indices of the lid points, row by row of lid_rings.csv
+    point : (n,) indices of the lid points and of the surrounding skin
+    weights : (n, r) by which `point` follows the displacements of `rings`
+    contact, clearances_mm : (c,) indices of the points that slide over the eye, and their minimum distances
+        from it [mm]
     """
 
     rings: Index
@@ -72,13 +73,13 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """Return the lid points as indices into sorted points, which must contain them."""
+        """Return a copy with indices into `point`, a sorted array that contains all points of the lids."""
         names = "rings", "point", "contact"
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 
 
 def fit_socket(balls: Points) -> EyeSocket:
-    """Return the socket of a published eyeball with points (b, 3) [mm]."""
+    """Return the centre and relative size of a published eyeball, from its points (b, 3) [mm]."""
     centre = (balls.min(axis=0) + balls.max(axis=0)) / 2
     return EyeSocket(centre, float(np.linalg.norm(balls - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM)
 
@@ -86,10 +87,10 @@ def fit_socket(balls: Points) -> EyeSocket:
 def fit_lids(
     points_mm: Points, sockets: tuple[EyeSocket, EyeSocket], closed: bool = False, axis: Points = FORWARD
 ) -> Points:
-    """Return a person's published points (n, 3) with the lids on eyeballs of anatomical size [mm].
+    """Return a person's published points (n, 3) with the lids fitted to eyeballs of anatomical size [mm].
 
-    sockets : of the left and of the right eye
-    closed : whether the upper lids are moved to end at the lower lids
+    sockets : sockets of the left and the right eye
+    closed : whether the upper lids are lowered onto the lower lids
     axis : (3,) unit viewing direction of the eyes
     """
     fitted = points_mm.copy()
@@ -99,9 +100,11 @@ def fit_lids(
 
 
 def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | Flags, axis: Points) -> None:
-    """Move the lids of one eye onto its eyeball in place, for one person or for several poses (m, n, 3).
+    """Move the lids of one eye onto its eyeball in place, for one person or for m poses of a person.
 
-    closed, axis : as for `fit_lids`; (m,) and (m, 1, 3) for several poses
+    points : (n, 3) points of the person, or (m, n, 3) for m poses [mm]
+    closed : whether the upper lid is lowered onto the lower lid; (m,) for m poses
+    axis : (3,) unit viewing direction of the eye; (m, 1, 3) for m poses
     """
     points[..., side.point, :] += side.weights @ _lid_displacements(points[..., side.rings, :], eye, closed)
     centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
@@ -113,10 +116,11 @@ def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | 
 
 
 def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidContact:
-    """Return the points that slide over the eyes, with their distances from the eyeballs.
+    """Return the lid points that slide over the eyeballs, with their minimum distances from them.
 
-    first, eyeball_size : index of the first point of the left eyeball, and the number of points of an eyeball
-    apex, back : indices of points of an eyeball
+    first : index of the first point of the left eyeball
+    eyeball_size : number of points of an eyeball; the right one follows the left one
+    apex, back : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
     return LidContact(
@@ -132,8 +136,8 @@ def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidConta
 def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> Points:
     """Return the displacements (..., r, 3) of lid points from the published to the anatomical eyeball [mm].
 
-    In a view from the front the points stay where they are, except near the outline of the eyeball. Edges
-    touch the eyeball; the thickness of the lids is kept.
+    Seen from the front the points stay in place, except near the outline of the eyeball. The edges of the
+    lids touch the eyeball, and the thickness of the lids is kept.
     """
     published = (rings - eye.centre) / eye.size
     relative, is_closed = published.copy(), np.asarray(closed)
@@ -153,7 +157,10 @@ def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> P
 
 
 def _close_upper_lid(rings: Points) -> None:
-    """Move rows of an upper lid (rows, 4, 3) in place until its crest is below that of the lower lid."""
+    """Lower an upper lid in place until its crest is below the crest of the lower lid.
+
+    rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the eye
+    """
     crest = rings[:, _CREST]
     lower = crest[_LOWER][np.argsort(crest[_LOWER, 0])]
     ends = np.interp(crest[_UPPER, 0], lower[:, 0], lower[:, 1]) - _OVERLAP_MM
@@ -161,7 +168,10 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(across: Points) -> Points:
-    """Return distances from the axis, in eyeball radii, compressed near the outline."""
+    """Compress distances from the viewing axis near the outline of the eyeball, to keep lid points on it.
+
+    across : distances from the axis divided by the radius of the eyeball [-]
+    """
     room = _MAX_RADIUS - _LINEAR_RADIUS
     compressed = _LINEAR_RADIUS + room * np.tanh((across - _LINEAR_RADIUS) / room)
     return np.where(across < _LINEAR_RADIUS, across, compressed)
@@ -169,10 +179,7 @@ def _compress_radius(across: Points) -> Points:
 
 @cache
 def lid_sides() -> tuple[LidSide, LidSide]:
-    """Return the lid points of the left and the right eye.
-
-    They are computed on the average person and are equal for all people.
-    """
+    """Return the lid points of the left and the right eye, computed on the average person for all people."""
     points_mm, (left, right) = average_surface()[0].astype(np.float64), lid_rings()
     body = np.unique(model_data()["quads"][model_data()["group"] == 0]).astype(np.int64)
     return _lid_side(left, points_mm, body, "Left"), _lid_side(right, points_mm, body, "Right")
@@ -197,7 +204,12 @@ def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSid
 
 
 def _sliding_points(rings: Index, point: Index, name: str) -> Index:
-    """Return the skin points beyond the rings that a blink moves (c,)."""
+    """Return the skin points (c,) beyond the lid rings that a blink moves, which also slide over the eye.
+
+    rings : (rows, 4) lid points from lid_rings.csv
+    point : (n,) candidates
+    name : "Left" or "Right"
+    """
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{name}")
     part = slice(*target_deltas().first[index : index + 2])
     is_far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _BLINK_DISPLACEMENT_MM
@@ -210,9 +222,10 @@ def _sliding_points(rings: Index, point: Index, name: str) -> Index:
 
 
 def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> NDArray[np.float32]:
-    """Return the displacements (m, 3) of `expression_targets`, corrected at a person's lids [mm].
+    """Return the displacements (m, 3) of `expression_targets`, adjusted to a person's fitted lids [mm].
 
-    points_mm : (n, 3) published points of the person
+    points_mm : (n, 3) published points of the person [mm]
+    sockets : sockets of the left and the right eye
     """
     lids, delta_mm = _lid_targets(), expression_targets().delta_mm.copy()
     rest_points = points_mm[lids.point]
@@ -228,14 +241,14 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 
 
 class _LidTargets(NamedTuple):
-    """Morph targets that move the lids.
+    """Index tables of the morph targets that move the lids, equal for all people.
 
-    closed, axis : (t,) whether the lids close, and (t, 1, 3) the viewing direction of the eyes
-    point : (n,) points around both eyes
-    lid_sides, target_index : of the left and the right eye: lid points as indices into `point`, and targets
-        that move them
-    row, target, point_index : (m,) rows of displacements of these points, their targets, and indices into
-        `point`
+    closed, axis : (t,) whether a target closes the lids, and (t, 1, 3) viewing direction of the eyes in it
+    point : (n,) indices of the points around both eyes
+    lid_sides, target_index : for the left and the right eye, its lid points as indices into `point`, and the
+        indices of the targets that move them
+    row, target, point_index : (m,) rows of `MorphTargets.delta_mm` that displace points around the eyes, the
+        index of the target of each row, and the index of its point in `point`
     """
 
     closed: Flags
@@ -272,7 +285,7 @@ def _lid_targets() -> _LidTargets:
 
 @cache
 def gaze_axes() -> dict[str, Points]:
-    """Return the viewing direction (3,) of an eye for each gaze target."""
+    """Return the viewing direction (3,) of an eye at full weight of each gaze target, by target name."""
     angles = {rotation.target: np.radians(rotation.degrees) for rotation in gaze_rotations()}
     axes = {}
     for name, (x, y, _) in angles.items():
@@ -282,14 +295,14 @@ def gaze_axes() -> dict[str, Points]:
 
 
 def eyeball_mesh() -> tuple[Doubles, Index]:
-    """Return the control points (n, 3) [mm] and the quads (q, 4) of an eyeball at the origin.
+    """Return the control points (n, 3) [mm] and quads (q, 4) of an average eyeball at the origin.
 
-    It looks along +Z.
+    The eyeball looks along +Z.
     """
     return build_eyeball(scale=CONTROL_SCALE)
 
 
 def place_eyeball(eye: EyeSocket) -> tuple[Doubles, Doubles]:
-    """Return the control points (n, 3) of a person's eyeball, and its centre (3,) [mm]."""
+    """Return the control points (n, 3) and the centre (3,) of the anatomical eyeball in a socket [mm]."""
     centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
     return centre + eye.size * eyeball_mesh()[0], centre

@@ -1,4 +1,4 @@
-"""MakeHuman's data of the parametric human: points, morph targets, uv layouts and bones."""
+"""Access to MakeHuman's data of the parametric human: points, morph targets, uv layouts and bones."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ EXPRESSION_PREFIX = "faceunits/"
 
 
 class TargetDeltas(NamedTuple):
-    """Displacements of all published targets, concatenated.
+    """Displacements of all published morph targets, concatenated.
 
-    first : start of each target in `point` and `delta_mm`, and the end of the last
+    names : names of the t targets, with their folders
+    first : (t + 1,) start of each target in `point` and `delta_mm`, followed by their length
+    point, delta_mm : (m,) indices of the displaced points, and (m, 3) displacements at a weight of 1 [mm]
     """
 
     names: tuple[str, ...]
@@ -37,11 +39,11 @@ class TargetDeltas(NamedTuple):
 
 
 def morphed_points_mm(weights: Mapping[str, float]) -> Points:
-    """Return the mesh points of a person, followed by the joints (n, 3) [mm].
+    """Return the mesh points of a person, followed by the joints of the skeleton (n, 3) [mm].
 
     The origin is the midpoint between the eyes.
 
-    weights : of published targets
+    weights : weights of published morph targets by name
 
     Raises DermisError for unknown targets.
     """
@@ -62,12 +64,12 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 
 @cache
 def _target_indices() -> Mapping[str, int]:
-    """Return the index of each target by name."""
+    """Return the index of each published morph target by name."""
     return {name: number for number, name in enumerate(target_deltas().names)}
 
 
 def check_targets(names: Iterable[str]) -> None:
-    """Raise DermisError for an unknown target."""
+    """Raise DermisError, with similar names as advice, for a name that is no published morph target."""
     for name in names:
         if name not in _target_indices():
             known = target_deltas().names
@@ -98,7 +100,7 @@ def human_targets() -> tuple[str, ...]:
 
 @cache
 def model_data() -> Mapping[str, NDArray[Any]]:
-    """Return the arrays of human.npz by name."""
+    """Return the arrays of MakeHuman's mesh, morph targets and bones by name, from data/human.npz."""
     file = resources.files(__package__).joinpath("data", "human.npz")
     with resources.as_file(file) as path, np.load(path) as stored:
         return {name: stored[name] for name in stored}
@@ -106,21 +108,21 @@ def model_data() -> Mapping[str, NDArray[Any]]:
 
 @cache
 def group_points(name: str) -> NDArray[np.int64]:
-    """Return the sorted points of a group of quads, such as "helper-l-eye"."""
+    """Return the sorted point indices of a mesh group, such as "helper-l-eye" for the left eyeball."""
     arrays = model_data()
     group = list(map(str, arrays["group_names"])).index(name)
     return np.unique(arrays["quads"][arrays["group"] == group]).astype(np.int64)
 
 
 def mesh_point_count() -> int:
-    """Return the number of mesh points, which precede the joints."""
+    """Return the number of mesh points, which precede the joints in the array of points."""
     arrays = model_data()
     return len(arrays["positions_mm"]) - len(arrays["joint_names"])
 
 
 @cache
 def target_deltas() -> TargetDeltas:
-    """Return the displacements of all targets."""
+    """Return the displacements of all published morph targets."""
     arrays = model_data()
     delta = DELTA_UNIT_MM * arrays["target_delta"].astype(np.float32)
     first, point = (arrays[name].astype(np.int64) for name in ("target_first", "target_point"))

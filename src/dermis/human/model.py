@@ -1,4 +1,4 @@
-"""Head models of the parametric human with expressions and bones, and their shared template."""
+"""Head of the parametric human: mesh, eyes, expressions and bones, and the template that people share."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ MEAN_WEIGHTS = {
 
 
 class _LayoutFaces(NamedTuple):
-    """Faces of the mesh with one uv layout, equal for all people.
+    """Vertices and quads of the human mesh in one uv layout, equal for all people.
 
-    point : (v,) control point of each vertex
-    uv : (v, 2)
-    quads : (q, 4) vertices
+    point : (v,) index of the control point of each vertex
+    uv : (v, 2) texture coordinates
+    quads : (q, 4) vertex indices
     material : (q,) index into `MATERIALS`
     """
 
@@ -66,12 +66,15 @@ class _LayoutFaces(NamedTuple):
 
 
 def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
-    """Return the bare head of a person, without hair.
+    """Return the bare head of a person before subdivision, without hair.
 
-    weights : of published targets
+    weights : weights of published morph targets by name
+    maps : maps of the skin
+    layout : uv layout
+    eyes : look of the eyes
     """
     points_mm, faces = morphed_points_mm(weights), _layout_faces(layout)
-    sockets = _sockets(points_mm)
+    sockets = _eye_sockets(points_mm)
     (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
     points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
     mesh = build_mesh(
@@ -88,25 +91,28 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
-    return Head("human", mesh, maps, CREDIT, rig, _eyes(eyes))
+    return Head("human", mesh, maps, CREDIT, rig, _build_eyes(eyes))
 
 
 def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
-    """Return the control points (p, 3) of a person in rest pose, see `Human.positions_mm` [mm]."""
+    """Return the control points (p, 3) of a person in rest pose, relative to the midpoint of the eyes [mm].
+
+    weights : weights of published morph targets by name
+    """
     points_mm = morphed_points_mm(weights)
-    sockets = _sockets(points_mm)
+    sockets = _eye_sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
     skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]
     return np.concatenate([skin, *balls]).astype(np.float32)
 
 
-def _sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
-    """Return the sockets of the left and the right eye."""
+def _eye_sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
+    """Return the sockets of the left and the right eye, from the published points of a person."""
     left, right = (lids.fit_socket(points_mm[group_points(name)]) for name in (LEFT_EYE, RIGHT_EYE))
     return left, right
 
 
-def _eyes(look: EyeLook) -> Eyes:
+def _build_eyes(look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
     first = mesh_point_count() + np.array([0, size], np.int32)
     apex, back, side = (np.asarray(first + point, np.int32) for point in eyeball.axis_points())
@@ -116,16 +122,16 @@ def _eyes(look: EyeLook) -> Eyes:
 
 @cache
 def _layout_faces(layout: Layout) -> _LayoutFaces:
-    uv, quads, corner, material = _quads(layout)
+    uv, quads, corner, material = _combined_quads(layout)
     both = np.stack([quads, corner], axis=-1).reshape(-1, 2)
     pairs, vertex = np.unique(both, axis=0, return_inverse=True)
     return _LayoutFaces(pairs[:, 0], uv[pairs[:, 1]], vertex.reshape(-1, 4), material)
 
 
-def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
-    """Return all quads, with anatomical eyeballs instead of the published ones.
+def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
+    """Return the quads of a uv layout with anatomical eyeballs instead of the published ones.
 
-    Arrays: uv (u, 2), points of the quads (q, 4), their uv indices (q, 4), and their materials (q,).
+    The arrays are uv (u, 2), control point indices (q, 4), uv indices (q, 4) and material indices (q,).
     """
     arrays = model_data()
     if layout == "own":
@@ -138,7 +144,7 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
     ball, quads = lids.eyeball_mesh()
     size, points = len(ball), arrays["quads"][: len(corner)].astype(np.int64)
     for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
-        tooth_points, tooth_uv = teeth.layout(upper)
+        tooth_points, tooth_uv = teeth.teeth_layout(upper)
         is_tooth = np.array(names) == name
         corner[is_tooth] = len(uv) + np.searchsorted(tooth_points, points[is_tooth])
         uv = np.concatenate([uv, tooth_uv])
@@ -153,11 +159,11 @@ def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """Data that all people with the same uv layout and level of subdivision share.
+    """Data that people with the same uv layout and subdivision level share.
 
-    head : bare head of the mean person
-    root_finder : roots of brows and lashes on it
-    refinement : subdivision of the meshes; None at level 0
+    head : bare head of the mean person, at this level
+    root_finder : finder of brow and lash roots on the mean person
+    refinement : subdivision stencils and topology; None at level 0
     """
 
     head: Head
@@ -165,9 +171,9 @@ class Template:
     refinement: Refinement | None
 
     def refine_head(self, control_head: Head) -> Head:
-        """Return a person's head on the subdivided mesh, with the template for atlas and tables.
+        """Return the subdivided head of a person, which refers to the template's head for atlas and tables.
 
-        control_head : the head before subdivision, of the same layout
+        control_head : head before subdivision, with the uv layout of the template
         """
         rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
         mesh = control_head.mesh
@@ -178,7 +184,7 @@ class Template:
 
 @cache
 def template(layout: Layout, levels: int) -> Template:
-    """Return the template of a uv layout and a level of subdivision."""
+    """Return the template for a uv layout and a number of subdivision levels; templates are cached."""
     head = control_head = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
     refined = refinement(control_head.mesh, levels) if levels else None
     if refined is not None:

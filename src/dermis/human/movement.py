@@ -36,7 +36,7 @@ _GAZE_ANGLES = {
 
 
 def gaze_rotations() -> tuple[BoneRotation, ...]:
-    """Return the rotations of the eyes that belong to the eyeLook targets of ARKit."""
+    """Return the rotations of the eye bones for the ARKit targets whose names start with eyeLook."""
     return tuple(
         BoneRotation(f"eyeLook{direction}{name}", f"eye.{name[0]}", (x, side * y, z))
         for name, side in (("Left", 1.0), ("Right", -1.0))
@@ -46,7 +46,7 @@ def gaze_rotations() -> tuple[BoneRotation, ...]:
 
 @cache
 def expression_targets() -> MorphTargets:
-    """Return the ARKit blend shapes of skin, teeth and tongue; `gaze_rotations` turn the eyeballs."""
+    """Return the ARKit blend shapes of skin, teeth and tongue, without eyeballs, which rotate with bones."""
     targets, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(targets.names):
         if name.startswith(EXPRESSION_PREFIX):
@@ -60,7 +60,7 @@ def expression_targets() -> MorphTargets:
 
 @cache
 def _moved_points() -> NDArray[np.bool_]:
-    """Return the mask (n,) of points that expressions move: neither joints nor eyeballs."""
+    """Return a mask (n,) of the published points that blend shapes may move: all but joints and eyeballs."""
     arrays = model_data()
     balls = [index for index, name in enumerate(arrays["group_names"]) if str(name).endswith("-eye")]
     moved = np.ones(len(arrays["positions_mm"]), bool)
@@ -70,12 +70,11 @@ def _moved_points() -> NDArray[np.bool_]:
 
 
 def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int) -> Skeleton:
-    """Return the skeleton: spine, clavicles, neck of three bones, head, jaw and eyes.
+    """Return the skeleton of a person: spine, clavicles, three neck bones, head, jaw and eyes.
 
-    joint_mm : (j, 3) the person's joints [mm]
-    centres : (3,) of the left and the right eyeball, about which they rotate [mm]
-    eyeball_size : number of points of an eyeball; the left eyeball follows the published points, then the
-        right
+    joint_mm : (j, 3) positions of the person's joints [mm]
+    centres : centres (3,) of the left and the right eyeball, about which they rotate [mm]
+    eyeball_size : number of points of an eyeball; the left and the right eyeball follow the mesh points
     """
     arrays = model_data()
     names = tuple(map(str, arrays["bone_names"]))
@@ -94,7 +93,12 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
 
 @cache
 def _skin_weights(eyes: tuple[int, ...], eyeball_size: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the bones (p, 4) of all points and their weights; an eyeball follows only its own bone."""
+    """Return the bone indices (p, 4) of all points, and the skinning weights (p, 4) of these bones.
+
+    An eyeball follows only its own bone.
+
+    eyes : indices of the bones of the left and the right eye
+    """
     arrays = model_data()
     weights = arrays["weight"].astype(np.float32)
     eyeball_weights = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)

@@ -1,4 +1,4 @@
-"""Parametric people, by given parameters or sampled at random."""
+"""Parametric people, with given parameters or sampled at random."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from dermis.mesh.subdivide import resolve_levels
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
 _ANCESTRY_CONCENTRATION = 0.35  # of the Dirichlet distribution of ancestries: mostly one for most people
-_SEX_DEVIATION = 0.08  # standard deviation from 0 or 1
-_OPPOSITES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
+_SEX_DEVIATION = 0.08  # standard deviation of `sex` from 0 or 1
+_OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
 """Suffixes of the names of targets with opposite effects."""
 _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
@@ -49,10 +49,10 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "ears": 0.25,
     "neck": 0.12,
 }
-_EXCLUDED = ("trans", "age", "fat", "measure", "push")  # macro quantities, and shifts of whole parts
+_EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")  # macro quantities, and shifts of whole parts
 _SIDE_DEVIATION = 0.2  # difference between left and right, as a fraction of the deviation
 _ASYMMETRY_DEVIATION = 0.1
-_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
+_HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MAX_SHAPE_WEIGHT = 0.3
 _ANCESTRY = "african", "asian", "caucasian"
 _LOOK_FIELDS = "targets", "skin", "eyes", "hair"
@@ -73,7 +73,10 @@ _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 
 
 def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a random `Human`, see `Human.drawn`."""
+    """Return the fields of a random `Human` by name, for `Human.drawn`.
+
+    given : fields that are not sampled
+    """
     macro = {name: float(value) for name, value in given.items() if name not in _LOOK_FIELDS}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
     ancestry = _ancestry_fractions(macro, rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3))
@@ -103,7 +106,7 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the given ancestries (3,), normalised to a sum of 1, or the sampled ones if none is given."""
+    """Return ancestry fractions (3,): the given weights divided by their sum, or the sampled fractions."""
     if not any(name in given for name in _ANCESTRY):
         return sampled
     weights = np.array([given.get(name, 0.0) for name in _ANCESTRY])
@@ -119,7 +122,11 @@ def _sample_hair_and_skin(
     skin: SkinLook,
     given: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return random hair, and the skin with the stubble and recession that match it."""
+    """Return the fields "hair" and "skin": a random hair look, and the skin with its stubble and recession.
+
+    person, typical : demographics and typical hair of the person
+    skin : sampled skin look, whose shadow of shaved hair is adjusted to the hair
+    """
     hair, recession = sample_hair(rng, person, typical), sample_recession(rng, person)
     hair = replace(hair, **given.get("hair", {}))
     visibility = stubble_visibility(hair)
@@ -129,9 +136,9 @@ def _sample_hair_and_skin(
 
 
 def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64]) -> tuple[float, float]:
-    """Return random eumelanin and pheomelanin of hair: nearly black except for mostly European ancestry.
+    """Return random eumelanin and pheomelanin of hair, which is nearly black without European ancestry.
 
-    ancestry : (3,) fractions
+    ancestry : (3,) fractions of African, Asian and European ancestry
     """
     fair = np.exp(rng.uniform(np.log(0.4), np.log(5.0)))
     brown = float(np.exp(ancestry @ np.log([8.0, 7.0, fair])) * rng.lognormal(0.0, 0.1))
@@ -140,7 +147,7 @@ def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64
 
 
 def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
-    """Yield random weights of targets, always in the same order."""
+    """Yield random names and weights of morph targets of the face, in a fixed order."""
     common: dict[str, float] = {}
     samples = iter(rng.standard_normal(sum(1 + bool(one.mirrored) for one in _opposite_targets())).tolist())
     for one in _opposite_targets():
@@ -150,16 +157,17 @@ def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
         if one.mirrored:  # left and right are nearly alike
             value = common.setdefault(one.mirrored, value) + _SIDE_DEVIATION * one.spread * next(samples)
         yield (one.more if value > 0 else one.less), abs(value)
-    yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
+    yield f"head/head-{rng.choice(_HEAD_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
 
 
 class _OppositeTargets(NamedTuple):
-    """Two targets with opposite effects, and the distribution of their weight.
+    """Two morph targets with opposite effects, and the normal distribution of their signed weight.
 
-    less, more : names of the targets
+    less, more : names of the targets for negative and positive weights
     spread : standard deviation of the weight
     truncated : whether the weight is limited to two standard deviations
-    mirrored : name shared with the target of the other side of the face, or ""
+    mirrored : key shared with the target of the opposite half of the face, so that both get similar weights;
+        "" for targets in the middle
     """
 
     less: str
@@ -171,16 +179,16 @@ class _OppositeTargets(NamedTuple):
 
 @cache
 def _opposite_targets() -> tuple[_OppositeTargets, ...]:
-    """Return all pairs of targets that are sampled, in the order of sampling."""
+    """Return the pairs of opposite morph targets that are sampled, in the order of random draws."""
     known, pairs = human_targets(), list[_OppositeTargets]()
     for name in known:
         folder, local_name = name.split("/")
         if folder == "asym" and name.endswith("-l"):
             pairs.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
-        if folder not in _FOLDER_DEVIATIONS or any(word in local_name for word in _EXCLUDED):
+        if folder not in _FOLDER_DEVIATIONS or any(word in local_name for word in _EXCLUDED_TARGETS):
             continue
         sided = local_name[:2] in ("l-", "r-")
-        for low, high in _OPPOSITES.items():
+        for low, high in _OPPOSITE_SUFFIXES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
                 side_free = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
@@ -243,7 +251,7 @@ class Human:
     hair: HairLook | None = None
 
     def __post_init__(self) -> None:
-        """Validate the fields."""
+        """Raise DermisError for fields out of range."""
         check_fields(self, _RANGES)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a weight of african, asian or caucasian above 0", "all are 0", "Raise one")
@@ -331,10 +339,11 @@ class Human:
         return add_hair(head, control_head, shared.root_finder, self.hairdo, self.look.recession, hairs)
 
     def on(self, head: Head) -> Head:
-        """Return the head of another person with the skin and the eyes of this one.
+        """Return the head of another person with the skin and eyes of this person.
 
-        With `Pose(positions_mm=person.positions_mm)` it also has the shape of this person, and only the skin
-        is painted again. Hair and joint positions are still those of the other person.
+        With `Pose(positions_mm=person.positions_mm)` the head also gets the shape of this person; only its
+        skin is painted again, which is faster than a new head. Hair and joint positions are still those of
+        the other person.
 
         Parameters
         ----------
@@ -344,12 +353,12 @@ class Human:
         Returns
         -------
         Head
-            The head with other maps and eyes.
+            The head with the skin maps and the eye look of this person.
 
         Raises
         ------
         DermisError
-            For other heads.
+            For heads that are not parametric or whose skin is not painted.
         """
         if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
             refuse(
@@ -363,7 +372,7 @@ class Human:
 
     @property
     def look(self) -> SkinLook:
-        """Return the look of the skin, given or typical for the person."""
+        """Return the given skin look, or the typical one for the person's ancestry, sex and age."""
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hairdo)
@@ -371,12 +380,12 @@ class Human:
 
     @property
     def iris(self) -> EyeLook:
-        """Return the look of the eyes, given or typical for the person."""
+        """Return the given eye look, or the typical one for the person's ancestry."""
         return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
     def hairdo(self) -> HairLook:
-        """Return the look of the hair, given or typical for the person."""
+        """Return the given hair look, or the typical one for the person's ancestry, sex and age."""
         if self.hair is not None:
             return self.hair
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
@@ -391,14 +400,15 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives any head of the parametric human this shape, as all have these points.
+        `Pose(positions_mm=...)` gives any head of the parametric human this shape, as the points of all
+        people correspond.
 
         Raises DermisError for unknown targets.
         """
         return control_points_mm(self.weights())
 
     def weights(self) -> dict[str, float]:
-        """Return the non-zero weights of published targets by name."""
+        """Return the non-zero weights of all published morph targets that shape this person, by name."""
         weights = {**self._ancestry_weights(), **self._build_weights()}
         for name, weight in self.targets.items():
             weights[name] = weights.get(name, 0.0) + weight
@@ -413,7 +423,7 @@ class Human:
         }
 
     def _build_weights(self) -> dict[str, float]:
-        """Return the weights of targets for weight and muscle; the average of both needs no target."""
+        """Return the morph target weights for body weight and muscle; average build needs no target."""
         weights = {}
         for kind, fraction in self._adult_fractions().items():
             for muscle, muscle_fraction in _blend_steps(self.muscle).items():
@@ -424,7 +434,7 @@ class Human:
         return weights
 
     def _adult_fractions(self) -> dict[str, float]:
-        """Return the fractions of the four published kinds of adults."""
+        """Return the blend fractions of MakeHuman's four adults: female or male, young or old."""
         old = (self.age - YOUNG) / (OLD - YOUNG)
         return {
             f"{sex}-{age}": sex_fraction * age_fraction
@@ -434,5 +444,5 @@ class Human:
 
 
 def _blend_steps(value: float) -> dict[str, float]:
-    """Return the fractions of minimum, average and maximum for a value from -1 to 1."""
+    """Return linear blend fractions of "min", "average" and "max" for a parameter from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}

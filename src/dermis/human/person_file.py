@@ -1,4 +1,4 @@
-"""People in files: their numbers as JSON, and their heads as glTF."""
+"""Files of people: their parameters as JSON, and their heads as glTF."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_numbers(person: Human) -> dict[str, Any]:
-    """Return all numbers of a person by name, including typical looks of skin, eyes and hair."""
+    """Return all parameters of a person by name, including the typical looks of skin, eyes and hair."""
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
 def write_person_json(path: Path, person: Human) -> int:
-    """Write a person as JSON in an atomic write, and return the size of the file [byte]."""
+    """Write the parameters of a person as JSON in an atomic write, and return the file size [byte]."""
     data = (json.dumps({"person": person_numbers(person)}, indent=2, default=float) + "\n").encode()
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
@@ -45,7 +45,7 @@ def write_person_json(path: Path, person: Human) -> int:
 
 
 def read_person(path: Path) -> Human:
-    """Return the person of a file written by `write_person_json`; missing values have their defaults.
+    """Read a person from a JSON file of `write_person_json`; missing parameters have their defaults.
 
     Raises DermisError for other files and for invalid values.
     """
@@ -63,7 +63,7 @@ def read_person(path: Path) -> Human:
 
 
 def _build(path: Path, kind: type[T], numbers: Any) -> T:
-    """Return a dataclass built from numbers by name."""
+    """Return an instance of a dataclass, such as `Human` or `SkinLook`, from its fields in a file."""
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):
         actual = f"got {format_value(numbers)}"
@@ -86,11 +86,11 @@ def write_person_glb(
     weights: Mapping[str, float] | None = None,
     eyes: EyeTextures | None = None,
 ) -> int:
-    """Write a person's head as a .glb file in an atomic write, and return the size of the file [byte].
+    """Write a person's head as a .glb file in an atomic write, and return the file size [byte].
 
     roughness : Beckmann roughness m of skin without a roughness map [-]
-    weights : of expressions in the file's rest pose
-    eyes : textures of the eyes; one colour if None
+    weights : weights of the morph targets of expressions that are active in the file
+    eyes : colour and normal textures of the eyes; they are exported with one colour if None
     """
     notes = {"person": person_numbers(person)}
     data = encode_head(
@@ -102,9 +102,9 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map to the right and upwards [-].
+    """Return the slopes (n, n, 2) of a head's height map along +u and upwards, for normal maps [-].
 
-    None for heads with a normal map or without a square height map, for which other programs need no slopes.
+    None for heads that already have a normal map or have no square height map.
     """
     height = head.maps.height
     if head.maps.normal is not None or height is None:

@@ -1,4 +1,4 @@
-"""Uv layout of the human's teeth: along the dental arch and up from the biting edge."""
+"""Uv layout of the human's teeth: u along the dental arch, v upwards from the biting edge."""
 
 from __future__ import annotations
 
@@ -20,8 +20,11 @@ _SAMPLES = 2000
 
 
 @cache
-def layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
-    """Return the points of the upper or lower teeth, and their uv (n, 2) on the average person."""
+def teeth_layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
+    """Return the point indices (n,) of the upper or lower teeth, and their uv (n, 2).
+
+    The uv are computed on the average person and are equal for all people.
+    """
     points = group_points("helper-upper-teeth" if upper else "helper-lower-teeth")
     x, y, z = average_surface()[0][points].astype(np.float64).T
     across, deep = float(np.abs(x).max()), float(np.ptp(z))
@@ -31,10 +34,10 @@ def layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
 
 
 def _arc_length(angle: Doubles, across: float, deep: float) -> Doubles:
-    """Return the length (n,) along an elliptic arch from its middle [mm].
+    """Return the signed arc length (n,) of an ellipse from its vertex in the middle of the teeth [mm].
 
-    angle : parameter of the ellipse [rad]
-    across, deep : half axes of the ellipse [mm]
+    angle : (n,) parameter of the ellipse [rad]
+    across, deep : half axes of the ellipse, sideways and backwards [mm]
     """
     t = np.linspace(0.0, np.pi / 2, _SAMPLES)
     step = np.hypot(across * np.cos(t), deep * np.sin(t)) * (t[1] - t[0])

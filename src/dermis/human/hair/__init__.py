@@ -1,1 +1,1 @@
-"""Hair of people as strands: brows, lashes, hair of the head and beard."""
+"""Hair of the parametric human as strands: brows, lashes, head hair and beard."""

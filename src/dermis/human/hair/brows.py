@@ -1,6 +1,6 @@
-"""Eyebrow hairs, rooted and traced on the skin around the eyes.
+"""Eyebrow hairs: random roots and shapes, and strands traced over the skin around the eyes.
 
-The skin is sampled on a grid in the front plane (x, y) of the mean person.
+Positions along and across a brow are defined in the front plane, the (x, y) plane of the mean person.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
 _ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
-_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
-_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
+_CENTRE_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
+_CENTRE_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
 _HALF_HEIGHT = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
 _ANGLES = np.radians([82, 66, 43, 21, 3, -20, -32])
 _DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
@@ -29,9 +29,9 @@ _LENGTH = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
 
 
 class SurfacePoints(NamedTuple):
-    """Points on the skin.
+    """Sampled skin points with their normals and tangents.
 
-    position_mm, normal : (n, 3)
+    position_mm, normal : (n, 3) positions [mm] and unit normals
     along_x, along_y : (n, 3) derivatives of the position with respect to x and y of the front plane [-]
     """
 
@@ -41,9 +41,10 @@ class SurfacePoints(NamedTuple):
     along_y: Doubles
 
     def step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
-        """Return the steps in x and y of the front plane that move along tangential directions (n, 3) [mm].
+        """Convert steps along the skin to steps (dx, dy) in the front plane, each (n,) [mm].
 
-        length : (n,) of the step on the skin [mm]
+        directions : (n, 3) directions of the steps; only their tangential components count
+        length : (n,) length of each step along the skin [mm]
         """
         u, v = self.along_x, self.along_y
         pairs = (u, u), (u, v), (v, v), (u, directions), (v, directions)
@@ -58,7 +59,7 @@ def _row_dots(a: Doubles, b: Doubles) -> Doubles:
 
 
 def grid_points() -> tuple[Doubles, Doubles]:
-    """Return x and y of the grid points in the front plane, for the left brow [mm]."""
+    """Return x and y (n,) of the grid nodes at which `BrowSurface` samples the skin of the left brow [mm]."""
     x, y = np.meshgrid(*_grid_axes(), indexing="ij")
     return x.ravel(), y.ravel()
 
@@ -69,10 +70,10 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 
 
 class BrowSurface:
-    """Skin of a person around the brows.
+    """Skin around the brows of a person as a height field, which hairs follow as they grow.
 
-    node_mm, normal : (2 nodes, 3) grid points of the left and the right brow projected onto the person by
-        `SkinSurface.project`; x is positive outwards on both sides
+    node_mm, normal : (2 n, 3) nodes of `grid_points` projected onto the skin [mm], and the skin normals
+        there; first all nodes of the left brow, then those of the right one, mirrored in x
     """
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
@@ -84,9 +85,10 @@ class BrowSurface:
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
     def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
-        """Return the skin at points (n,) of the front plane [mm]; points off the grid use its border.
+        """Return the skin at points (n,) of the front plane, which are clamped to the grid.
 
-        side : 1 for the left brow
+        side : (n,) 1 for the left brow, -1 for the right
+        x, y : (n,) coordinates in the front plane, x outwards from the middle of the face [mm]
         """
         grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _CELL_MM
         grid = np.clip(grid, 0.0, self._last[:, None] - 1e-9)
@@ -103,43 +105,52 @@ class BrowSurface:
 
 
 def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """Return random positions along and across the brow (n,), and x and y in the front plane (n,) [mm]."""
+    """Return random root positions of brow hairs as arrays u, v, x and y (n,).
+
+    u is the position along the brow, 0 to 1 from its inner end, v the position across it, -1 to 1 from the
+    lower to the upper edge, and x and y are coordinates in the front plane of the left brow [mm].
+    """
     u = rng.random(4 * _MAX_HAIRS)
     accepted = rng.random(len(u)) < np.interp(u, _ALONG, _DENSITY * _HALF_HEIGHT / _HALF_HEIGHT.max())
     u = u[accepted][:_MAX_HAIRS]
     v = np.clip(rng.normal(0.0, 0.52, len(u)), -1.5, 1.5)
     ahead, behind = np.minimum(u + 0.02, 1.0), np.maximum(u - 0.02, 0.0)
-    along = np.stack([np.interp(ahead, _ALONG, c) - np.interp(behind, _ALONG, c) for c in (_X, _Y)])
+    along = np.stack(
+        [np.interp(ahead, _ALONG, c) - np.interp(behind, _ALONG, c) for c in (_CENTRE_X, _CENTRE_Y)]
+    )
     along /= np.linalg.norm(along, axis=0)
     offset = v * np.interp(u, _ALONG, _HALF_HEIGHT)
-    x = np.interp(u, _ALONG, _X) - along[1] * offset + rng.normal(0, 0.4, len(u))
-    y = np.interp(u, _ALONG, _Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
+    x = np.interp(u, _ALONG, _CENTRE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _ALONG, _CENTRE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
     return u, v, x, y
 
 
-def outline(across: float) -> Doubles:
-    """Return the line (k, 2) along the left brow in the front plane, from its inner end [mm].
+def brow_outline(across: float) -> Doubles:
+    """Return a polyline (k, 2) along the left brow in the front plane, from its inner to its outer end [mm].
 
-    across : -1 for the lower edge, 0 for the middle, 1 for the upper edge
+    across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
     """
-    along = np.gradient(np.stack([_X, _Y], axis=-1), axis=0)
+    along = np.gradient(np.stack([_CENTRE_X, _CENTRE_Y], axis=-1), axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    x, y = _X - across * _HALF_HEIGHT * along[:, 1], _Y + across * _HALF_HEIGHT * along[:, 0]
+    x, y = (
+        _CENTRE_X - across * _HALF_HEIGHT * along[:, 1],
+        _CENTRE_Y + across * _HALF_HEIGHT * along[:, 0],
+    )
     return np.stack([x, y], axis=-1)
 
 
 def hair_count(look: HairLook) -> int:
-    """Return the number of hairs of one brow."""
+    """Return the number of hairs in each brow, which grows with `HairLook.bushy`."""
     return int(_MAX_HAIRS * (0.55 + 0.45 * look.bushy))
 
 
 def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLook) -> Doubles:
-    """Return random shapes of hairs (5, n).
+    """Return random shape parameters (5, n) of brow hairs.
 
-    The rows are the angle at the root in the front plane and its change [rad], the length, the height over
-    the skin and the radius of the root [mm].
+    The rows are the angle of the hair at its root, measured in the front plane from outwards to upwards, the
+    change of this angle along the hair [rad], the length, the height above the skin and the root radius [mm].
 
-    u, v : (n,) along and across the brow, from `sample_positions`
+    u, v : (n,) positions along and across the brow, from `sample_positions`
     """
     n = len(u)
     # hairs of the upper and the lower half lean towards each other
@@ -155,12 +166,12 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
 def grow(
     skin: BrowSurface, root_mm: Doubles, side: Doubles, front_mm: Doubles, shape: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Return the knots (n, k, 3) and radii (n, k) of the hairs of brows [mm].
+    """Return the knots (n, k, 3) and radii (n, k) of brow hairs traced over the skin [mm].
 
-    root_mm : (n, 3) on the skin
-    side : (n,) 1 for the left brow
-    front_mm : (2, n) x and y in the front plane, from `sample_positions`
-    shape : (5, n) from `sample_shapes`
+    root_mm : (n, 3) positions of the roots on the skin [mm]
+    side : (n,) 1 for hairs of the left brow, -1 for the right
+    front_mm : (2, n) x and y of the roots in the front plane, from `sample_positions` [mm]
+    shape : (5, n) shape parameters from `sample_shapes`
     """
     (x, y), (first_angle, bend, length, rise, radius) = front_mm, shape
     t = np.linspace(0.0, 1.0, KNOTS)

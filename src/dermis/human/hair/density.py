@@ -1,4 +1,4 @@
-"""Density of hair over the skin of the average person, and roots sampled from it."""
+"""Density of scalp hair and beard over the skin, and random hair roots with that density."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
 _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
-_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of its edge [rad/mm]
+_HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # below the hairline, for quads that may have hair
 _HAIR_MARGIN_MM, _BROW_MARGIN_MM = 25.0, 8.0  # around hairy quads, for skin that hair may touch
@@ -33,11 +33,11 @@ _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
 
 class HairDensity(NamedTuple):
-    """Relative density of hair over the skin.
+    """Relative density of scalp hair or beard over the skin.
 
-    relative : function of points (n, 4) that returns the relative density (n,); columns are the position on
-        the average person and the distance inside the lips [mm]
-    candidates : (p,) mask of control points whose quads may have hair
+    relative : function that returns the relative density (n,), 0 to 1, at points (n, 4): position on the
+        average person, and distance inside the border of the lips [mm]
+    candidates : (p,) mask of control points; quads without any of them are skipped, as no hair grows there
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -45,10 +45,13 @@ class HairDensity(NamedTuple):
 
 
 def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
-    """Return random, evenly distributed roots, ordered by quad; none on ears, lips and in the mouth.
+    """Return random, evenly distributed hair roots, ordered by quad.
 
-    mesh : the person's mesh before subdivision
-    per_cm2 : density where the relative density is 1 [1/cm2]
+    No hair grows on ears, on lips and in the mouth.
+
+    mesh : control mesh of the person
+    density : relative density over the skin
+    per_cm2 : number of roots per area where the relative density is 1 [1/cm2]
     """
     quad = _hairy_quads(mesh)
     corner_points = quad_corners(mesh, quad)
@@ -69,9 +72,10 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
 
 
 def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
-    """Return the height (n,) of points (n, 3 or more) of the average person above the hairline [mm].
+    """Return the height (n,) of points on the average person above the hairline, negative below it [mm].
 
-    recession : see `SkinLook`
+    points : (n, 3 or more) positions on the average person [mm]
+    recession : recession of the hairline, 0 to 1, see `SkinLook`
     """
     angle = np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
     edge = hairline_heights(recession)
@@ -79,9 +83,9 @@ def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
 
 
 def scalp_density(recession: float) -> HairDensity:
-    """Return the density of the hair of the head.
+    """Return the relative density of scalp hair, which fades at the hairline and is thin on a receding crown.
 
-    recession : see `SkinLook`
+    recession : recession of hairline and crown, 0 to 1, see `SkinLook`
     """
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
@@ -100,7 +104,7 @@ def scalp_density(recession: float) -> HairDensity:
 
 
 def beard_density() -> HairDensity:
-    """Return the density of the beard."""
+    """Return the relative density of the beard, which ends at the lips."""
     return HairDensity(_beard_amount, _beard_candidates())
 
 
@@ -126,7 +130,7 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
 
 
 def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
-    """Return the areas (n,) of quads [cm2]."""
+    """Return the areas (n,) of quads of a control mesh, given by their indices (n,) [cm2]."""
     corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
     across = cross_columns(c - a, d - b)
@@ -134,7 +138,12 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
 
 
 def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
-    """Return the sum (n,) of a quantity over Gaussian zones, see zones.csv."""
+    """Return an amount (n,), such as that of hair or beard, summed over the Gaussian zones of the face.
+
+    name : one of `ZONE_AMOUNTS`
+    rows : (k, 20) zones from `zone_table`
+    points : (n, 3 or more) positions on the average person [mm]
+    """
     column, total = _amount_column(name), np.zeros(len(points))
     mirrored = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
@@ -145,7 +154,10 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Return the vertices of the subdivided mesh that hair of any person may touch."""
+    """Return the indices of subdivided vertices within reach of hair, to which `SkinSurface` can be limited.
+
+    bearded : whether the beard is included
+    """
     from scipy.spatial import cKDTree
 
     mesh = root_finder.mesh
@@ -166,7 +178,7 @@ def _amount_column(name: str) -> int:
 
 @cache
 def average_points() -> Doubles:
-    """Return the control points of the average person and their distance inside the lips (p, 4) [mm]."""
+    """Return the average person's control points (p, 4): position and distance inside the lip border [mm]."""
     points_mm, distances = average_surface()
     lips = distances[:, BORDER_FIELDS.index("lips")]
     return np.asfortranarray(np.column_stack([points_mm, lips]), np.float64)
@@ -174,7 +186,7 @@ def average_points() -> Doubles:
 
 @cache
 def _hairless_quads() -> Index:
-    """Return the quads without hair: ears, lips and the inside of the mouth."""
+    """Return the indices of quads on which no hair grows: ears, lips and the inside of the mouth."""
     rows = read_rows("dermis.human.regions", "parts")
     return np.concatenate([np.arange(int(row["first"]), int(row["last"]) + 1) for row in rows])
 

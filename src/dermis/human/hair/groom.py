@@ -1,4 +1,7 @@
-"""Hair, beard, brows and lashes of a person; the roots are the same for all people."""
+"""Complete hair of a person: scalp hair, beard, brows and lashes as strands.
+
+Brows and lashes are rooted on the quads of the template person, whose topology all people share.
+"""
 
 from __future__ import annotations
 
@@ -32,29 +35,31 @@ def add_hair(
     recession: float = 0.0,
     hairs: float = 1.0,
 ) -> Head:
-    """Return the head with hair, beard, brows and lashes.
+    """Return a head with strands for scalp hair, beard, brows and lashes.
 
-    control_head : the head before subdivision
-    root_finder : of the template person, on whom brows and lashes are defined
-    recession : see `SkinLook`
-    hairs : fraction of the hairs of head and beard that grow, each wider by the inverse
+    head, control_head : the subdivided head, and the same head before subdivision
+    root_finder : root finder of the template person, on whom brows and lashes are defined
+    look : length, density, curl and colour of the hair
+    recession : recession of the hairline, 0 to 1, see `SkinLook`
+    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by its inverse to keep
+        coverage
     """
     skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
     surface = GrowthSurface(head, control_head.mesh, skin, hairs)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
-    left, right = _brows(surface, root_finder, look, rngs)
-    rows = list(_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
+    left, right = _grow_brows(surface, root_finder, look, rngs)
+    rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
-    head = replace(head, strands=_join(groups, _absorption(groups, look)))
+    head = replace(head, strands=_join_groups(groups, _fine_hair_absorption(groups, look)))
     hair = [*scalp_hair(surface, look, recession), *beard_hair(surface, look)]
     if not hair:
         return head
-    joined = _join(hair, _mixed_absorption(hair, look))
-    return replace(head, hair=_shuffle(joined, look.seed))
+    joined = _join_groups(hair, _mixed_hair_absorption(hair, look))
+    return replace(head, hair=_shuffle_strands(joined, look.seed))
 
 
-def _shuffle(strands: Strands, seed: int) -> Strands:
-    """Return the strands in random order, so that the first few represent all."""
+def _shuffle_strands(strands: Strands, seed: int) -> Strands:
+    """Return the strands in random order, so that any first fraction of them is a fair sample."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
     roots = Roots(strands.roots.quad.take(order), strands.roots.position.take(order, axis=0))
     names = "knots_mm", "radius_mm", "absorption", "cover"
@@ -62,10 +67,10 @@ def _shuffle(strands: Strands, seed: int) -> Strands:
     return replace(strands, roots=roots, **arrays)
 
 
-def _brows(
+def _grow_brows(
     surface: GrowthSurface, root_finder: RootFinder, look: HairLook, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the left and the right brow, computed together as array operations have a fixed cost."""
+    """Yield the hairs of the left and then of the right brow, which are computed in one batch for speed."""
     roots, parameters = [], []
     for side, rng in zip(SIDES, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)
@@ -78,15 +83,15 @@ def _brows(
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
     brow_surface = BrowSurface(*surface.skin.project(grid_mm))
     knots, radius = brows.grow(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
-    yield from _split(_hair_group(frames, knots, radius, 1.0), [len(part.quad) for part in roots])
+    yield from _split_group(_hair_group(frames, knots, radius, 1.0), [len(part.quad) for part in roots])
 
 
-def _lashes(
+def _grow_lashes(
     surface: GrowthSurface, root_finder: RootFinder, eyes: Doubles, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the upper and the lower lashes of the left eye, then those of the right eye, computed together.
+    """Yield the upper and lower lashes of the left, then of the right eye, computed in one batch for speed.
 
-    eyes : (2, 3) centres of the eyes [mm]
+    eyes : (2, 3) centres of the left and the right eye [mm]
     """
     roots, parameters, clumps = [], [], 0
     for side, eye, rng in zip(SIDES, eyes, rngs, strict=True):
@@ -99,11 +104,11 @@ def _lashes(
     frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
     knots, radius = lashes.grow(frames.positions_mm, hair[1:4].T, hair[0], hair[4:])
     group = _hair_group(frames, knots, radius, _LASH_PIGMENT_FACTOR)
-    yield from _split(group, [len(part.quad) for part in roots])
+    yield from _split_group(group, [len(part.quad) for part in roots])
 
 
-def _split(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
-    """Yield consecutive parts of a group with these numbers of hairs."""
+def _split_group(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
+    """Yield consecutive slices of a hair group; `counts` are their numbers of hairs."""
     for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
         part = slice(end - count, end)
         roots = Roots(group.roots.quad[part], group.roots.position[part])
@@ -113,19 +118,22 @@ def _split(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
 def _hair_group(
     frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
 ) -> HairGroup:
-    """Return hairs from knots (n, k, 3) in the coordinates of the head [mm]."""
+    """Return a hair group, with knots converted from the coordinates of the head to the root frames.
+
+    knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
+    """
     offsets = to_frames(frames.frame, knots_mm - frames.positions_mm[:, None])
     return HairGroup(frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 
-def _join(groups: list[HairGroup], absorption: Doubles) -> Strands:
-    """Return the strands of all groups.
+def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
+    """Return the strands of several hair groups as one object.
 
-    absorption : (n, 3) of single hairs [1/mm]
+    absorption : (n, 3) absorption coefficient of each single hair [1/mm], which is spread over wider strands
     """
     roots = _concatenate(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
-    hairs_per_strand, cover = (_per_hair(groups, name) for name in ("hairs_per_strand", "cover"))
+    hairs_per_strand, cover = (_repeat_per_hair(groups, name) for name in ("hairs_per_strand", "cover"))
     strand_absorption = (absorption / hairs_per_strand[:, None]).astype(np.float32)
     return Strands(roots, knots, radius, strand_absorption, cover.astype(np.float32))
 
@@ -135,23 +143,24 @@ def _concatenate(parts: Iterable[Roots]) -> Roots:
     return Roots(np.concatenate(quads), np.concatenate(positions))
 
 
-def _per_hair(groups: list[HairGroup], name: str) -> Doubles:
-    """Return a scalar field of the groups, repeated for each of their hairs (n,)."""
+def _repeat_per_hair(groups: list[HairGroup], name: str) -> Doubles:
+    """Return a scalar field of hair groups, such as "cover", repeated for each hair of its group (n,)."""
     return np.concatenate([np.full(len(group.radius), getattr(group, name)) for group in groups])
 
 
-def _absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
-    """Return the absorption (n, 3) of brows and lashes, some of which are white [1/mm]."""
-    rng, pigment_factor = np.random.default_rng((look.seed, 2)), _per_hair(groups, "pigment_factor")
+def _fine_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
+    """Return absorption coefficients (n, 3) of brow and lash hairs, some of them white at random [1/mm]."""
+    rng, pigment_factor = np.random.default_rng((look.seed, 2)), _repeat_per_hair(groups, "pigment_factor")
     n = len(pigment_factor)
     amount = pigment_factor * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
     return absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
 
 
-def _mixed_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
-    """Return the absorption (n, 3) of strands that represent several hairs, some of them white [1/mm].
+def _mixed_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
+    """Return absorption coefficients (n, 3) of strands that each represent white and pigmented hairs [1/mm].
 
-    The mean of white and brown hairs is grey; brown hair with less pigment would be blond.
+    A mixture of white and brown hairs looks grey, which brown hair with less pigment would not: it looks
+    blond.
     """
     rng, n = np.random.default_rng((look.seed, 6)), sum(len(group.radius) for group in groups)
     white = rng.binomial(_HAIRS_PER_COLOUR, look.grey, n)[:, None] / _HAIRS_PER_COLOUR

@@ -1,4 +1,4 @@
-"""Strands of hair and beard: combing by style, growth and random variation."""
+"""Strands of scalp hair and beard: combed guide hairs, and randomly varied hairs interpolated from them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PARTING_X = 31.0  # position of the parting of short hair
 _PARTING_WIDTH_MM = 9.0
 _LEVEL_TILT = 0.15  # slope of the levels of equal length, higher in front
 _CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # angles of root and tip to the skin [rad]
-_SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # at the sides, and its increase on top
+_SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # angles at the sides, and their increase on top [rad]
 _TUFT_MM = 2.2  # size of the cells in which tips form tufts
 _MIN_HEIGHT_MM = 0.35  # minimum height above the skin
 _HEAD_RADIUS_MM = 85.0
@@ -40,18 +40,18 @@ MAX_PER_CM2 = 200.0
 BEARD_PER_CM2 = 60.0
 """Density of beards [1/cm2]."""
 _HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
-_TIP_RADIUS_FACTOR = 0.6  # radius at the tip
+_TIP_RADIUS_FACTOR = 0.6  # radius at the tip relative to the root
 _STRAIGHT_KNOTS, _CURVED_KNOTS, _COILED_KNOTS = 5, 7, 9
 _COIL_CURL = 0.5  # curl above which hair coils
 _LONG_BEARD_MM = 8.0
 
 
 class GuideShape(NamedTuple):
-    """Shape of guide hairs.
+    """Shape of guide hairs, from which the neighbouring hairs are interpolated.
 
-    directions : (n, 3) unit directions along the skin
-    length_mm : (n,)
-    rise, tip_rise : (n,) angles between the skin and the hair at root and tip [rad]
+    directions : (n, 3) unit tangents of the skin, along which the guides are traced
+    length_mm : (n,) length of each guide [mm]
+    rise, tip_rise : (n,) angles between the skin and the guide at its root and at its tip [rad]
     """
 
     directions: Doubles
@@ -61,11 +61,12 @@ class GuideShape(NamedTuple):
 
 
 def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: float) -> GuideShape:
-    """Return the guides of the hair of the head.
+    """Return the shapes of scalp guide hairs combed according to the hair style.
 
-    points : (n, 3) on the average person [mm]
-    normals : (n, 3) of the person's skin
-    recession : see `SkinLook`
+    points : (n, 3) positions of the guide roots on the average person [mm]
+    normals : (n, 3) skin normals of the actual person at these roots
+    look : style, length and fade of the hair
+    recession : recession of the hairline, 0 to 1, see `SkinLook`
     """
     growth, top, n = _growth_directions(points, normals), _top_weight(points), len(points)
     edge = height_above_hairline(points, recession)
@@ -81,7 +82,10 @@ def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: flo
 
 
 def comb_beard(points: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
-    """Return the guides of the beard, which point down and slightly to the sides; see `comb_scalp`."""
+    """Return the shapes of beard guide hairs, which point down and slightly to the sides.
+
+    points, normals : (n, 3) root positions on the average person [mm], and skin normals of the actual person
+    """
     n = len(points)
     sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
     directions = tangent_directions(np.stack([sideways, np.full(n, -1.0), np.zeros(n)], axis=1), normals)
@@ -89,19 +93,19 @@ def comb_beard(points: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
 
 
 def tangent_directions(offsets: Doubles, normals: Doubles) -> Doubles:
-    """Return the unit tangential components of vectors (n, 3)."""
+    """Return unit tangents (n, 3): vectors projected onto the tangent planes and normalised."""
     flat = tangent_component(offsets, normals)
     return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 
 def rotate_about_normals(offsets: Doubles, normals: Doubles, angle: Doubles) -> Doubles:
-    """Return tangent vectors rotated about the normals by angles (n,) [rad]."""
+    """Rotate tangent vectors (n, 3) counter-clockwise about unit normals (n, 3) by angles (n,) [rad]."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return np.asarray(c * offsets + s * np.cross(normals, offsets))
 
 
 def _growth_directions(points: Doubles, normals: Doubles) -> Doubles:
-    """Return the natural growth directions: away from the whorl, and down at sides and nape."""
+    """Return directions (n, 3) of uncombed hair: in a spiral away from the whorl, down at sides and nape."""
     away = points - _WHORL_CENTRE
     spiral = 1.1 * np.exp(-(away**2).sum(axis=1) / _WHORL_MM**2)
     offsets = rotate_about_normals(tangent_directions(away, normals), normals, spiral)
@@ -112,12 +116,15 @@ def _growth_directions(points: Doubles, normals: Doubles) -> Doubles:
 
 
 def _top_weight(points: Doubles) -> Doubles:
-    """Return 1 on top of the head, 0 at its sides and back."""
+    """Return a blend weight (n,) for combing: 1 on top of the head, 0 at its sides and back."""
     return smoothstep(48.0, 86.0, points[:, 1] + _LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z))
 
 
 def _combed_directions(points: Doubles, normals: Doubles, growth: Doubles) -> Doubles:
-    """Return combed directions: on top from the parting to the other side, at the sides down and back."""
+    """Return unit directions (n, 3) of short hair: away from the parting on top, down and back at the sides.
+
+    growth : (n, 3) directions of uncombed hair
+    """
     one = np.ones(len(points))
     top = 2.2 * _top_weight(points) * smoothstep(-135.0, -95.0, points[:, 2])
     away = np.tanh((points[:, 0] - _PARTING_X) / _PARTING_WIDTH_MM)
@@ -128,14 +135,14 @@ def _combed_directions(points: Doubles, normals: Doubles, growth: Doubles) -> Do
 
 
 class HairVariation(NamedTuple):
-    """Random variation of hairs around their guides.
+    """Parameters of the random deviation of hairs from their interpolated guides.
 
     angle_deviation : standard deviation of the sideways angle [rad]
-    length_deviation : relative standard deviation of the length
-    tuft_strength : attraction of tips to tufts, 0 to 1
-    frizz : amplitude of waves relative to the length
-    coil_mm : radius of curls
-    coils : number of turns
+    length_deviation : standard deviation of the length relative to the guide [-]
+    tuft_strength : attraction of hair tips to the central hair of a tuft, 0 to 1
+    frizz : amplitude of smooth random waves, relative to the length of the hair [-]
+    coil_mm : radius of the helices of curly hair [mm]
+    coils : mean number of turns of the helices per hair
     """
 
     angle_deviation: float
@@ -156,11 +163,13 @@ def grow_hair(
 ) -> tuple[RootFrames, Floats]:
     """Return the root frames of hairs, and the offsets (k, 3, n) of their knots from the roots [mm].
 
-    roots : on quads of the control mesh; guides grow at the corners of these quads
-    comb : function that returns guides from points on the average person and normals of the skin, both (g, 3)
+    roots : hair roots on quads of the control mesh; guides grow at the corners of these quads
+    comb : function of root positions on the average person and skin normals, both (g, 3), that returns guide
+        shapes
+    knots : number of knots per hair
 
     In all arrays the hair index comes last, which suits vectorised operations. For results that are equal on
-    all machines, sines are computed in float64, and float32 values are only added and multiplied.
+    all machines, sines are computed in float64, and float32 arrays are only added and multiplied.
     """
     hair, around = surface.root_frames(roots), quad_corners(surface.control_mesh, roots.quad)
     point, near = compact_vertices(around)
@@ -174,20 +183,21 @@ def grow_hair(
     _form_tufts(found, hair.positions_mm, t, variation.tuft_strength, rng)
     tips = found[-1]
     size = np.asarray(variation.frizz * np.sqrt(dot_columns(tips, tips)), np.float32)
-    for fade, part in _waves(size, t, rng):
+    for fade, part in _random_waves(size, t, rng):
         found += fade[..., None].astype(np.float32) * part
     if variation.coil_mm:
-        found += _coils(found[-1], t, variation, rng)
+        found += _coil_offsets(found[-1], t, variation, rng)
     return hair, _lift_above_skin(found, normal, t.astype(np.float32))
 
 
 def _trace_guides(
     skin: SkinSurface, root_mm: Doubles, base_mm: Doubles, normal: Doubles, guide: GuideShape, knots: int
 ) -> Doubles:
-    """Return the offsets (g, k, 3) of guide knots from the roots, traced over the skin [mm].
+    """Trace guide hairs over the skin; return the offsets (g, k, 3) of their knots from their roots [mm].
 
-    root_mm : (g, 3) control points at which the guides grow
-    base_mm, normal : (g, 3) their projections onto the skin, and the normals there
+    root_mm : (g, 3) control points at which the guides grow [mm]
+    base_mm, normal : (g, 3) projections of these control points onto the skin [mm], and the skin normals
+        there
     """
     root_offset = root_mm - base_mm  # distance of the control points from the smooth surface
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
@@ -202,9 +212,10 @@ def _trace_guides(
 
 
 def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets: Doubles) -> Floats:
-    """Return the weighted means (k, 3, n) of offsets of guides.
+    """Return the knot offsets (k, 3, n) of hairs, interpolated from the guides at the corners of their quads.
 
-    weight, guide_index : (n, 4)
+    weight, guide_index : (n, 4) interpolation weights and indices of the four guides of each hair
+    offsets : (g, k, 3) knot offsets of the guides
     """
     from scipy.sparse import csr_array
 
@@ -218,7 +229,7 @@ def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets
 def _vary_directions(
     offsets: Floats, normal: Floats, variation: HairVariation, rng: np.random.Generator
 ) -> Floats:
-    """Return offsets rotated about the normal, tilted and scaled, at random for each hair."""
+    """Return knot offsets (k, 3, n) with a random rotation about the normal, tilt and scale for each hair."""
     n = offsets.shape[-1]
     angle = variation.angle_deviation * rng.standard_t(4, size=n)
     lean = 1.0 + variation.angle_deviation * rng.normal(size=n)
@@ -234,7 +245,13 @@ def _vary_directions(
 def _form_tufts(
     offsets: Floats, root_mm: Doubles, t: Doubles, strength: float, rng: np.random.Generator
 ) -> None:
-    """Pull tips towards one hair of each tuft, in place."""
+    """Form tufts in place: pull the tips of all hairs in a cell of space towards one hair of that cell.
+
+    offsets : (k, 3, n) knot offsets from the roots [mm]
+    root_mm : (n, 3) positions of the roots [mm]
+    t : (k, 1) position along the hair, 0 at the root, 1 at the tip
+    strength : maximum fraction of the distance by which tips are pulled
+    """
     points = np.ascontiguousarray(root_mm.T)
     cell = np.zeros(len(root_mm), np.int64)
     for coordinate in np.floor(points / _TUFT_MM).astype(np.int64):
@@ -252,10 +269,13 @@ def _form_tufts(
     offsets += difference
 
 
-def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
-    """Yield smooth waves that are 0 at the roots, as factors (k, 1) and amplitudes (3, n).
+def _random_waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
+    """Yield terms of a smooth random displacement that is 0 at the roots.
 
-    size : (n,) amplitude
+    Each term is a factor (k, 1) per knot and an amplitude (3, n) per hair, whose product is an offset.
+
+    size : (n,) amplitude of the displacement of each hair [mm]
+    t : (k, 1) position along the hair, 0 at the root, 1 at the tip
     """
     fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
@@ -264,8 +284,12 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
             yield np.sqrt(2.0) / waves * fade * shape, amplitude * size
 
 
-def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
-    """Return the offsets (k, 3, n) of helices around the line from the root to the tip (3, n)."""
+def _coil_offsets(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Generator) -> Floats:
+    """Return offsets (k, 3, n) that turn hairs into helices around the line from root to tip [mm].
+
+    tips : (3, n) offsets of the tips from the roots [mm]
+    t : (k, 1) position along the hair, 0 at the root, 1 at the tip
+    """
     n = tips.shape[-1]
     along = np.asarray(tips / np.maximum(np.sqrt(dot_columns(tips, tips)), _EPSILON), np.float32)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
@@ -279,7 +303,7 @@ def _coils(tips: Floats, t: Doubles, variation: HairVariation, rng: np.random.Ge
 
 
 def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
-    """Return cosines and sines (k, n) of angles (n,) at equal steps, by recurrence."""
+    """Return cos(angle + i step) and sin(angle + i step) for i < `knots`, each (knots, n), by recurrence."""
     x, y = np.empty((knots, len(angle))), np.empty((knots, len(angle)))
     x[0], y[0], cosine, sine = np.cos(angle), np.sin(angle), np.cos(step), np.sin(step)
     for k in range(1, knots):
@@ -289,7 +313,11 @@ def _sine_sequence(angle: Doubles, step: Doubles, knots: int) -> tuple[Doubles, 
 
 
 def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
-    """Return offsets with knots lifted above the skin, which is approximated by a sphere."""
+    """Lift knots to a minimum height above the skin, approximated by a sphere; return their offsets.
+
+    offsets, normal : (k, 3, n) knot offsets from the roots [mm], and (3, n) skin normals at the roots
+    t : (k, 1) position along the hair, 0 at the root, 1 at the tip
+    """
     height = dot_columns(offsets, normal)
     flat2 = dot_columns(offsets, offsets) - height**2
     min_height = _MIN_HEIGHT_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_RADIUS_MM)
@@ -298,14 +326,14 @@ def _lift_above_skin(offsets: Floats, normal: Floats, t: Floats) -> Floats:
 
 
 def knot_count(look: HairLook) -> int:
-    """Return the number of knots of each hair, fewer for straighter hair."""
+    """Return the number of knots per hair, which increases with curl and with length."""
     if look.curl > _COIL_CURL:
         return _COILED_KNOTS
     return _CURVED_KNOTS if look.style == "short" or look.beard_mm > _LONG_BEARD_MM else _STRAIGHT_KNOTS
 
 
 def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list[HairGroup]:
-    """Return the hair of the head; empty for a bald one."""
+    """Return the strands of scalp hair as a list of one group; the list is empty for a bald head."""
     if look.style == "none" or look.density == 0.0:
         return []
     rng = np.random.default_rng((look.seed, 3))
@@ -318,7 +346,7 @@ def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list
 
 
 def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
-    """Return the beard; empty for a shaved one."""
+    """Return the strands of the beard as a list of one group; the list is empty without a beard."""
     if look.beard_mm == 0.0:
         return []
     rng, strands_per_cm2 = np.random.default_rng((look.seed, 4)), surface.hair_fraction * BEARD_PER_CM2
@@ -338,10 +366,12 @@ def _hair_group(
     radius_mm: float,
     rng: np.random.Generator,
 ) -> HairGroup:
-    """Return strands with radii and coverage; there are fewer strands than hairs, and they are wider.
+    """Return strands with radii and coverage; each is wide enough to represent several hairs.
 
-    offsets : (k, 3, n) from `grow_hair`
-    strands_per_cm2, hairs_per_cm2 : density of strands, and of the hairs that they represent
+    hair : frames of the strand roots
+    offsets : (k, 3, n) knot offsets from the roots, from `grow_hair` [mm]
+    strands_per_cm2, hairs_per_cm2 : densities of the strands and of the hairs that they represent [1/cm2]
+    radius_mm : mean radius of one hair [mm]
     """
     hairs_per_strand, (knots, _, n) = hairs_per_cm2 / strands_per_cm2, offsets.shape
     radius = np.tile((hairs_per_strand * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)

@@ -14,15 +14,15 @@ _ALONG = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
 class LashRow(NamedTuple):
-    """Lashes of one lid.
+    """Row of lashes on the edge of one lid.
 
-    edge_points : control points of the left lid's edge, from the nose outwards
+    edge_points : control points along the edge of the left lid, from the nose outwards
     hairs : number of lashes
-    start, end : of the row along the edge, 0 to 1
-    length : along the row [mm]
-    rise : angles from forward to upward, at root and tip [rad]
-    splay : sideways inclination at the inner and the outer end
-    radius : of the roots [mm]
+    start, end : ends of the row, as fractions of the arc length of the edge
+    length : (7,) lengths of lashes at the fractions `_ALONG` of the row, interpolated between them [mm]
+    rise : elevation of lashes above the forward direction at root and tip, negative downwards [rad]
+    splay : sideways inclination of lashes at the inner and the outer end of the row [-]
+    radius : radius of the lashes at the root [mm]
     """
 
     edge_points: tuple[int, ...]
@@ -58,20 +58,24 @@ LOWER_LASHES = LashRow(
 
 
 def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
-    """Return random positions along the lid's edge and from the edge into the skin, each (n,)."""
+    """Return random root positions of lashes: along the edge of the lid and from the edge into the skin.
+
+    Both (n,) are coordinates for `RootFinder.lid_edge_roots`, 0 to 1.
+    """
     u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
     across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)
     return row.start + (row.end - row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
 def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clump: int) -> Doubles:
-    """Return random shapes of lashes (7, n).
+    """Return random shape parameters (7, n) of lashes.
 
-    The rows are the splay, the angles of the first and the last segment [rad], the length and the radius of
-    the root [mm], the number of the clump, and the attraction of the tip to the clump, 0 to 1.
+    The rows are the splay [-], the elevations of the first and the last segment [rad], the length and the
+    root radius [mm], the index of the clump that the lash sticks to, and the attraction of its tip to the
+    clump, 0 to 1.
 
-    u : (n,) along the lid's edge, from `sample_positions`
-    first_clump : number of the first clump
+    u : (n,) positions along the lid's edge, from `sample_positions`
+    first_clump : index of the first clump of this row
     """
     n, fraction = len(u), (u - row.start) / (row.end - row.start)
     splay = np.interp(fraction, [0, 1], row.splay) + rng.normal(0, 0.1, n)
@@ -88,9 +92,9 @@ def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clum
 def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
-    root_mm, eye_mm : (n, 3) on the lids, and centres of their eyes
-    side : (n,) 1 for the left eye
-    shape : (7, n) from `sample_shapes`; each clump belongs to one lid
+    root_mm, eye_mm : (n, 3) roots on the lids, and for each lash the centre of its eye [mm]
+    side : (n,) 1 for lashes of the left eye, -1 for the right
+    shape : (7, n) shape parameters from `sample_shapes`; each clump must belong to one lid
     """
     splay, first, last, length, radius, clump, pull = shape
     ahead = root_mm - eye_mm
@@ -110,7 +114,11 @@ def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tu
 
 
 def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
-    """Return knots with the tips of each clump pulled towards their mean."""
+    """Return knots (n, k, 3) with the tips of the lashes in each clump pulled towards their mean tip.
+
+    clump, strength : (n,) index of the clump of each lash, and attraction to it, 0 to 1
+    t : (k,) position along the lash, 0 at the root, 1 at the tip
+    """
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
     pull = (mean[clump] - knots[:, -1]) * strength[:, None]

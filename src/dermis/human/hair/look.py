@@ -1,4 +1,4 @@
-"""Look of the hair, typical or sampled at random."""
+"""Hair look (style, length, density, colour) of a person, typical or sampled at random."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RANGES = {
 }
 """Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
-_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
+_TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
 _CROPPED_CURL = 0.6  # curl above which hair is cropped
 _CROPPED_LENGTH_MM, _SHORT_LENGTH_MM, _SHORT_MALE_LENGTH_MM = 6.0, 32.0, 27.0
 _MAX_BEARD_MM = 14.0
@@ -83,19 +83,19 @@ class HairLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Validate the fields."""
+        """Raise DermisError for an unknown style and for fields out of range."""
         if self.style not in STYLES:
             refuse("style", f"one of {', '.join(STYLES)}", f"got {format_value(self.style)}", "Choose one")
         check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})
 
 
 def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: float) -> HairLook:
-    """Return the typical hair by ancestry, age and sex.
+    """Return the typical hair look for a person's ancestry, age and sex.
 
-    eumelanin, pheomelanin : see `HairLook`
+    eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
-    curl = demographics.weighted_mean(_CURL)
+    curl = demographics.weighted_mean(_TYPICAL_CURL)
     tight = curl > _CROPPED_CURL
     short_mm = _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex
     return HairLook(
@@ -112,9 +112,10 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 
 
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
-    """Return random hair around the typical one; random numbers are always drawn in the same order.
+    """Return a random hair look around the typical one of a person.
 
-    Men have cropped or shaved hair more often than women, and only men have beards.
+    Men have cropped or shaved hair more often than women, and only men have beards. The order of random draws
+    does not depend on the person.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
@@ -141,12 +142,12 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 
 def sample_recession(rng: np.random.Generator, demographics: Demographics) -> float:
-    """Return a random recession of the hair of men, which increases with age."""
+    """Return a random recession of the hairline for `SkinLook`, 0 to 1, which increases with age in men."""
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
     man = max(2.0 * demographics.sex - 1.0, 0.0)
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
 def stubble_visibility(hair: HairLook) -> float:
-    """Return the factor of the shadow of shaved hair due to its pigments, 0 to 1."""
+    """Return the visibility of shaved hair below the skin: from 0.15 for white hair to 1 for dark hair."""
     return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK_EUMELANIN)

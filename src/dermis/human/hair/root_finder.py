@@ -1,4 +1,4 @@
-"""Roots of brows and lashes on the quads of the mean person, computed once for all people."""
+"""Hair roots of brows and lashes on the quads of the template person, computed once for all people."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),
     np.array([70.0, 50.0]),
 )  # bounds of that grid, around the brows [mm]
-_HALVES = np.array([[0, 1, 2], [2, 3, 0]])
+_TRIANGLES = np.array([[0, 1, 2], [2, 3, 0]])  # corners of the two triangles of a quad
 
 
 class _FrontTriangles(NamedTuple):
-    """Front-facing triangles, listed by cells of a grid in the front plane.
+    """Front-facing triangles with a grid in the front plane that accelerates point queries.
 
-    triangle_lists : (columns, rows, longest list) triangles of each cell, -1 for none
-    quad, half : (t,) quad of each triangle, and which half of it
-    corner : (t, 3, 3) [mm]
+    triangle_lists : (columns, rows, m) indices of the triangles that overlap each grid cell, padded with -1
+    quad, half : (t,) index of the quad of each triangle, and 0 or 1 for the first or second half of the quad
+    corner : (t, 3, 3) positions of the corners [mm]
     """
 
     triangle_lists: Index
@@ -43,12 +43,12 @@ class _FrontTriangles(NamedTuple):
 
 
 class _LidEdge(NamedTuple):
-    """Edge of a lid as a polyline, with the adjacent quads.
+    """Edge of a lid as a polyline of m points, with the quads that adjoin its segments.
 
-    lengths_mm : (m,) arc length at each point
-    quad : (m - 1,) adjacent quad of each segment
-    frame : (m - 1, 4, 2) coordinates in the quad of the ends of the segment, and of the corners opposite to
-        them
+    lengths_mm : (m,) arc length from the first point to each point [mm]
+    quad : (m - 1,) index of the adjacent quad of each segment
+    frame : (m - 1, 4, 2) corners of this quad in its own (0, 1) coordinates: first the two ends of the
+        segment, then the corners opposite to them
     """
 
     lengths_mm: Doubles
@@ -57,11 +57,12 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Roots on a quad mesh by position in the front plane or along the lids.
+    """Finder of hair roots on a quad mesh, by position in the front plane or along the edge of a lid.
 
-    mesh : mesh with control points at points_mm (p, 3)
-    eyes_mm : (2, 3) centres of the left and the right eye
-    subdivided_mesh : the subdivided mesh of the same person
+    mesh : control mesh
+    points_mm : (p, 3) positions of its control points [mm]
+    eyes_mm : (2, 3) centres of the left and the right eye [mm]
+    subdivided_mesh : subdivided mesh of the same person
     """
 
     def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, subdivided_mesh: Mesh) -> None:
@@ -70,7 +71,12 @@ class RootFinder:
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
-        """Return roots on front-facing triangles at points (n,) of the front plane [mm], and a hit mask."""
+        """Return the roots at points (n,) of the front plane, and a mask (n,) of points that hit the mesh.
+
+        Of several triangles at a point, the foremost is taken.
+
+        x, y : (n,) coordinates in the front plane [mm]
+        """
         front = self._front
         cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _CELL_MM).astype(np.int64)
         last_cell = np.array(front.triangle_lists.shape[:2]) - 1
@@ -93,22 +99,25 @@ class RootFinder:
             triangle[front_index],
             np.stack([u[front_index], v[front_index], w[front_index]], axis=-1),
         )
-        position = np.einsum("nk,nkc->nc", weights, _QUAD_CORNERS[_HALVES].take(front.half[triangle], axis=0))
+        position = np.einsum(
+            "nk,nkc->nc", weights, _QUAD_CORNERS[_TRIANGLES].take(front.half[triangle], axis=0)
+        )
         quad = np.where(hit, front.quad[triangle], 0)
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """Return the roots at the grid points of `BrowSurface`, all of which are front-facing."""
+        """Return roots at the nodes of `grid_points`, first of the left and then of the right brow."""
         x, y = grid_points()
         return self.front_roots(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
 
     def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
-        """Return roots along a lid's edge, on the adjacent quads that are farther from the eye.
+        """Return lash roots along a lid's edge, on the adjacent quads of the outer side of the lid.
 
-        side : 1 for the left eye
-        u : (n,) arc length along the edge, 0 to 1
-        across : (n,) distance from the edge into the quad, 0 to 1
+        lid : row of lashes whose edge is used
+        side : 1 for the left eye, -1 for the right
+        u : (n,) position along the edge, as a fraction of its arc length
+        across : (n,) distance from the edge into the quad, 0 to 1 at its opposite side
         """
         key = lid.edge_points, side
         if key not in self._lid_edges:
@@ -141,14 +150,14 @@ class RootFinder:
 
     @cached_property
     def _quad_points(self) -> NDArray[np.int32]:
-        """Return the points (q, 4) of all quads."""
+        """Return the control point indices (q, 4) of all quads."""
         return quad_corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
     def _front(self) -> _FrontTriangles:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
-        corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALVES[half], axis=1)]
+        corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _TRIANGLES[half], axis=1)]
         (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_bounding_box(corner)
         ac = ab + ac
         visible = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
@@ -173,14 +182,14 @@ def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
-    """Return the points on the other side of a symmetric head."""
+    """Return the indices of the points that are mirror images in x of given points of a symmetric head."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
 
 
 def eye_centres(mesh: Mesh) -> Doubles:
-    """Return the centres (2, 3) of the left and the right eye [mm]."""
+    """Return the centres (2, 3) of the left and the right eyeball of a mesh, found by material name [mm]."""
     names = [one.name for one in mesh.materials]
     centres = []
     for name in ("left eye", "right eye"):

@@ -1,4 +1,4 @@
-"""Skin surface on which strands grow, and groups of strands."""
+"""Skin surface over which hair grows, coordinate frames at hair roots, and groups of hairs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _NEIGHBOURS = 6  # vertices whose tangent planes are averaged
 
 
 class SkinSurface:
-    """Smooth surface through vertices with normals.
+    """Smooth skin surface for projections, interpolated from vertices and their normals.
 
-    mesh : the subdivided mesh
-    vertex_index : vertices to use; all by default
+    mesh : subdivided mesh of the head
+    vertex_index : indices of the vertices to use, which limits the cost of queries; all by default
     """
 
     def __init__(self, mesh: Mesh, vertex_index: NDArray[np.int64] | None = None) -> None:
@@ -30,7 +30,7 @@ class SkinSurface:
         self._planes = np.column_stack([normals, (self._positions_mm * normals).sum(axis=1)])
 
     def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
-        """Return the projections of points (n, 3) onto the skin along its normals, and these normals [mm]."""
+        """Project points (n, 3) onto the skin along its normals; return projections [mm] and unit normals."""
         distance, near = self._tree.query(points_mm, k=_NEIGHBOURS)
         weights = 1.0 / (distance**2 + 0.05)
         weights /= weights.sum(axis=1, keepdims=True)
@@ -47,27 +47,33 @@ class SkinSurface:
 
 
 def tangent_component(vectors: Doubles, normals: Doubles) -> Doubles:
-    """Return the components of vectors (n, 3) tangential to the skin."""
+    """Return vectors (n, 3) minus their components along the unit normals (n, 3)."""
     return np.asarray(vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals)
 
 
 class RootFrames:
-    """Roots on the subdivided mesh, with their positions (n, 3) [mm] and coordinate frames (n, 3, 3)."""
+    """Hair roots on the subdivided mesh with a coordinate frame at each, in which knots are stored.
+
+    roots : roots on quads of the subdivided mesh
+    positions_mm : (n, 3) positions of the roots [mm]
+    frame : (n, 3, 3) coordinate frames whose rows are the axes; the last is the normal
+    """
 
     def __init__(self, roots: Roots, positions_mm: Doubles, frame: Doubles) -> None:
         self.roots, self.positions_mm, self.frame = roots, positions_mm, frame
 
     @cached_property
     def frame_vectors(self) -> Floats:
-        """Return the frames (3, 3, n) with the root index last."""
+        """Return the frame axes as an array (axis, xyz, n), root index last for vectorised operations."""
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 
 class GrowthSurface:
-    """Surface that hair grows on: the subdivided head and its control mesh.
+    """Surface that hair grows on: the subdivided head with its control mesh.
 
-    skin : surface of the head, over which hairs lie
-    hair_fraction : fraction of the hairs that grow, each wider by the inverse
+    head, control_mesh : subdivided head, and its mesh before subdivision, on whose quads roots are given
+    skin : smooth surface over which hairs lie
+    hair_fraction : fraction of hairs to generate; the hairs are widened by its inverse to keep coverage
     """
 
     def __init__(self, head: Head, control_mesh: Mesh, skin: SkinSurface, hair_fraction: float = 1.0) -> None:
@@ -81,18 +87,19 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Return the positions and frames of roots on quads of the control mesh."""
+        """Return roots on control quads with their positions and frames on the subdivided mesh."""
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 
 
 class HairGroup(NamedTuple):
-    """Hairs of one kind.
+    """Hairs that share pigment and coverage, such as one brow, one row of lashes, or the beard.
 
-    knots, radius : (n, k, 3) in the frames of the roots, see `Strands`, and (n, k) [mm]
-    pigment_factor : factor of the pigments
-    hairs_per_strand : number of hairs that each strand represents
-    cover : coverage of the roots by surrounding hair
+    roots : roots of the n hairs on the subdivided mesh
+    knots, radius : (n, k, 3) knot positions in the root frames, see `Strands`, and (n, k) radii [mm]
+    pigment_factor : factor of the pigment concentrations of the person's hair [-]
+    hairs_per_strand : number of real hairs that each strand represents
+    cover : optical coverage of the roots by surrounding hair, see `Strands` [-]
     """
 
     roots: Roots

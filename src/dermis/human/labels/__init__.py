@@ -1,1 +1,1 @@
-"""Label classes of the face: classes of triangles and hairs, and border distances of skin."""
+"""Label classes (skin, brow, lip, ...) of the triangles and hairs of a head."""

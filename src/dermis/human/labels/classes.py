@@ -1,4 +1,4 @@
-"""Classes of the label outputs."""
+"""Table of the classes that the label outputs of a frame distinguish, such as skin, iris and hair."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dermis.base.tables import read_rows
 
 
 class LabelClass(NamedTuple):
-    """Class of a pixel.
+    """Class of the surface that a pixel shows.
 
-    number : value in the output `label`
-    face_synthetics : value in the output `label_face_synthetics`
+    number : pixel value in the output `label`
+    face_synthetics : pixel value in the output `label_face_synthetics`, with the numbers of FaceSynthetics
     """
 
     number: int
@@ -23,7 +23,7 @@ class LabelClass(NamedTuple):
 
 @cache
 def label_classes() -> tuple[LabelClass, ...]:
-    """Return all classes, ordered by their consecutive numbers."""
+    """Return all label classes in the order of their numbers."""
     rows = read_rows(__package__, "classes")
     return tuple(
         LabelClass(int(row["number"]), row["name"], int(row["face_synthetics"]), row["description"])
@@ -33,5 +33,5 @@ def label_classes() -> tuple[LabelClass, ...]:
 
 @cache
 def class_number(name: str) -> int:
-    """Return the number of a class."""
+    """Return the number of a label class by its name."""
     return next(one.number for one in label_classes() if one.name == name)

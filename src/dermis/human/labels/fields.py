@@ -1,4 +1,4 @@
-"""Labels of meshes: signed border distances of parts of the face, and classes of hairs."""
+"""Label classes of meshes, as signed distances to the borders of facial parts, and of hairs."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ _LOCK = Lock()
 
 @cache
 def label_fields() -> Doubles:
-    """Return the signed distances (k, p) of `HUMAN_FIELDS` at the control points, positive inside [mm]."""
+    """Return signed distances (k, p) of control points to the borders of the classes `HUMAN_FIELDS` [mm].
+
+    Distances are positive inside a class.
+    """
     points = average_head().positions_mm.astype(np.float64)
     distances = np.full((len(BORDER_FIELDS), len(points)), -_OUTSIDE_MM)
     distances[:, : len(average_surface()[1])] = average_surface()[1].T
@@ -75,7 +78,10 @@ def label_fields() -> Doubles:
 
 
 def dense_fields() -> tuple[Doubles, Doubles]:
-    """Return points (n, 3) on the average human's outer skin [mm], and the signed distances (k, n) there."""
+    """Return points (n, 3) on the average human's outer skin, and their label fields (k, n) [mm].
+
+    The fields are the signed distances of `label_fields`, interpolated on a subdivided mesh.
+    """
     head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
@@ -85,7 +91,10 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:
-    """Return the class of each hair (n,), brows and lashes first; "hair" for heads of another topology."""
+    """Return the label class (n,) of each hair of a head, first of brows and lashes, then of scalp and beard.
+
+    Hair on meshes of another topology has the class "hair".
+    """
     both = [part for part in (head.strands, head.hair) if part is not None]
     quads = [part.roots.quad >> (2 * head.levels) for part in both]
     if not quads:
@@ -99,7 +108,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the classes (q,) of fine and of coarse hairs on each quad of the human."""
+    """Return two label classes (q,) per control quad: of brow or lash hairs, and of scalp or beard hairs."""
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
@@ -112,7 +121,10 @@ def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 
 
 def _ear_field() -> Doubles:
-    """Return a field (p,) that is positive where most quads around a control point belong to an ear."""
+    """Return a field (p,) over control points whose zero crossing is the border of the ears, positive inside.
+
+    It is the fraction of the adjacent quads that belong to an ear, minus 0.5.
+    """
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
@@ -124,9 +136,12 @@ def _ear_field() -> Doubles:
 
 
 def _brow_field(points: Doubles) -> Doubles:
-    """Return the signed distance (p,) to the outline of the brows in the front plane [mm]."""
+    """Return the signed distance (p,) of points (p, 3) to the brow outlines, positive inside [mm].
+
+    The distance is measured in the front plane and bounded by the nearest of four edges.
+    """
     x, y = np.abs(points[:, 0]), points[:, 1]
-    low, high = (brows.outline(side) for side in (-1.0, 1.0))
+    low, high = (brows.brow_outline(side) for side in (-1.0, 1.0))
     ends = 0.5 * (low + high)
     below, above = (np.interp(x, *side.T) for side in (low, high))
     across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
@@ -137,11 +152,12 @@ _CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
-    """Label classes of a mesh.
+    """Label classes of a mesh with sub-triangle borders.
 
-    base : (t,) class of each triangle
-    classes : (k,) classes of the fields; the first field that is positive decides, else the base class
-    fields : (v, k) signed distances at the vertices, interpolated linearly, positive inside [mm]
+    base : (t,) class of each triangle where no field is positive
+    classes : (k,) class of each field; the first positive field at a surface point determines its class
+    fields : (v, k) signed distances of the vertices to the class borders, positive inside, interpolated
+        linearly over the triangles [mm]
     """
 
     base: NDArray[np.uint8]
@@ -150,7 +166,7 @@ class MeshLabels(NamedTuple):
 
 
 def mesh_labels(head: Head) -> MeshLabels:
-    """Return the labels of a head; cached for parametric humans, where they depend on layout and level."""
+    """Return the label classes of a head; those of parametric humans are cached by mesh topology."""
     if not is_human(head):
         return _build_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
@@ -176,13 +192,16 @@ def _build_labels(head: Head) -> MeshLabels:
 
 
 def _material_class(material: Material) -> str:
-    """Return the class of a material that is not an eyeball."""
+    """Return the name of the label class of a material; eyeballs are labelled separately."""
     known = _PART_CLASSES.get(material.part or material.name)
     return known or ("skin" if material.kind == "skin" else "other")
 
 
 def _iris_fields(head: Head) -> dict[str, Doubles]:
-    """Return the signed distances of eyeball points to the limbus, positive inside [mm of an average eye]."""
+    """Return the signed distances (p,) of eyeball points to the border of the iris, by class name.
+
+    Distances are positive inside the iris, in mm of an eye of average size.
+    """
     if head.eyes is None:
         return {}
     mesh, points = head.mesh, head.mesh.points_mm
@@ -198,7 +217,7 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
-    """Return the signed distances of skin points to the borders of the parts of the face [mm]."""
+    """Return the signed distances (p,) of skin points to the borders of facial parts, by class name [mm]."""
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
@@ -218,7 +237,10 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
-    """Return the fields at the points of the average human that a landmark warp maps to."""
+    """Return the label fields of a head of another topology, mapped from the average human by landmarks.
+
+    Each point takes the field of the nearest point of the average human after a landmark warp.
+    """
     from scipy.spatial import cKDTree
 
     points = head.mesh.points_mm

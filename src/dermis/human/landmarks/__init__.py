@@ -1,1 +1,1 @@
-"""Landmarks of published sets on the parametric human, and of users' tables on any mesh."""
+"""Facial landmarks: published sets on the parametric human, and tables of vertices for any mesh."""

@@ -25,12 +25,12 @@ _EXPECTED = "landmarks in CSV: rows of name,vertex"
 
 @dataclass(frozen=True, eq=False)
 class LandmarkPoints:
-    """Landmarks as weighted means of mesh points.
+    """Landmarks of a mesh as weighted means of four of its points, which follow expressions and poses.
 
-    names : in order
-    point, weight : (n, 4) indices and weights of the points
-    material : (n,) material that must be visible there for the landmark to count as visible; -1 for any
-        surface
+    names : names of the n landmarks in the order of the set
+    point, weight : (n, 4) indices of the mesh points and their weights
+    material : (n,) index of the material that must be visible at the landmark for it to count as visible;
+        -1 for any material
     """
 
     names: tuple[str, ...]
@@ -40,11 +40,12 @@ class LandmarkPoints:
 
 
 def landmark_points(head: Head, name: str) -> LandmarkPoints:
-    """Return the landmarks of a set or of a table by vertex.
+    """Return the landmarks of a head, from a published set or from a table of vertices.
 
-    name : one of `SETS`, or a file of rows name,vertex; vertices are indices into `Head.positions_mm`
+    name : one of `SETS`, or a CSV file with columns name,vertex, where vertex is an index into
+        `Head.positions_mm`
 
-    Raises DermisError for a set on a head of another topology, and for tables that cannot be read.
+    Raises DermisError for a published set on a head of another topology, and for tables that cannot be read.
     """
     if name not in SETS:
         return _table_landmarks(head, name)
@@ -52,13 +53,13 @@ def landmark_points(head: Head, name: str) -> LandmarkPoints:
         actual = f"{head.name!r} has a topology of its own"
         advice = "Write a CSV table of name,vertex for its mesh, and pass the name of that file"
         refuse(f"landmarks {name}", "a head of the parametric human", actual, advice)
-    return _human_landmarks(head, _rows(name))
+    return _human_landmarks(head, _landmark_rows(name))
 
 
 def check_landmarks(name: object) -> str:
-    """Return the name of a set or of a table's file.
+    """Validate the name of a landmark set or the path of a landmark table, and return it.
 
-    Raises DermisError for other names.
+    Raises DermisError if it is neither.
     """
     text = str(checked_path(name, "a set of landmarks or its table"))
     if text not in SETS and not text.endswith(".csv"):
@@ -68,7 +69,7 @@ def check_landmarks(name: object) -> str:
 
 
 def read_landmark_table(name: str) -> list[tuple[str, int]]:
-    """Return the name and the vertex of each landmark in a table's file.
+    """Return (name, vertex index) pairs from a CSV file of landmarks.
 
     Raises DermisError for tables that cannot be read.
     """
@@ -81,7 +82,7 @@ def read_landmark_table(name: str) -> list[tuple[str, int]]:
 
 
 @cache
-def _rows(name: str) -> Rows:
+def _landmark_rows(name: str) -> Rows:
     return read_rows(__package__, name)
 
 

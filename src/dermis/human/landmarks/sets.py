@@ -1,4 +1,4 @@
-"""Names of the package's sets of landmarks."""
+"""Names and descriptions of the published landmark sets that the parametric human has."""
 
 SETS = {
     "ibug-68": "the 68 of iBUG's 300-W",

@@ -1,1 +1,1 @@
-"""Roughness and specular strength by region of the face."""
+"""Regions of the face, such as nose and cheek, each with its own roughness and specular strength."""

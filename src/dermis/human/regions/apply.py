@@ -1,4 +1,4 @@
-"""Maps of roughness and specular strength by region of the face."""
+"""Roughness and specular maps of a head, painted region by region."""
 
 from __future__ import annotations
 
@@ -27,23 +27,24 @@ EDGE_MM = 2.5
 _DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
 _MIN_LOCAL_MEAN, _MAX_DETAIL = 0.4, 3.0  # relative to the mean of the map, and to its local mean
 _CELL_MM = 2.0
-_MAX_CELLS = 256  # of the longest side
-_TRUNCATE = 3  # standard deviations
+_MAX_CELLS = 256  # along the longest side of the grid
+_TRUNCATE = 3  # radius of the blur kernel in standard deviations
 _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for the same head
 
 
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) -> tuple[Head, float]:
     """Return a head with roughness and specular maps by region of the face.
 
-    The specular map contains rho_s itself; maps that are scaled to a mean need the returned one. Fine detail
-    of the head's own two maps is kept, as a factor relative to its local mean.
+    The specular map contains rho_s itself; for maps that are normalised to a mean, multiply by the returned
+    mean. Existing roughness and specular maps of the head contribute their fine detail, as a factor relative
+    to their local mean.
 
     Parameters
     ----------
     head : Head
         Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
     table : RegionTable, str or path
-        Table, its TOML file, or "default" for the package's.
+        Roughness and strength of each region: a table, its TOML file, or "default" for that of the package.
 
     Returns
     -------
@@ -86,7 +87,12 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
 def _region_map(
     atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_maps: Floats | None
 ) -> Floats:
-    """Return a map (h, w) of the values (n,) of covered texels, times the fine detail of an existing map."""
+    """Return a map (h, w) of a regional quantity, multiplied by the fine detail of the head's own map.
+
+    points : (n, 3) positions of the covered texels of the atlas [mm]
+    level : (n,) quantity at these texels, smoothed across region borders
+    own_maps : (h, w) existing map of the quantity, or None
+    """
     if own_maps is None:
         return _texel_image(atlas, level)
     y, x = np.nonzero(atlas.coverage)
@@ -103,7 +109,7 @@ def _region_map(
 
 
 def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
-    """Return the values (n,) of covered texels as an image; other texels take the nearest value."""
+    """Return values (n,) of covered atlas texels as an image; other texels copy the nearest covered one."""
     from scipy.ndimage import distance_transform_edt
 
     image = np.zeros(atlas.coverage.shape, np.float32)
@@ -122,11 +128,11 @@ def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
 
 
 def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
-    """Return the Gaussian-weighted means (n, c) of values around each point, across seams of the uv layout.
+    """Blur values on a surface with a Gaussian in 3D, which ignores seams of the uv layout; return (n, c).
 
-    points : (n, 3) [mm]
-    values : (n, c)
-    sigma_mm : standard deviation [mm]
+    points : (n, 3) positions of the samples [mm]
+    values : (n, c) values of the samples
+    sigma_mm : standard deviation of the Gaussian [mm]
     """
     from scipy.ndimage import gaussian_filter, map_coordinates
 
@@ -149,10 +155,10 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
 
 @logged_step("finding the regions of the face")
 def with_default_regions(head: Head) -> Head:
-    """Return a head with roughness and strength of the package's region table.
+    """Return a head with roughness and specular maps from the package's region table.
 
-    A head whose regions are unknown or that has a roughness map stays the same, and an existing specular map
-    is kept. The strengths are relative; the skin's rho_s is their mean.
+    A head with unknown regions or with a roughness map is returned unchanged, and an existing specular map is
+    kept. The specular map is relative: the skin's rho_s is its mean.
     """
     if head.maps.has_roughness or known_landmarks(head) is None:
         return head

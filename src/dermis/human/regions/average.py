@@ -1,4 +1,4 @@
-"""Average human: landmarks, skin and regions of the face."""
+"""Average human, on which regions and landmarks are defined: its head, outer skin and landmarks."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ _MOUTH_MATERIALS = ("upper teeth", "lower teeth", "tongue")
 
 
 class DenseSkin(NamedTuple):
-    """Dense sampling of the average human's outer skin.
+    """Dense samples of the average human's outer skin, for nearest-neighbour queries.
 
-    quad_index : (n,) quad of the human at each point
-    tree : spatial index of the points
+    quad_index : (n,) index of the control quad that contains each sample
+    tree : k-d tree of the sample positions [mm]
     """
 
     quad_index: NDArray[np.int64]
     tree: Any
 
     def nearest_quads(self, points: Doubles) -> NDArray[np.int64]:
-        """Return the quad (m,) of the human nearest to each point (m, 3) [mm]."""
+        """Return the index (m,) of the control quad nearest to each point (m, 3) [mm]."""
         return np.asarray(self.quad_index[self.tree.query(points)[1]])
 
 
 @cache
 def average_head() -> Head:
-    """Return the average human without subdivision."""
+    """Return the head of the average human without subdivision."""
     return AVERAGE_HUMAN.head(subdivide=0)
 
 
 @cache
 def average_skin() -> DenseSkin:
-    """Return the outer skin, without the inside of the mouth."""
+    """Return dense samples of the average human's outer skin, without the inside of the mouth."""
     from scipy.spatial import cKDTree
 
     head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
@@ -56,12 +56,12 @@ def average_skin() -> DenseSkin:
 
 
 def landmark_indices() -> dict[str, int]:
-    """Return the control point of each landmark on the skin."""
+    """Return the index of the control point at each skin landmark, by landmark name."""
     return {row["landmark"]: int(row["point"]) for row in read_rows(__package__, "points")}
 
 
 def human_landmarks(head: Head) -> dict[str, Doubles]:
-    """Return the positions (3,) of all landmarks of a parametric human [mm]."""
+    """Return the positions (3,) of skin landmarks and eye centres of a parametric human, by name [mm]."""
     positions_mm = head.positions_mm.astype(np.float64)
     landmarks = {name: positions_mm[point] for name, point in landmark_indices().items()}
     mesh = head.mesh
@@ -73,7 +73,7 @@ def human_landmarks(head: Head) -> dict[str, Doubles]:
 
 
 def is_human(head: Head) -> bool:
-    """Return whether a head is a parametric human, by its control points and morph targets."""
+    """Return whether a head is a parametric human, judged by its control points, targets and materials."""
     average, rig = average_head().control, head.rig
     return (
         rig is not None
@@ -84,9 +84,10 @@ def is_human(head: Head) -> bool:
 
 
 def control_quads(head: Head, triangle: NDArray[Any]) -> NDArray[np.int64]:
-    """Return the quad of the human (n,) that each triangle (n,) of a subdivided head belongs to.
+    """Return the index (n,) of the control quad from which each triangle was subdivided.
 
-    head : parametric human in either layout
+    head : parametric human in either uv layout, at any level of subdivision
+    triangle : (n,) triangle indices
     """
     control_triangles = len(average_head().mesh.triangles)
     levels = 0
@@ -96,17 +97,20 @@ def control_quads(head: Head, triangle: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def average_positions(head: Head) -> Doubles:
-    """Return the positions of a parametric human's vertices on the average human (v, 3) [mm]."""
+    """Return where the vertices of a parametric human lie on the average human (v, 3) [mm].
+
+    Regions defined on the average human are looked up at these positions.
+    """
     points_mm = average_head().positions_mm.astype(np.float64)
     stencils = head.control.stencils
     return np.asarray((points_mm if stencils is None else stencils.points(points_mm))[head.mesh.point])
 
 
 def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Return the index into `REGIONS` (n,) of points on or near the average human.
+    """Return the face region (n,) of points on or near the average human, as indices into `REGIONS`.
 
-    points : (n, 3) [mm]
-    quad_index : (n,) nearest quad of the human
+    points : (n, 3) positions [mm]
+    quad_index : (n,) index of the nearest control quad
     """
     parts, mesh = part_quads(), average_head().mesh
     mouth_materials = [k for k, one in enumerate(mesh.materials) if one.name in _MOUTH_MATERIALS]
@@ -117,7 +121,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
 
 @cache
 def part_quads() -> Mapping[str, NDArray[np.int64]]:
-    """Return the quads of lips, ears and the inside of the mouth."""
+    """Return the indices of the control quads of lips, ears and the inside of the mouth, by part name."""
     runs_by_part: dict[str, list[NDArray[np.int64]]] = {}
     for row in read_rows(__package__, "parts"):
         runs_by_part.setdefault(row["part"], []).append(np.arange(int(row["first"]), int(row["last"]) + 1))

@@ -1,4 +1,4 @@
-"""Region of the face of each atlas texel, by a warp of landmarks onto the average human."""
+"""Region labels of atlas texels, from a label map or by a landmark warp onto the average human."""
 
 from __future__ import annotations
 
@@ -40,12 +40,18 @@ _SMOOTHING = 1.0  # for landmarks picked by hand; 0 would interpolate them exact
 
 
 def load_landmarks(path: Path) -> Landmarks:
-    """Load landmarks by name from a CSV file with landmark,x,y,z [mm from the head's centre]."""
+    """Load landmark positions by name from a CSV file with columns landmark,x,y,z.
+
+    Positions are relative to the centre of the head [mm].
+    """
     return _parse_landmarks(read_text(path, "landmarks in CSV"), str(path))
 
 
 def known_landmarks(head: Head) -> Landmarks | None:
-    """Return the package's landmarks of a head, or None [mm from its centre]."""
+    """Return the landmarks of a human or of a sample head of the package, None for other heads.
+
+    Positions are relative to the centre of the head [mm].
+    """
     if is_human(head):
         return _to_tuples(human_landmarks(head), head.centre_mm)
     file = resources.files(__package__) / "landmarks" / f"{Path(head.name).stem}.csv"
@@ -54,7 +60,7 @@ def known_landmarks(head: Head) -> Landmarks | None:
 
 @cache
 def average_landmarks() -> Landmarks:
-    """Return the positions of all supported landmarks on the average human [mm]."""
+    """Return the positions of all supported landmarks on the average human, by name [mm]."""
     return _to_tuples(human_landmarks(average_head()))
 
 
@@ -64,11 +70,12 @@ def _to_tuples(positions: Mapping[str, Doubles], origin: Point = (0.0, 0.0, 0.0)
 
 
 def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Doubles:
-    """Return the positions of points (n, 3) of a head on or near the average human (n, 3) [mm].
-
-    landmarks : of the head, a subset of `average_landmarks` [mm from its centre]
+    """Map points (n, 3) of any head to the corresponding points (n, 3) on or near the average human [mm].
 
     The warp is an affine map plus radial basis functions that are linear in the distance to each landmark.
+
+    landmarks : landmarks of the head, a subset of `average_landmarks`, relative to its centre [mm]
+    points : (n, 3) positions in the coordinates of the head [mm]
     """
     from scipy.interpolate import RBFInterpolator
 
@@ -111,10 +118,10 @@ def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> No
 
 
 def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uint8]:
-    """Return the index into `REGIONS` (n,) of each covered texel of the atlas, in row order.
+    """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
 
-    Sources in order of precedence: labels or landmarks of the table, label map of the head, and landmarks
-    known to the package. Raises DermisError for a head without any.
+    The first of these sources that exists is used: label map or landmarks of the table, label map of the
+    head, landmarks known to the package. Raises DermisError for a head without any of them.
     """
     if table.labels is not None:
         return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))
@@ -148,6 +155,6 @@ def _labels_from_landmarks(head: Head, atlas: Atlas, landmarks: Landmarks) -> ND
 
 
 def _labels_of_human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:
-    """Return the labels of a parametric human from the quads that all people share."""
+    """Return the region labels of a parametric human's texels, from the topology that all people share."""
     points = atlas.interpolate(head.mesh, average_positions(head))[atlas.coverage]
     return classify_surface(points, control_quads(head, atlas.triangle[atlas.coverage]))

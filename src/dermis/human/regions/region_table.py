@@ -1,4 +1,4 @@
-"""Regions of the face on the average human, and the table of their roughness and strength."""
+"""Face regions on the average human, and the table of their roughness and specular strength."""
 
 from __future__ import annotations
 
@@ -48,11 +48,14 @@ _MIN_NOSE_Z, _JAW_Y = -20.0, -108.0
 DEFAULT_TABLE = "default"
 """Name of the package's table, which has artist's values."""
 LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
-_FILES = ("landmarks", "labels")
+_FILE_KEYS = ("landmarks", "labels")
 
 
 def nose_distance_mm(points: Doubles) -> Doubles:
-    """Return the signed distance (n,) of points (n, 3) of the average human to the nose's outline [mm]."""
+    """Return the signed distance (n,) of points to the outline of the nose, positive inside it [mm].
+
+    points : (n, 3) positions on the average human [mm]
+    """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     top, half = _NOSE_OUTLINE[-1]
     beside = np.interp(y, *_NOSE_OUTLINE.T) - np.maximum(y - top, 0.0) * half - x
@@ -60,14 +63,20 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
-    """Return the distance (n,) of points (n, 3) of the average human below jaw and skull [mm]."""
+    """Return the signed vertical distance (n,) of points below the line from jaw to skull [mm].
+
+    It is positive on the neck and negative on the head.
+
+    points : (n, 3) positions on the average human [mm]
+    """
     return np.asarray(_JAW_Y + 0.42 * np.maximum(6 - points[:, 2], 0) - points[:, 1])
 
 
 def classify_regions(points: Doubles, lips: Mask, ears: Mask) -> NDArray[np.int64]:
-    """Return the index into `REGIONS` (n,) of points (n, 3) on the average human [mm].
+    """Return the face region (n,) of points on the average human, as indices into `REGIONS`.
 
-    lips, ears : (n,) masks; the inside of the mouth counts as lips
+    points : (n, 3) positions [mm]
+    lips, ears : (n,) masks of points on the lips, including the inside of the mouth, and on the ears
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     front, above_jaw = z > _MIN_NOSE_Z, neck_distance_mm(points) < 0
@@ -89,7 +98,7 @@ def classify_regions(points: Doubles, lips: Mask, ears: Mask) -> NDArray[np.int6
 
 
 def _brow_mask(x: Doubles, y: Doubles) -> Mask:
-    """Return the mask of the arch where eyebrows grow, which narrows outwards."""
+    """Return a mask (n,) of points inside the brows, from their coordinates in the front plane [mm]."""
     middle = 20.5 - ((x - 33) / 10) ** 2 * 1.2
     inside = np.abs(y - middle) < 5.5 - 0.06 * np.maximum(x - 20, 0)
     return np.asarray(inside & (x > 9) & (x < 55))
@@ -97,11 +106,11 @@ def _brow_mask(x: Doubles, y: Doubles) -> Mask:
 
 @dataclass(frozen=True)
 class RegionTable:
-    """Roughness and specular strength by region of the face.
+    """Roughness and specular strength of each face region.
 
-    values : (10, 2) roughness m and strength rho_s [-] in the order of `REGIONS`
-    landmarks : file of the head's landmarks, for heads unknown to the package
-    labels : label map of the head, which makes landmarks unnecessary
+    values : (10, 2) Beckmann roughness m and specular strength rho_s [-], in the order of `REGIONS`
+    landmarks : CSV file of the head's landmarks, for heads unknown to the package
+    labels : label map of the head, whose texels are indices into `REGIONS`; it makes landmarks unnecessary
     """
 
     values: NDArray[np.float64]
@@ -110,18 +119,18 @@ class RegionTable:
 
 
 def load_region_table(name: str | Path) -> RegionTable:
-    """Load a region table from a TOML file, or the package's by the name "default".
+    """Load a region table from a TOML file; the name "default" loads the package's own table.
 
     Raises DermisError for missing and unknown regions and for invalid numbers.
     """
     if str(name) == DEFAULT_TABLE:
         text = resources.files(__package__).joinpath("default.toml").read_text("utf-8")
-        return _table(tomllib.loads(text), Path(DEFAULT_TABLE))
-    return _table(read_toml(name, "default, or regions in TOML"), Path(name))
+        return _build_table(tomllib.loads(text), Path(DEFAULT_TABLE))
+    return _build_table(read_toml(name, "default, or regions in TOML"), Path(name))
 
 
-def _table(entries: dict[str, Any], path: Path) -> RegionTable:
-    files = {key: _file_path(path, key, entries.pop(key)) for key in _FILES if key in entries}
+def _build_table(entries: dict[str, Any], path: Path) -> RegionTable:
+    files = {key: _file_path(path, key, entries.pop(key)) for key in _FILE_KEYS if key in entries}
     if set(entries) != set(REGIONS):
         wrong = sorted(set(entries) - set(REGIONS)) or sorted(set(REGIONS) - set(entries))
         actual = f"[{wrong[0]}] {'is none of them' if wrong[0] in entries else 'is missing'}"

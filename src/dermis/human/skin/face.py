@@ -1,4 +1,4 @@
-"""Tables of the face: zones of skin, hairline, folds, and their changes with expressions."""
+"""Zones, hairline and folds of the average face for skin painting, and their changes with expressions."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ HAIRLINE_STEP_DEGREES = 2
 _HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
 _SAMPLES_PER_SEGMENT = 4
 _CACHE_SIZE = 32  # tables of receding hair
-_CROWN = "crown"  # zone where hair thins first
+_CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
 def movement_weights(names: tuple[str, ...], weights: Floats) -> Floats:
-    """Return the strength (m,) of each movement, 0 to 1.
+    """Return the strength (m,) of each movement in `MOVEMENTS`, 0 to 1, from morph target weights.
 
-    names, weights : of a rig's targets
+    names, weights : names of the t morph targets, and their weights (t,)
     """
     return np.asarray(np.clip(_movement_matrix(names) @ weights, 0.0, 1.0), np.float32)
 
 
 @cache
 def _movement_matrix(names: tuple[str, ...]) -> Floats:
-    """Return the contribution (m, t) of each target to each movement."""
+    """Return the contribution (m, t) of each morph target to each movement in `MOVEMENTS`."""
     table = np.zeros((len(MOVEMENTS), len(names)), np.float32)
     for row in read_rows(__package__, "movements"):
         if row["target"] in names:
@@ -63,13 +63,15 @@ def _movement_matrix(names: tuple[str, ...]) -> Floats:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def zone_table(recession: float = 0.0) -> Floats:
-    """Return a row (k, 20) for each zone: centre and 0, inverse radii [1/mm] and 0, and its amounts.
+    """Return the Gaussian zones of the face as rows (k, 20) for the paint shader.
 
-    recession : see `SkinLook`
+    Columns: centre [mm], a zero, inverse radii [1/mm], a zero, and the twelve `ZONE_AMOUNTS`.
+
+    recession : thinning of hair at the crown, 0 to 1, see `SkinLook`
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
-        if row["zone"] == _CROWN:
+        if row["zone"] == _CROWN_ZONE:
             row["hair"] = str(recession * float(row["hair"]))
     columns = "x y z", "rx ry rz", " ".join(ZONE_AMOUNTS)
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
@@ -79,9 +81,9 @@ def zone_table(recession: float = 0.0) -> Floats:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def hairline_heights(recession: float = 0.0) -> Floats:
-    """Return the height (91,) of the hairline by the angle from the front [mm].
+    """Return the height (91,) of the hairline over y = 0 by the angle from the front, every 2 degrees [mm].
 
-    recession : see `SkinLook`; it starts at the temples
+    recession : recession of the hairline, 0 to 1, which starts at the temples, see `SkinLook`
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -94,12 +96,12 @@ def hairline_heights(recession: float = 0.0) -> Floats:
 
 
 class Folds(NamedTuple):
-    """Polylines of folds on the left half of the average person's face.
+    """Skin folds, such as the nasolabial fold, as polylines on the left half of the average face.
 
-    knots : (k, 4) of all folds [mm], with their position along the fold, 0 to 1
-    curves : (c, 8) centre and radius of a bounding sphere, width, depth in a young and in an old face [mm],
-        and the number of the movement that deepens the fold, from 1; 0 for none
-    first : (c + 1,) start of each fold in `knots`
+    knots : (k, 4) points of all polylines [mm], and their position along the fold, 0 to 1
+    curves : (c, 8) for each fold: centre and radius of a bounding sphere, width, depth in a young and in an
+        old face [mm], and 1 plus the index of the movement that deepens the fold, or 0
+    first : (c + 1,) index of the first knot of each fold, followed by the number of knots
     """
 
     knots: Floats
@@ -109,7 +111,7 @@ class Folds(NamedTuple):
 
 @cache
 def fold_curves() -> Folds:
-    """Return the folds of the face."""
+    """Return the skin folds of folds.csv as smooth polylines with their dimensions."""
     knots, curves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):
         rows = list(group)
@@ -125,19 +127,22 @@ def fold_curves() -> Folds:
 
 @cache
 def table_sizes() -> dict[str, int]:
-    """Return the numbers of zones, folds, knots and hairline samples, without importing SciPy."""
+    """Return the sizes of the tables of zones, folds, knots and hairline, without computing their splines.
+
+    The shaders need them as constants, and SciPy would be slow to import.
+    """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))
     return {"zones": len(zone_table()), "folds": len(lengths), "knots": knots, "edges": _HAIRLINE_SAMPLES}
 
 
 def _sample_count(knots: int) -> int:
-    """Return the number of samples of a curve through so many knots."""
+    """Return the number of samples of the spline through a number of knots."""
     return _SAMPLES_PER_SEGMENT * (knots - 1) + 1
 
 
 def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return samples of the smooth curve through the knots."""
+    """Return samples of a cubic spline through knots (k, 3)."""
     from scipy.interpolate import CubicSpline
 
     index = np.arange(len(knots))

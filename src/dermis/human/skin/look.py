@@ -1,4 +1,4 @@
-"""Look of the skin: pigments and texture, typical or sampled at random."""
+"""Skin look (pigments, marks, folds) of a person, typical or sampled at random."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 RANGES = {"seed": (0, 2**32 - 1)}
 """Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
-_MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
-_EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
-_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
-_IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
+_TYPICAL_MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
+_TYPICAL_EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
+_TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
+_TYPICAL_IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _MELANIN_LOG_DEVIATION = 0.42  # standard deviation of log melanin within an ancestry
 _EUMELANIN_STEP = 0.05  # rounding, so that people share colour tables
 _AGE_SPOTS_FROM = 45.0
@@ -97,16 +97,16 @@ class SkinLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Validate the fields."""
+        """Raise DermisError for fields out of range."""
         check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
 
 
 class Demographics(NamedTuple):
-    """Ancestry, sex and age of a person, on which the typical look depends.
+    """Ancestry, sex and age of a person, from which typical looks of skin, eyes and hair are derived.
 
     african, asian, caucasian : fractions of the ancestries, with a sum of 1
-    sex : 0 female, 1 male
-    age : [years]
+    sex : from 0, female, to 1, male [-]
+    age : age [years]
     """
 
     african: float
@@ -116,21 +116,21 @@ class Demographics(NamedTuple):
     age: float
 
     def weighted_mean(self, values: dict[str, float]) -> float:
-        """Return the mean of values by ancestry."""
+        """Return the mean of one value per ancestry, weighted by the ancestry fractions."""
         african, asian, caucasian = (values[name] for name in ("african", "asian", "caucasian"))
         return self.african * african + self.asian * asian + self.caucasian * caucasian
 
 
 def typical_skin(demographics: Demographics) -> SkinLook:
-    """Return the typical skin by ancestry, age and sex."""
+    """Return the typical skin look for a person's ancestry, age and sex."""
     old = (demographics.age - YOUNG) / (OLD - YOUNG)
-    log_melanin = {name: math.log(fraction) for name, fraction in _MELANIN.items()}
+    log_melanin = {name: math.log(fraction) for name, fraction in _TYPICAL_MELANIN.items()}
     lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD - _AGE_SPOTS_FROM)
     return SkinLook(
         melanin=math.exp(demographics.weighted_mean(log_melanin)),
-        eumelanin=demographics.weighted_mean(_EUMELANIN),
+        eumelanin=demographics.weighted_mean(_TYPICAL_EUMELANIN),
         blood=0.009,
-        freckles=demographics.weighted_mean(_FRECKLES),
+        freckles=demographics.weighted_mean(_TYPICAL_FRECKLES),
         moles=0.3,
         spots=0.7 * lines * (0.4 + 0.6 * demographics.caucasian),
         veins=0.2 + 0.5 * old,
@@ -141,13 +141,13 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
-    """Return the typical eyes: brown, lighter with more European ancestry."""
+    """Return the typical eye look: brown irises, which are lighter with more European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG)
-    return EyeLook(eumelanin=demographics.weighted_mean(_IRIS), redness=redness)
+    return EyeLook(eumelanin=demographics.weighted_mean(_TYPICAL_IRIS), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
-    """Return random eyes around the typical ones: of all colours for European ancestry."""
+    """Return a random eye look around the typical one; European ancestry gives irises of all colours."""
     typical = typical_eyes(demographics)
     spread = 0.08 + 0.28 * demographics.caucasian
     eumelanin = _clamp(typical.eumelanin + spread * rng.normal(), 0.0, 1.0)
@@ -156,7 +156,10 @@ def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook
 
 
 def sample_skin(rng: np.random.Generator, demographics: Demographics) -> SkinLook:
-    """Return random skin around the typical one; random numbers are always drawn in the same order."""
+    """Return a random skin look around the typical one of a person.
+
+    The order of random draws does not depend on the person.
+    """
     typical = typical_skin(demographics)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))

@@ -1,4 +1,4 @@
-"""Maps of skin painted from a look, and mean colours of face and lips."""
+"""Skin maps that the device paints from a skin look, and mean colours of face and lips."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MIN_SIDE, MAX_SIDE = 256, 4096
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Return the table of skin colours by fractions of melanin and blood."""
+    """Return the table of skin colours by melanin and blood fraction; tables are cached."""
     with _LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 
@@ -34,13 +34,13 @@ def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -
 
 
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
-    """Return the colour (3,) of skin with mean pigments, linear Rec. 709 [-]."""
+    """Return the colour (3,) of skin that has the mean pigments of a look everywhere, linear Rec. 709 [-]."""
     table = skin_colour_table(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
     return np.asarray(table.lookup(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
 def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
-    """Return the colours (2, n, n, 3) of face and lips, laid out as in `ColourTable`."""
+    """Return the colour tables (2, n, n, 3) of face and lips by pigment fractions, as in `ColourTable`."""
     thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
     both = [skin_colour_table(look.eumelanin, look.oxygen, mm).colours for mm in thick]
     return np.stack(both).astype(np.float32)
@@ -48,7 +48,7 @@ def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Maps that the device paints from a look; given maps replace painted ones.
+    """Skin maps that the device paints from a skin look, except for maps that are given.
 
     look : pigments and texture of the skin
     """
@@ -58,10 +58,10 @@ class PaintedMaps(Maps):
 
     @property
     def has_roughness(self) -> bool:
-        """Return whether there is a roughness map, which is always painted."""
+        """Return True, as a roughness map is painted if none is given."""
         return True
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """Return the mean colour (3,) of the skin, linear Rec. 709 [-]."""
+        """Return the mean colour (3,) of the skin, of its colour map or of its look, linear Rec. 709 [-]."""
         return super().mean_colour if self.colour is not None else mean_colour(self.look)

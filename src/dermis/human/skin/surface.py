@@ -1,4 +1,4 @@
-"""Surface of the average person, on which the patterns of the skin are defined."""
+"""Surface of the average person, on which patterns of the skin such as zones and folds are defined."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Floats = NDArray[np.float32]
 BORDER_FIELDS = ("lips", "mouth", "lids")
 """Signed distances to borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the
 eyelids, negative on the side of the eye."""
-_UNIT_MM = 0.01
-_LID_DISTANCES_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
-_CREST_LIMITS_MM = 0.15, 0.8  # of the third column
+_STORED_UNIT_MM = 0.01
+_LID_DISTANCES_MM = -2.0, -0.6  # lid distances of the wall and edge columns of lid_rings.csv
+_CREST_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the crest column
 
 
 @cache
 def average_surface() -> tuple[Floats, Floats]:
-    """Return the average person's control points (p, 3) and their border distances (p, 3) [mm].
+    """Return the average person's control points (p, 3) and their distances (p, 3) to three borders [mm].
 
-    The distances are those listed in `BORDER_FIELDS`.
+    The borders and the signs of the distances are those of `BORDER_FIELDS`.
     """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
@@ -40,7 +40,10 @@ def average_surface() -> tuple[Floats, Floats]:
 
 @cache
 def lid_rings() -> NDArray[np.int64]:
-    """Return the control points (2, r, 4) of the left and the right eye's lids, see human/lid_rings.csv."""
+    """Return the control points (2, r, 4) of the lids of the left and the right eye, as in lid_rings.csv.
+
+    The columns are four concentric rings: socket wall, lid edge, crest of the lid margin, and skin.
+    """
     left = float_columns(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
     points_mm = _load_array("places")
     mirrored = points_mm[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
@@ -51,7 +54,7 @@ def lid_rings() -> NDArray[np.int64]:
 def _load_array(name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
     with resources.as_file(file) as path, np.load(path) as vertices_mm:
-        return np.asarray(vertices_mm[name].astype(np.float32) * np.float32(_UNIT_MM))
+        return np.asarray(vertices_mm[name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
 
 
 _CACHE: dict[bytes, PaintedSurface] = {}
@@ -61,11 +64,11 @@ _LOCK = Lock()
 
 @dataclass(frozen=True, eq=False)
 class PaintedSurface:
-    """Skin triangles of a human's mesh, as painted_surface.wgsl reads them.
+    """Skin triangles of a human's mesh with the vertex attributes that painted_surface.wgsl reads.
 
-    vertices : (v, 12) uv, position and normal on the average person, border distances, and the binary
-        logarithm of the mm per unit of uv
-    triangles : (t, 4) corners, and 1 if a side is the border of a chart
+    vertices : (v, 12) uv, position and normal on the average person, distances to `BORDER_FIELDS` [mm], and
+        the base-2 logarithm of the length on the skin per unit of uv [mm]
+    triangles : (t, 4) vertex indices, and 1 if an edge of the triangle is the border of a chart
     """
 
     vertices: Floats
@@ -73,14 +76,14 @@ class PaintedSurface:
 
     @property
     def count(self) -> int:
-        """Return the number of triangles."""
+        """Return the number of triangles to draw."""
         return len(self.triangles)
 
 
 def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
-    """Return the skin triangles of a human's mesh; cached, as they are equal for all people with its layout.
+    """Return the skin triangles of a human's mesh, cached by topology, as they do not depend on the person.
 
-    stencils : of the subdivision of its points, if any
+    stencils : subdivision stencils that give the points of the mesh; None without subdivision
     """
     key = mesh.topology_key
     with _LOCK:
@@ -97,7 +100,7 @@ def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
     others = np.zeros(
         (int(mesh.point.max() if stencils is None else stencils.point.max()) + 1, both.shape[1])
     )
-    control = np.concatenate([both, others[len(both) :]])  # of eyeballs, which are not painted
+    control = np.concatenate([both, others[len(both) :]])  # zeros for eyeballs, which are not painted
     points = control if stencils is None else stencils.points(control)
     vertices_mm = points[mesh.point].astype(np.float32)
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
@@ -112,7 +115,7 @@ def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
 
 
 def _log_mm_per_uv(uv: Floats, points_mm: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the binary logarithm of the mm per unit of uv around each vertex (v,)."""
+    """Return the base-2 logarithm of the skin length per unit of uv around each vertex (v,) [mm]."""
     areas = triangle_areas(points_mm[triangles].astype(np.float64))
     a, b, c = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
     ab, ac = b - a, c - a

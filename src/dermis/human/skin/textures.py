@@ -1,4 +1,4 @@
-"""Random textures of skin: gradient noises, scattered dots, and a tile of fine relief."""
+"""Parameters of procedural skin textures: gradient noise, scattered dots, and a tile of pores and furrows."""
 
 from __future__ import annotations
 
@@ -32,12 +32,15 @@ MAX_HEIGHT_MM = 0.2
 
 
 class Noise(NamedTuple):
-    """Gradient noise with values of about -1 to 1.
+    """Fractal gradient noise, with values from about -1 to 1, that the paint shader evaluates.
 
-    feature_mm : size of its features along the axes of its space [mm]
-    gain, octaves : of a fractal sum: ratio of the amplitudes of consecutive octaves, and their number
+    name : name of the noise in the shader
+    feature_mm : size of its features along the three axes of its space [mm]
+    space : coordinates in which it is evaluated, one of `NOISE_SPACES`
+    gain : ratio of the amplitudes of consecutive octaves
+    octaves : number of octaves
     antialiased : whether octaves finer than a texel are left out
-    region : where it is used; it is not evaluated elsewhere
+    region : part of the skin where it is evaluated, one of `NOISE_REGIONS`; elsewhere it is 0
     """
 
     name: str
@@ -94,11 +97,11 @@ NOISES = (
 
 
 class DotLayer(NamedTuple):
-    """Layer of soft round dots, at most one in each cell of a lattice.
+    """Layer of soft round dots, such as freckles, with at most one dot in each cell of a cubic lattice.
 
-    spacing_mm : of the cells [mm]
-    min_radius, max_radius : up to 0.5 [fraction of the spacing]
-    edge_warp_mm : amplitude of the noise that distorts the outlines [mm]
+    spacing_mm : side of the cells [mm]
+    min_radius, max_radius : limits of the random radius as fractions of the spacing, up to 0.5
+    edge_warp_mm : amplitude of the noise that distorts the outlines of the dots [mm]
     """
 
     name: str
@@ -121,9 +124,10 @@ DOT_LAYERS = (  # artist's values
 def noise_table() -> NDArray[np.float32]:
     """Return a row (n, 16) for each octave of each noise, as spot.wgsl reads it.
 
-    Three rows of the matrix from the space of the noise to its lattice [1/mm], each followed by one number:
-    the texel size that resolves the octave [mm], 0 for any; its amplitude; its seed. Then indices of the
-    noise, its space and its region.
+    Columns 0 to 11 are three rows of four: the 3x3 matrix from the noise's space to its lattice [1/mm], each
+    row followed by one scalar. The scalars are the feature size [mm] below which texels do not resolve the
+    octave (0 if it is not antialiased), the amplitude of the octave, and its seed. Columns 12 to 14 are the
+    indices of noise, space and region. Seed and indices are stored as the bits of uint32.
     """
     rows = list(_octave_rows())
     table = np.zeros((len(rows), 16), np.float32)
@@ -147,7 +151,7 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
 
 
 def dot_table() -> NDArray[np.float32]:
-    """Return a row (d, 4) for each layer of dots: spacing [mm], radii and edge warp [mm].
+    """Return a row (d, 4) for each layer of dots: spacing [mm], minimum and maximum radius, edge warp [mm].
 
     The radii are fractions of the spacing.
     """
@@ -156,7 +160,7 @@ def dot_table() -> NDArray[np.float32]:
 
 @cache
 def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the heights (TILE_SIDE, TILE_SIDE) of pores and of furrows, as periodic tiles [mm]."""
+    """Return the heights of pores and of furrows as periodic tiles (TILE_SIDE, TILE_SIDE) [mm]."""
     from PIL import Image
 
     file = resources.files("dermis.human").joinpath("data", "detail.png")
@@ -167,9 +171,9 @@ def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 @cache
 def detail_slopes() -> NDArray[np.float32]:
-    """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of pores along +u and down, and of furrows [-].
+    """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of the periodic tiles of pores and of furrows [-].
 
-    The tile is periodic.
+    The channels are the slopes of the pores along +u and down, then those of the furrows.
     """
     heights = np.stack(detail_heights_mm(), axis=-1)
     per_mm = np.float32(TILE_SIDE / TILE_LENGTH_MM / 2)
