@@ -21,7 +21,7 @@ from dermis.apps.export.targets.gltf.volume import (
     fit_volume,
     multiscatter_colour,
     multiscatter_for_reflectance,
-    single_scattering,
+    single_scattering_albedo,
     volume_curve,
     volume_from_paths,
 )
@@ -65,10 +65,10 @@ def skin_of(file: Path) -> dict[str, Any]:
 def test_the_inversion_is_van_de_hulsts() -> None:
     """The draft prints one direction; the other is the published inverse of the approximation."""
     albedo = np.array([0.3, 0.7, 0.9, 0.99, 0.999])
-    np.testing.assert_allclose(single_scattering(multiscatter_colour(albedo)), albedo, atol=2e-5)
+    np.testing.assert_allclose(single_scattering_albedo(multiscatter_colour(albedo)), albedo, atol=2e-5)
     s = np.sqrt(1 - 0.9)
     assert multiscatter_colour(0.9) == pytest.approx((1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
-    assert single_scattering(0.5, 0.8) > single_scattering(0.5)
+    assert single_scattering_albedo(0.5, 0.8) > single_scattering_albedo(0.5)
 
 
 def test_a_volume_keeps_its_paths() -> None:
@@ -85,7 +85,7 @@ def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
     tissue, subject = load_tissue(name), load_subject(name)
     volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
     np.testing.assert_allclose(volume.mean_free_path_mm, layer.mean_free_path_mm, rtol=0.01)
-    np.testing.assert_allclose(single_scattering(volume.multiscatter), layer.alpha_prime, atol=0.003)
+    np.testing.assert_allclose(single_scattering_albedo(volume.multiscatter), layer.alpha_prime, atol=0.003)
     found = curve_error(subject.curve, volume_curve(volume))
     assert found.cdf.max() < 0.003 and found.edge.max() < 0.001 and np.abs(found.energy).max() < 0.005
 

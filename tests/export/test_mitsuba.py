@@ -15,7 +15,7 @@ from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.mitsuba.meshes import subdivide_triangles
 from dermis.apps.export.targets.mitsuba.target import TARGET, SkinColours, fit_medium
-from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, element
+from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, object_element
 from dermis.apps.truths.mitsuba_scene import mitsuba_variant
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import media
@@ -69,10 +69,13 @@ def test_dimmed_skin_has_a_brighter_medium() -> None:
 
 def test_words_are_escaped_and_pictures_numbered() -> None:
     backend = XmlBackend()
-    made = element({"type": "ply", "filename": '"/><x a="&'}, "", backend)
+    made = object_element({"type": "ply", "filename": '"/><x a="&'}, "", backend)
     assert ET.fromstring(ET.tostring(made))[0].attrib["value"] == '"/><x a="&'
     slide = {"type": "bitmap", "bitmap": Bitmap(np.zeros((1, 1, 3), np.float32)), "raw": True}
-    assert element(slide, "", backend)[0].attrib == {"name": "filename", "value": "textures/light_0.exr"}
+    assert object_element(slide, "", backend)[0].attrib == {
+        "name": "filename",
+        "value": "textures/light_0.exr",
+    }
     assert len(backend.bitmaps) == 1
 
 

@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from dermis.apps.export.targets.openpbr.document import standard_library
 from dermis.apps.export.targets.openpbr.materials import OpenPbrMaterial, skin_material
-from dermis.apps.export.targets.usd.geometry import valid_names
+from dermis.apps.export.targets.usd.geometry import unique_usd_names
 from dermis.apps.export.targets.usd.stage import build_stage
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -132,4 +132,4 @@ def test_a_hostile_name_is_a_name_alone(rigged: Head, tmp_path: Path) -> None:
 
 
 def test_names_stay_apart() -> None:
-    assert valid_names(["a b", "a_b", "a-b"]) == ["a_b", "a_b_again1", "a_b_again2"]
+    assert unique_usd_names(["a b", "a_b", "a-b"]) == ["a_b", "a_b_again1", "a_b_again2"]

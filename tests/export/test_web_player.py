@@ -25,7 +25,7 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.targets.pages.html import csp_hash
 from dermis.apps.export.targets.web.build import PageContent, PageRequest, build_content
 from dermis.apps.export.targets.web.sliders import Slider, scene_sliders
-from dermis.apps.export.targets.web.target import MODULES, page_html, player_script
+from dermis.apps.export.targets.web.target import PLAYER_MODULES, page_html, player_script
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]
@@ -93,10 +93,10 @@ class CapturedPage(NamedTuple):
     sliders: tuple[Slider, ...]
 
 
-def capture_page(scene: dermis.Scene, form: str, sliders: tuple[Slider, ...]) -> CapturedPage:
+def capture_page(scene: dermis.Scene, adapter_kind: str, sliders: tuple[Slider, ...]) -> CapturedPage:
     renderers: list[Renderer] = []
     request = PageRequest(
-        scene, sliders, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+        scene, sliders, SETTINGS, {adapter_kind: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
     )
     content = build_content(request, lambda renderer, *_: renderers.append(renderer))
     return CapturedPage(content, scene, renderers[0], sliders)
@@ -212,7 +212,7 @@ def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
 
 
 def test_modules_are_joined_in_order() -> None:
-    assert {f"{name}.js" for name in MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
+    assert {f"{name}.js" for name in PLAYER_MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
     assert not re.search(r"^(import|export) ", player_script(), re.MULTILINE)
     names = re.findall(r"^(?:async function|function|class|const|let) (\w+)", player_script(), re.MULTILINE)
     assert len(names) > 40 and len(names) == len(set(names))

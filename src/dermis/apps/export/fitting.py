@@ -1,4 +1,4 @@
-"""Fits of the profiles that a target supports to a reference profile, and their errors."""
+"""Fits of a program's diffusion profile to the reference profile of a skin, and the remaining errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative profile of Burley's R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
     d_mm : (3,) width d of each channel [mm]
-    energy : (3,) total energy A [-]
+    energy : (3,) total energy A of each channel: emerging light per incident light [-]
     """
     d = np.maximum(np.asarray(d_mm, np.float64), _MIN_WIDTH_MM)
     return CumulativeProfile.from_function(BurleyProfile(np.ones(3), 1.0 / d).energy_within, energy)
@@ -52,9 +52,9 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
 def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
     """Return the cumulative profile of a sum of Gaussians.
 
-    variance_mm2 : (n,) variances [mm2]
-    weight : (n, 3) weights [-]
-    energy : (3,) total energy [-]
+    variance_mm2 : (n,) variances of the Gaussians [mm2]
+    weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
+    energy : (3,) total energy of the curve: emerging light per incident light [-]
     """
     fraction = weight / weight.sum(axis=0)
 
@@ -66,7 +66,11 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return a cumulative profile scaled by a length (3,) per channel [mm]."""
+    """Return a cumulative profile whose radii are multiplied by one length per channel.
+
+    unit : profile with radii in units of the length
+    scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
+    """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
     def within(radius_mm: Floats) -> Floats:
@@ -76,9 +80,9 @@ def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativePro
 
 
 def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
-    """Return the lengths (3,) by which a profile is scaled to match another one [mm].
+    """Return the lengths (3,) by which the radii of `unit` are multiplied to match `curve` [mm].
 
-    The largest difference of the cumulative profiles is minimised.
+    The largest difference of the two cumulative profiles is minimised in each channel.
     """
     middle = np.log(curve.radius_at_fraction(0.5) / unit.radius_at_fraction(0.5))
     return _fit_scale_near(curve, unit, middle, _LOG_RANGE, _BISECTIONS - 1)
@@ -86,11 +90,11 @@ def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
 
 @dataclass(frozen=True)
 class HomogeneousMedium:
-    """Half-space of one medium with isotropic scattering.
+    """Half-space of a homogeneous medium with isotropic scattering.
 
-    albedo : (3,) reduced single-scattering albedo [-]
+    albedo : (3,) reduced albedo [-]
     mfp_mm : (3,) reduced mean free path [mm]
-    curve : cumulative profile of the light that leaves it
+    curve : cumulative profile of the light that leaves the half-space
     """
 
     albedo: Floats
@@ -101,10 +105,11 @@ class HomogeneousMedium:
 def fit_homogeneous_medium(
     curve: CumulativeProfile, energy: Floats | None = None, kind: HalfSpaceKind = "skin"
 ) -> HomogeneousMedium:
-    """Return the medium whose cumulative profile is closest to a curve.
+    """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
-    energy : (3,) total energy of the medium, by default that of the curve [-]
-    kind : surface and illumination of the half-space
+    curve : reference profile
+    energy : (3,) light that leaves the medium per incident light, by default that of `curve` [-]
+    kind : surface and illumination of the half-space, see `half_space`
     """
     albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
     unit = half_space(kind, albedo, np.ones(3))
@@ -123,13 +128,14 @@ def _fit_scale_near(
 
 
 def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
-    """Return the lengths (3,) that minimise the largest difference of two cumulative profiles.
+    """Return the lengths (3,) for which a scaled cumulative profile is closest to a reference profile.
 
-    A wider profile has less light within each radius, so its largest excess decreases and its largest deficit
-    increases with the length. The largest difference is smallest where both are equal.
+    A wider profile has less light within each radius, so its largest excess over the reference decreases and
+    its largest deficit increases with the length. The larger of the two is smallest where they are equal.
 
-    excess : function that returns the excess (n, 3) of light within some radii for logarithmic lengths (3,)
-    low, high : bounds of the logarithmic lengths (3,)
+    excess : function of log lengths (3,) that returns the fraction of light within each radius of the scaled
+        profile minus that of the reference, (n, 3)
+    low, high : (3,) bounds of the log lengths
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)
@@ -140,11 +146,12 @@ def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Float
 
 
 def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[[Floats], Floats]) -> float:
-    """Return the length by which a profile is scaled to match one channel of a curve [mm].
+    """Return the length by which the radii of a profile are multiplied to match one channel of `curve` [mm].
 
-    Least squares with radii spaced evenly in log r.
+    The sum of squared differences is minimised, at radii spaced evenly in log r.
 
-    unit_cdf : cumulative profile at radii (n,), for a length of 1
+    channel : index of the channel, 0 for red
+    unit_cdf : function that returns the cumulative profile for a length of 1 at radii (n,)
     """
     from scipy.optimize import minimize_scalar
 
@@ -163,7 +170,7 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
 
 @dataclass(frozen=True)
 class CurveError:
-    """Errors of a target's cumulative profile for red, green and blue.
+    """Differences of the profile that a program renders from the reference profile, for red, green and blue.
 
     cdf : (3,) largest difference of the fraction of light within a radius [-]
     edge : (3,) largest difference beside a straight edge of light, such as a shadow edge [-]
@@ -175,12 +182,12 @@ class CurveError:
     energy: Floats
 
     def as_json(self) -> dict[str, list[float]]:
-        """Return lists of three numbers by name."""
+        """Return the three errors as lists of red, green and blue, by the names of the fields."""
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
 def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
-    """Return the errors of a cumulative profile relative to a reference."""
+    """Return the errors of a cumulative profile relative to a reference profile."""
     steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLES)
     widest = _MAX_EDGE_DISTANCE * np.maximum(reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5))
     edge = np.zeros(3)

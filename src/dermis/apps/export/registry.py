@@ -1,4 +1,4 @@
-"""Registry of export targets; each has a module with a `TARGET`."""
+"""Registry of export targets, by name; the module of each target defines its instance `TARGET`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export of a skin or head to a program, with a report of its accuracy there."""
+"""Export of a skin or head to another program, with a report of the error that remains there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 from dermis.apps.export.fitting import CurveError, curve_error, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
-from dermis.apps.export.target import Parameters, Target, Value
+from dermis.apps.export.target import Parameters, ParameterValue, Target
 from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, temporary_folder
 from dermis.base.errors import refuse
 from dermis.optics.media import Floats
@@ -33,15 +33,17 @@ _MAP_SIDE = 2048
 class ExportReport:
     """Report of one export.
 
-    target, title, version, variant : the program; the variant is "" if there is only one
-    subject, model : name of the skin or head, and the model of its profile
+    target, title, version, variant : name, title, version and variant of the target program; the variant is
+        empty if the target has none
+    subject, model : name of the skin or head, and the model of its reference profile
     parameters : exported parameters
-    naive_parameters : parameters that a user might choose without knowing their meaning
-    d_mm : (3,) width of the closest Burley profile [mm]
-    error, naive_error : errors of the profile that the target renders, by the target's own formulas
-    limitations : what the target cannot reproduce
-    untested : whether the parameters were never used in the program
-    files : all written files
+    naive_parameters : parameters that a user might choose without knowing their meaning in the program
+    d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
+    error, naive_error : errors of the profile that the program renders with the exported and with the naive
+        parameters, predicted by its own formulas
+    limitations : sentences on what the program cannot reproduce
+    untested : whether the parameters were never used in the program itself
+    files : paths of all written files
     """
 
     target: str
@@ -60,7 +62,7 @@ class ExportReport:
     files: tuple[Path, ...] = ()
 
     def as_json(self) -> dict[str, object]:
-        """Return the report as numbers, lists and texts for JSON."""
+        """Return the report as a dictionary that JSON can store."""
         return {
             "target": self.target,
             "version": self.version,
@@ -79,25 +81,27 @@ class ExportReport:
         }
 
     def lines(self, naive: bool = False) -> list[str]:
-        """Return the report as lines of text.
+        """Return the report as lines of plain text for the terminal.
 
-        naive : include the naive parameters
+        naive : whether to list the naive parameters too
         """
         target = " ".join(filter(None, (self.title, self.version, self.variant)))
         lines = [f"{self.subject}, profile by {self.model}, for {target}"]
         lines += ["not tested: parameters follow published documentation"] if self.untested else []
-        lines += ["", *_table(self.parameters)]
+        lines += ["", *_parameter_lines(self.parameters)]
         if naive:
-            lines += ["", "naive parameters", *_table(self.naive_parameters)]
+            lines += ["", "naive parameters", *_parameter_lines(self.naive_parameters)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
-        lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  width of the fitted Burley profile")
+        lines.append(f"{'d [mm]':12}{_format_channels(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERRORS.items():
-            lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {meaning}")
-            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  of naive parameters")
+            lines.append(f"{name:12}{_format_channels(getattr(self.error, name))}  {meaning}")
+            lines.append(
+                f"{'  naive':12}{_format_channels(getattr(self.naive_error, name))}  of naive parameters"
+            )
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:
-        """Return sentences about the remaining error of this skin and the limitations of the target."""
+        """Return sentences on the remaining error of this skin and on the program's limitations."""
         worst = int(self.error.cdf.argmax())
         error = float(self.error.cdf[worst])
         if error < _NOTABLE_ERROR:
@@ -112,25 +116,25 @@ class ExportReport:
         return "\n".join(lines)
 
 
-def _table(parameters: Parameters) -> Sequence[str]:
+def _parameter_lines(parameters: Parameters) -> Sequence[str]:
     rows = [(one.name, format_parameter(one.value), one.unit, one.meaning) for one in parameters]
     widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
     return ["  ".join([*map(str.ljust, row[:3], widths), row[3]]) for row in rows]
 
 
-def format_parameter(value: Value) -> str:
-    """Return a parameter's value as text."""
+def format_parameter(value: ParameterValue) -> str:
+    """Return the value of a parameter as text, with four significant digits."""
     if isinstance(value, tuple):
         return ", ".join(f"{x:.4g}" for x in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _numbers(values: Floats) -> str:
+def _format_channels(values: Floats) -> str:
     return "".join(f"{x:9.4f}" for x in values)
 
 
 def _single_line(text: str) -> str:
-    """Return a text without characters that would end a line or a block of code."""
+    """Return a text without backticks and line breaks, which would end a line or a code block of Markdown."""
     return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
 
@@ -216,7 +220,7 @@ def export_skin(
 
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
-    """Return the report of an export without writing any file."""
+    """Return the report of an export without writing any file: parameters and predicted errors."""
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
         curve_error(subject.curve, target.predicted_curve(one, subject, version))
@@ -240,7 +244,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
 
 
 def _checked_output(target: Target, output: str | Path) -> Path:
-    """Return the output path if the target supports its suffix."""
+    """Return the output path; raise DermisError if the target cannot write its suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
         allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
@@ -251,7 +255,7 @@ def _checked_output(target: Target, output: str | Path) -> Path:
 
 @contextmanager
 def _staging_path(output: Path) -> Iterator[Path]:
-    """Yield a temporary path for `Target.write`, and move the written files to the output afterwards."""
+    """Yield a temporary path for `Target.write`, and move the written files to `output` on success."""
     if not output.suffix:
         with atomic_folder(output, REPORT_FILE) as folder:
             yield folder
@@ -273,7 +277,7 @@ def _move_into_place(source: Path, target: Path) -> None:
 
 
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
-    """Write the report into the folder or beside the file, and return its paths."""
+    """Write the report as Markdown and JSON beside the output file or into the folder; return both paths."""
     single = bool(output.suffix)
     page = output.with_name(f"{output.name}.md") if single else output / _PAGE_FILE
     numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE

@@ -1,4 +1,4 @@
-"""Parts of scenes for other renderers: supported lights, and triangles as PLY files."""
+"""Lights that other renderers support, and triangle meshes as PLY files."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights, replacing unsupported kinds by the closest supported base kind, with a note.
+    """Return the lights with each unsupported one replaced by a point or directional light, with a note.
 
     supported : kinds of light that the program supports, including point and directional
+    program : name of the program for the note
     """
     return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
 
@@ -36,12 +37,12 @@ def encode_ply(
     uv: ArrayLike | None = None,
     colour: ArrayLike | None = None,
 ) -> bytes:
-    """Return a binary PLY file of triangles.
+    """Return a triangle mesh as a binary PLY file.
 
     triangles : (t, 3) vertex indices
-    positions, normals : (v, 3) per vertex
-    uv : (v, 2) per vertex
-    colour : (v, 3) linear colour per vertex
+    positions, normals : (v, 3) positions and unit normals of the vertices
+    uv : (v, 2) texture coordinates of the vertices
+    colour : (v, 3) linear colour of the vertices
     """
     attributes = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
     columns = {names: values for names, values in attributes.items() if values is not None}

@@ -53,7 +53,7 @@ class Subject:
     curve : cumulative reference profile, per incident light
     albedo : (3,) base colour: mean of the head's colour map, or the energy of the profile; linear Rec. 709
         [-]
-    model : model of the profile: "montecarlo", "layered", "table" ...
+    model : model of the profile, such as "montecarlo" or "layered"; "table" for a table of Gaussians
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     """
@@ -67,7 +67,7 @@ class Subject:
 
     @property
     def head(self) -> Head | None:
-        """Return the head of the skin, or None."""
+        """Return the head to export, or None for a skin without a head."""
         return None if self.scene is None else self.scene.head
 
     @cached_property
@@ -77,13 +77,13 @@ class Subject:
 
     @property
     def identifier(self) -> str:
-        """Return the name reduced to ASCII letters, digits and underscores."""
+        """Return the name as ASCII letters, digits and underscores, for names of files and materials."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_MAX_NAME_LENGTH]
         return f"skin_{name}" if not name or name[0].isdigit() else name
 
     @property
     def skin(self) -> Skin:
-        """Return the skin of the scene, or the default skin."""
+        """Return the skin of the scene, or the default skin if there is no scene."""
         return Skin() if self.scene is None else self.scene.skin
 
     def clipped_albedo(self, low: float = 0.0) -> Floats:
@@ -91,7 +91,12 @@ class Subject:
         return np.clip(self.albedo, low, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return a curve with the subject's energy, times the ratio of the curve's energy to the albedo."""
+        """Return a program's profile with the reference energy, times the program's error in reflectance.
+
+        That error is the ratio of the light that the program returns for the albedo to the albedo itself.
+
+        curve : profile that the program renders, with the energy that it returns for the subject's albedo
+        """
         return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
 
     def eye_pictures(self) -> EyeTextures | None:
@@ -103,10 +108,10 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, side: int, adapter: str) -> Subject:
-        """Return the subject with all maps of its head as arrays; itself if no map has to be painted.
+        """Return the subject with procedural maps of its head painted as arrays; itself if there are none.
 
         side : side of the maps, a power of two from 256 to 4096 [texel]
-        adapter : adapter that paints them
+        adapter : adapter that paints the maps
         """
         head = self.head
         if self.scene is None or head is None or not head.maps.is_painted:
@@ -118,7 +123,7 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return the maps of the head as PNG files: colour, normal, roughness, specular and height.
+        """Return the maps of the head as PNG files by role: colour, normal, roughness, specular and height.
 
         Colour is sRGB, and green of the normal points up. Roughness is Beckmann's m and specular the specular
         strength, both linear; height spans its range in 16 bits.
@@ -132,12 +137,12 @@ class Subject:
 def load_subject(
     source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
-    """Return the subject of a name or file.
+    """Return the skin or head with a name or in a file, with its reference profile.
 
     source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
     profile : skin of a head; by default a person's own pigments, or the default skin
-    model : model of the profile, see `reference_curve`
+    model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
 
     DermisError : for an unknown name, or an option that does not apply
@@ -166,12 +171,12 @@ def _load_skin(name: str, model: ModelName | None, head_options: Iterable[str]) 
 def reference_curve(
     skin: Skin, model: ModelName | None = None
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
-    """Return the cumulative profile of a skin, the name of its model, and its tissue.
+    """Return the cumulative reference profile of a skin, the name of its model, and its tissue.
 
     model : by default tabulated Monte Carlo for homogeneous media of the package, layered diffusion for other
         tissue, and the Gaussians themselves for a table of Gaussians
 
-    DermisError : for an unknown model, or a model of a table of Gaussians
+    DermisError : for an unknown model, or a model requested for a table of Gaussians
     """
     if model is not None and model not in MODELS:
         refuse("model", f"one of {', '.join(MODELS)}", f"got {format_value(model)}", "Choose one of them")
@@ -186,10 +191,10 @@ def reference_curve(
         return tabulated, "montecarlo", tissue
     used: ModelName = model or "layered"
     transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
-    return CumulativeProfile.from_radial_profile(_profile(tissue, used), transmitted), used, tissue
+    return CumulativeProfile.from_radial_profile(_model_profile(tissue, used), transmitted), used, tissue
 
 
-def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:
+def _model_profile(tissue: Tissue, model: ModelName) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model)
     from dermis.apps.truths.slab_mc import monte_carlo_profile

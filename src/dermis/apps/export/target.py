@@ -1,4 +1,4 @@
-"""Base classes of export targets, and the parameters that they export."""
+"""Base classes of export targets, and the named parameters that they write."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from dermis.apps.export.subject import Subject
 from dermis.base.errors import format_value, refuse
 from dermis.optics.cumulative_profile import CumulativeProfile
 
-Value = bool | int | float | str | tuple[float, ...]
+ParameterValue = bool | int | float | str | tuple[float, ...]
 T = TypeVar("T", bound="Target")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Parameter of a target.
+    """Named parameter of a program's skin material.
 
     name : name in the program
     value : number, (red, green, blue), switch or text
@@ -31,7 +31,7 @@ class Parameter:
     """
 
     name: str
-    value: Value
+    value: ParameterValue
     unit: str
     meaning: str
 
@@ -39,29 +39,29 @@ class Parameter:
 Parameters = tuple[Parameter, ...]
 
 
-def get_value(parameters: Parameters, name: str) -> Value:
+def get_value(parameters: Parameters, name: str) -> ParameterValue:
     """Return the value of the parameter with a given name."""
     return next(one.value for one in parameters if one.name == name)
 
 
 def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
-    """Return the value of the parameter with a given name as a tuple of numbers."""
+    """Return the value of a named parameter as a tuple of floats: one for a scalar, three for a colour."""
     value = get_value(parameters, name)
     return value if isinstance(value, tuple) else (float(value),)
 
 
-def replace_values(parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
-    """Return the parameters with some values replaced by name."""
+def replace_values(parameters: Parameters, values: Mapping[str, ParameterValue]) -> Parameters:
+    """Return the parameters with new values for those that are named in `values`."""
     return tuple(replace(one, value=values.get(one.name, one.value)) for one in parameters)
 
 
-def floats(values: ArrayLike) -> tuple[float, ...]:
-    """Return an array as a flat tuple of Python floats."""
+def flat_tuple(values: ArrayLike) -> tuple[float, ...]:
+    """Return an array as a flat tuple of Python floats, for parameters and text files."""
     return tuple(np.ravel(np.asarray(values, np.float64)).tolist())
 
 
 def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:
-    """Write files by name into a folder, and return their paths."""
+    """Write files, given as pairs of name and content, into a folder, and return their paths."""
     written = []
     for name, content in contents:
         written.append(folder / name)
@@ -215,7 +215,7 @@ class Target(ABC):
 
     @abstractmethod
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters that reproduce the subject best.
+        """Return the parameters for which the program's profile is closest to the reference profile.
 
         Parameters
         ----------
@@ -290,7 +290,7 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Target for which only a JSON file of parameters is written, not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters, not tested in the program."""
 
     suffixes = (".json", "")
     untested = True

@@ -1,1 +1,1 @@
-"""Export targets: one module or folder per program."""
+"""Export targets: one module or folder for each program."""

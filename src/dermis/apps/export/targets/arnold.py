@@ -1,7 +1,8 @@
-"""Export to Arnold's standard_surface as a table of parameters, by published documentation.
+"""Export to Arnold's standard_surface as a JSON file of parameters, by published documentation.
 
 The radius is the mean free path per channel in scene units, times the scale. The colour is converted to a
-single-scattering albedo, as in OpenPBR. The random walk is assumed to be in an index-matched medium.
+single-scattering albedo by the same formula as in OpenPBR. The random walk is assumed to be in an
+index-matched medium.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 
 from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import JsonTarget, Parameter, Parameters, floats, get_numbers
+from dermis.apps.export.target import JsonTarget, Parameter, Parameters, flat_tuple, get_numbers
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.half_space import half_space, tabulated_albedo
 from dermis.optics.media import Floats
@@ -20,7 +21,7 @@ _MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
 class Arnold(JsonTarget):
-    """Export of the parameters of standard_surface's random walk, for scenes in cm."""
+    """Export of the parameters of standard_surface with subsurface random walk, for scenes in cm."""
 
     name = "arnold"
     title = "Arnold"
@@ -31,16 +32,16 @@ class Arnold(JsonTarget):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the mean free paths of the homogeneous medium closest to the profile."""
+        """Return the mean free paths of the homogeneous medium whose profile is closest to the reference."""
         colour = subject.clipped_albedo(_MIN_ALBEDO)
         return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the width of a fitted Burley profile as the radius."""
+        """Return the width of a fitted Burley profile as the radius, which is a mean free path in Arnold."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of a random walk with the albedo that belongs to the colour."""
+        """Return the profile of a random walk whose single-scattering albedo is derived from the colour."""
         path = _MM_PER_CM * np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)
         colour = np.array(get_numbers(parameters, _COLOUR))
         curve = half_space("walk", tabulated_albedo("walk", colour), path)
@@ -51,8 +52,8 @@ def _parameters(colour: Floats, path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
-        Parameter(_COLOUR, floats(colour), "-", "diffuse reflectance"),
-        Parameter(_RADIUS, floats(path_mm / _MM_PER_CM), "cm", "mean free path"),
+        Parameter(_COLOUR, flat_tuple(colour), "-", "diffuse reflectance"),
+        Parameter(_RADIUS, flat_tuple(path_mm / _MM_PER_CM), "cm", "mean free path"),
         Parameter(_SCALE, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
         Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),
     )

@@ -1,4 +1,4 @@
-"""Export of a head's maps in its uv layout, with light before and after diffusion, as pictures."""
+"""Export of a head's maps as pictures in its uv layout, with irradiance before and after diffusion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from dermis.scene.settings import Settings
 Floats = NDArray[np.float32]
 Ranges = dict[str, str | float | list[float]]
 NormalY = Literal["up", "down"]
-SIDES = tuple(1 << k for k in range(8, 14))
+MAP_SIDES = tuple(1 << k for k in range(8, 14))
 """Supported sides of the maps [texel]."""
 _MAX_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
 _LOGGER = logging.getLogger("dermis")
@@ -47,11 +47,11 @@ _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
 @dataclass(frozen=True)
 class MapInfo:
-    """Properties of a map.
+    """Properties of an exported map.
 
-    unit : unit of the values in OpenEXR; "" for none
+    unit : unit of the texels in OpenEXR; "" for none
     png_encoding : encoding as PNG
-    description : meaning of the values
+    description : meaning of the texels, for the JSON file
     """
 
     unit: str
@@ -80,7 +80,7 @@ MAP_INFOS: Mapping[str, MapInfo] = MappingProxyType(
 
 
 class MapFolder(Target):
-    """Folder of maps: OpenEXR with linear values, PNG for viewing, and JSON with units and ranges."""
+    """Folder of maps: OpenEXR with linear values, PNG for viewing, and a JSON file with units and ranges."""
 
     name = "maps"
     title = "maps"
@@ -93,7 +93,7 @@ class MapFolder(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the format of the maps, and which of the two maps of light is to be displayed."""
+        """Return the size of the maps, the direction of green, and whether to display the diffused light."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter("normal_green", self._green, "-", "direction of green: towards row 0, or away from it"),
@@ -105,7 +105,7 @@ class MapFolder(Target):
         return replace_values(self.parameters(subject, version), {_SCATTERED: False})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the sum of Gaussians with which the renderer diffuses light, or no diffusion."""
+        """Return the profile of the renderer's sum of Gaussians, or a step at radius 0 without diffusion."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERED) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
@@ -113,12 +113,12 @@ class MapFolder(Target):
         return gaussian_curve(profile.variance_mm2, profile.weight, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write all maps of the scene."""
+        """Bake all maps of the scene and write them into the output folder."""
         if subject.scene is None:
             actual = f"got the skin {subject.name}"
             refuse("maps", "a head", actual, "Name a head, and the skin with --profile")
         scene, side = subject.scene, check_side(self.side)
-        settings = Settings(atlas=min(max(side, SIDES[0]), _MAX_ATLAS_SIDE))
+        settings = Settings(atlas=min(max(side, MAP_SIDES[0]), _MAX_ATLAS_SIDE))
         baked = bake_maps(Renderer(self.adapter), scene, settings, side)
         return write_files(output, map_files(baked, scene, self._green))
 
@@ -135,7 +135,7 @@ def encode_map_exr(name: str, values: Floats) -> bytes:
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
-    """Return the PNG levels of a map, and how to convert them to values."""
+    """Return the integer levels of a map for PNG, and the JSON entries by which they are decoded."""
     if encoding == "colour":
         return encode_srgb8(np.clip(values, 0.0, 1.0)), {"png": "sRGB"}
     if encoding == "light":
@@ -154,7 +154,10 @@ def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
 
 
 def orient_green(normal: Floats, normal_y: NormalY) -> Floats:
-    """Return normals whose green points towards row 0 ("up", OpenGL) or away from it ("down", DirectX)."""
+    """Return normals whose y, the green channel, points towards row 0 of the map or away from it.
+
+    normal_y : "up" for row 0, as in OpenGL, or "down" for the opposite, as in DirectX
+    """
     if normal_y == "up":
         return normal
     return normal * np.array([1.0, -1.0, 1.0], np.float32)
@@ -165,19 +168,27 @@ def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
 
 
 def check_side(side: object) -> int:
-    """Return the side of the maps [texel].
+    """Return the requested side of the maps [texel] if it is supported.
 
-    Raises DermisError if it is not one of `SIDES`.
+    Raises DermisError if it is not one of `MAP_SIDES`.
     """
-    if side not in SIDES or isinstance(side, bool):
+    if side not in MAP_SIDES or isinstance(side, bool):
         actual = f"got {side!r}"
-        refuse("size of the maps", f"a power of two from {SIDES[0]} to {SIDES[-1]}", actual, "Choose 2048")
+        refuse(
+            "size of the maps",
+            f"a power of two from {MAP_SIDES[0]} to {MAP_SIDES[-1]}",
+            actual,
+            "Choose 2048",
+        )
     assert isinstance(side, int)
     return side
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
-    """Return the maps of the skin in the scene's light, including its height map if there is one."""
+    """Return the skin's maps in the scene's light, with the height map if the head has one.
+
+    side : side of the maps [texel]
+    """
     baked = bake(renderer, scene, settings, side)
     painted = renderer.reopening_device.run(
         lambda: with_painted_maps(renderer.device, scene.head, min(max(side, MIN_SIDE), MAX_SIDE))
@@ -191,7 +202,7 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -
 
 
 def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Yield names and contents of the files, with the JSON last."""
+    """Yield name and content of each map's OpenEXR and PNG files, then of the JSON that describes them."""
     described: dict[str, Ranges] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked.maps:
@@ -206,13 +217,19 @@ def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tup
             picture, scale = quantise_map(values, info.png_encoding)
             yield f"{name}.png", encode_png(picture[..., None] if picture.ndim == 2 else picture, 6)
             described[name] |= scale
-    yield "maps.json", (json.dumps(_description(baked, scene, normal_y, described), indent=1) + "\n").encode()
+    yield (
+        "maps.json",
+        (json.dumps(_maps_description(baked, scene, normal_y, described), indent=1) + "\n").encode(),
+    )
 
 
-def _description(
+def _maps_description(
     baked: BakedMaps, scene: Scene, normal_y: NormalY, described: dict[str, Ranges]
 ) -> dict[str, object]:
-    """Return the content of the JSON file."""
+    """Return the description of all maps for maps.json: layout, lights, units and ranges.
+
+    described : unit, meaning, range and PNG encoding of each map, by name
+    """
     return {
         "format": "dermis maps 1",
         "made_by": f"dermis {version()}",
@@ -233,7 +250,10 @@ def _description(
 
 
 def resample(values: Floats, side: int) -> Floats:
-    """Return a map (h, w) resampled to another side by averaging, or by linear interpolation if enlarged."""
+    """Return a square map resampled from (h, w) by averaging, or by linear interpolation where enlarged.
+
+    side : side of the returned map [texel]
+    """
     height, width = values.shape
     while min(height, width) >= 2 * side and not (height | width) & 1:
         values = 0.25 * (values[0::2, 0::2] + values[1::2, 0::2] + values[0::2, 1::2] + values[1::2, 1::2])

@@ -1,7 +1,8 @@
 """Export to RenderMan: parameters of PxrSurface by its published documentation, not tested in RenderMan.
 
 The subsurface DMFP is the diffuse mean free path in mm times the unit length. In [ChristensenBurley2015], by
-the authors of the material, the lobe has the width d = dmfp / s(A), with s for diffuse mean free paths.
+the authors of the material, the Burley profile has the width d = dmfp / s(A), where A is the albedo and s
+Burley's factor for diffuse mean free paths.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 
 from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import JsonTarget, Parameter, Parameters, floats, get_numbers
+from dermis.apps.export.target import JsonTarget, Parameter, Parameters, flat_tuple, get_numbers
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import shape_factor_diffuse
 from dermis.optics.media import Floats
@@ -21,7 +22,7 @@ _MIN_ALBEDO = 1e-3
 
 
 class RenderMan(JsonTarget):
-    """Export of the parameters of PxrSurface with Burley's model (subsurfaceType 4), for scenes in mm."""
+    """Export of the parameters of PxrSurface with Burley's profile (subsurfaceType 4), for scenes in mm."""
 
     name = "renderman"
     title = "RenderMan"
@@ -32,16 +33,16 @@ class RenderMan(JsonTarget):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the diffuse mean free paths of Burley profiles fitted to the skin."""
+        """Return the diffuse mean free paths for which Burley's profile is closest to the reference."""
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
         return _parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the width of the Burley profiles used as the diffuse mean free path."""
+        """Return the widths d of the closest Burley profiles in place of diffuse mean free paths."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the paper's lobe."""
+        """Return the cumulative Burley profile whose width follows from the diffuse mean free paths."""
         path, path_colour, unit, colour = (
             np.array(get_numbers(parameters, name)) for name in (_PATH, _PATH_COLOUR, _UNIT, _COLOUR)
         )
@@ -52,9 +53,11 @@ def _parameters(albedo: Floats, path_mm: Floats) -> Parameters:
     longest = float(path_mm.max())
     return (
         Parameter("subsurfaceGain", 1.0, "-", "all diffuse light is scattered below the surface"),
-        Parameter(_COLOUR, floats(albedo), "-", "diffuse reflectance A"),
+        Parameter(_COLOUR, flat_tuple(albedo), "-", "diffuse reflectance A"),
         Parameter(_PATH, longest, "mm", "largest diffuse mean free path, s(A) d, of the channels"),
-        Parameter(_PATH_COLOUR, floats(path_mm / longest), "-", "each channel's relative to that, no gamma"),
+        Parameter(
+            _PATH_COLOUR, flat_tuple(path_mm / longest), "-", "each channel's relative to that, no gamma"
+        ),
         Parameter(_UNIT, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
     )
 

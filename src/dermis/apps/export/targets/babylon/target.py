@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, floats, get_numbers
+from dermis.apps.export.target import Parameter, Parameters, flat_tuple, get_numbers
 from dermis.apps.export.targets.pages.engine_page import EnginePage, LibraryFile, material_parameters
 from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -65,11 +65,11 @@ class Babylon(EnginePage):
         return _parameters(subject, k / d, WIDTH_ERROR / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the widths in mm as the colour, with metersPerUnit 1 for the scene in metres."""
+        """Return the Burley widths in mm as the colour, and metersPerUnit 1 for the scene in metres."""
         return _parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the shader's samples."""
+        """Return the cumulative profile of the discrete samples that the shader takes."""
         profile, (metres,) = get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)
         return spiral_curve(profile, metres, subject.curve.energy)
 
@@ -84,7 +84,7 @@ class Babylon(EnginePage):
 
 def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
     return (
-        Parameter(_PROFILE, floats(profile), "-", "inverse widths: smaller numbers diffuse farther"),
+        Parameter(_PROFILE, flat_tuple(profile), "-", "inverse widths: smaller numbers diffuse farther"),
         Parameter(_SCALE, metres, "m", "widths are 2 mm / (metersPerUnit colour), not a length of the scene"),
         *material_parameters(subject),
     )
@@ -93,7 +93,10 @@ def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
 def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are in mm for the scale given by metersPerUnit, without the error in width.
+    The radii are for metersPerUnit 1 and without the shader's width error: multiply them by `WIDTH_ERROR` /
+    metersPerUnit to get mm.
+
+    colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """
     s = np.asarray(colour, np.float64)
     i = np.arange(samples)
@@ -105,7 +108,10 @@ def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floa
 
 
 def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the radii that contain fractions of a Burley profile of width 1, and 1 / (r pdf(r))."""
+    """Return the radii r that contain given fractions of a Burley profile of width 1, and 1 / (r p(r)).
+
+    p(r) is the density of the light per radius; its inverse weights samples at these radii.
+    """
     u = 1.0 - np.asarray(fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
     n = g ** (-1.0 / 3.0)
@@ -114,9 +120,11 @@ def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> CumulativeProfile:
-    """Return the profile of the samples, averaged over all directions of an edge, in a scene in metres.
+    """Return the cumulative profile of the shader's samples, as if their spiral were turned to all angles.
 
-    metres : metersPerUnit
+    colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    metres : value of metersPerUnit
+    energy : (3,) total energy of the profile [-]
     """
     radii, _, weight = spiral_samples(colour)
     radii_mm = WIDTH_ERROR * radii / metres

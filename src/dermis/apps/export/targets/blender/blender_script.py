@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> None:
     set_world(EXPORT["world"], panorama and np.load(data_folder() / panorama, allow_pickle=False))
     set_camera(EXPORT["camera"])
     set_render(bpy.context.scene)
-    finish(options)
+    save_and_render(options)
 
 
 def parse_options(arguments: list[str]) -> argparse.Namespace:
@@ -63,7 +63,7 @@ def check_version() -> None:
 
 
 def data_folder() -> Path:
-    """Return the folder of the files beside this one; Blender's text editor runs a copy without a path."""
+    """Return the folder of the files beside this script; Blender's text editor runs a copy without a path."""
     texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
     folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
     name = EXPORT["head"] or EXPORT["world"].get("panorama")
@@ -78,7 +78,7 @@ def set_units(scene: Any) -> None:
 
 
 def place_head() -> None:
-    """Import the head from the file beside this one and set its skin, or add a ball."""
+    """Import the head's .glb beside this script and set its skin material, or add a ball if there is none."""
     if EXPORT["head"] is None:
         add_ball(EXPORT["ball_m"])
         return
@@ -93,7 +93,10 @@ def place_head() -> None:
 
 
 def add_ball(diameter: float) -> None:
-    """Add a ball with the skin."""
+    """Add a ball with the skin material.
+
+    diameter : diameter of the ball [m]
+    """
     import bmesh  # type: ignore[import-not-found,unused-ignore]  # exists after bpy is imported
 
     mesh, shape = bpy.data.meshes.new("ball"), bmesh.new()
@@ -106,7 +109,7 @@ def add_ball(diameter: float) -> None:
 
 
 def make_skin() -> Any:
-    """Return a skin material of one colour."""
+    """Return a new skin material of uniform colour, for the ball."""
     material = bpy.data.materials.new("skin")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
@@ -133,7 +136,7 @@ def set_skin(shader: Any) -> None:
 
 
 def set_render(scene: Any) -> None:
-    """Set the render engine, the size of the picture and its colours."""
+    """Set the render engine, the resolution and the colour management of the scene."""
     known = {item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items}
     eevee = "BLENDER_EEVEE_NEXT" if "BLENDER_EEVEE_NEXT" in known else "BLENDER_EEVEE"
     scene.render.engine = eevee if EXPORT["method"] == "EEVEE" else "CYCLES"
@@ -143,7 +146,7 @@ def set_render(scene: Any) -> None:
     scene.view_settings.view_transform = "Standard"
 
 
-def finish(options: argparse.Namespace) -> None:
+def save_and_render(options: argparse.Namespace) -> None:
     """Save and render the scene as requested."""
     scene = bpy.context.scene
     if scene.render.engine == "CYCLES":

@@ -1,4 +1,4 @@
-"""Files of an export to Blender: a script with its data, the head beside it, or a .blend.
+"""Files of an export to Blender: a Python script with the head as .glb beside it, or a .blend.
 
 Scenes are in metres with Z up.
 """
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps import truths
 from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.subject import BALL_MM, Subject
-from dermis.apps.export.target import Parameters, floats
+from dermis.apps.export.target import Parameters, flat_tuple
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.truths.cycles import cycles_camera
 from dermis.apps.truths.lights import CYCLES, cycles_lamp
@@ -31,7 +31,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-Versions = tuple[list[int], list[int] | None]
+VersionRange = tuple[list[int], list[int] | None]
 """First version for which the parameters are valid, and the first for which they are not, or None."""
 SCRIPT, HEAD, PANORAMA = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
@@ -56,25 +56,28 @@ _MAIN_GUARD = 'if __name__ == "__main__":'
 
 
 def write_scene(
-    subject: Subject, parameters: Parameters, output: Path, method: str, versions: Versions
+    subject: Subject, parameters: Parameters, output: Path, method: str, versions: VersionRange
 ) -> list[Path]:
-    """Write the files of a subject to the output of `Target.write`, and return their paths.
+    """Write the script or .blend of a subject to the output of `Target.write`, and return the paths.
 
-    method : subsurface method of the Principled BSDF, or EEVEE
+    method : subsurface method of the Principled BSDF, or "EEVEE"
+    versions : versions of Blender in which the parameters are valid: first one, and the first one after them
     """
     skin = _describe_skin(subject, parameters, method, versions)
     if output.suffix == ".blend":
         python = blender_python()
         with TemporaryDirectory(prefix="dermis-blender-") as name:
-            script = _write(subject, skin, Path(name) / SCRIPT, HEAD)[0]
+            script = _write_script_files(subject, skin, Path(name) / SCRIPT, HEAD)[0]
             run_blender(python, script, ["--", "--save", str(output)], _TIMEOUT_S, _TASK)
         return [output]
     if output.suffix == ".py":
-        return _write(subject, skin, output, f"{output.stem}.glb")
-    return _write(subject, skin, output / SCRIPT, HEAD)
+        return _write_script_files(subject, skin, output, f"{output.stem}.glb")
+    return _write_script_files(subject, skin, output / SCRIPT, HEAD)
 
 
-def _describe_skin(subject: Subject, parameters: Parameters, method: str, versions: Versions) -> SceneDict:
+def _describe_skin(
+    subject: Subject, parameters: Parameters, method: str, versions: VersionRange
+) -> SceneDict:
     skin = subject.skin
     values = {one.name: one.value for one in parameters if one.name != "Subsurface Method"}
     inputs = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
@@ -84,7 +87,7 @@ def _describe_skin(subject: Subject, parameters: Parameters, method: str, versio
         "versions": list(versions),
         "method": method,
         "inputs": inputs | {"Specular IOR Level": 0.5 * skin.strength},
-        "colour": list(floats(subject.clipped_albedo())),
+        "colour": list(flat_tuple(subject.clipped_albedo())),
         "roughness": float(np.sqrt(skin.roughness)),
         "smoother": float(np.sqrt(skin.smoothing * _GGX_RATIO)),
         "ball_m": BALL_MM * METRES_PER_MM,
@@ -94,8 +97,8 @@ def _describe_skin(subject: Subject, parameters: Parameters, method: str, versio
     }
 
 
-def _write(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[Path]:
-    """Write the script and the files that it reads beside it."""
+def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[Path]:
+    """Write the script, and the head and panorama that it reads beside it; return all paths."""
     files, scene = [script], subject.scene
     if scene is None:
         scene_dict, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
@@ -123,15 +126,17 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
 
 
 def skin_slots(head: Head) -> list[int]:
-    """Return the indices of the skin's materials in the written file, which omits unused materials."""
+    """Return the indices of skin materials in the .glb, which omits materials that no triangle uses."""
     used = np.unique(head.mesh.material)
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
 def script_text(export: Mapping[str, object]) -> str:
-    """Return the script with its data: numbers, texts, lists and tables of them.
+    """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
-    Texts are written as Python literals, so a name cannot become code.
+    As texts are written as literals, a name cannot become code.
+
+    export : numbers, texts, and nested lists and dictionaries of them
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
@@ -155,9 +160,9 @@ def _ball_scene(ball: Head) -> Scene:
 
 
 def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
-    """Return the lights, camera and world for the script, and the panorama of the world.
+    """Return the lights, camera and world for the script, and the panorama of the environment or None.
 
-    centre_mm : (3,) point relative to which they are positioned
+    centre_mm : (3,) point that becomes the origin of the exported scene [mm]
 
     Raises DermisError for lights and cameras that Blender does not support.
     """
@@ -174,14 +179,14 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
 
 def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
-    """Convert a transformation to Blender's coordinates: Z up, in metres."""
+    """Convert a transformation from Y up in mm to Blender's coordinates: Z up, in metres."""
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
     return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
 
 
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
-    """Convert a lamp to Blender's coordinates: Z up, in metres."""
+    """Convert the description of a lamp from Y up in mm to Blender's coordinates: Z up, in metres."""
     fields = dict(lamp["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":

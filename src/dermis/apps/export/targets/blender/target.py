@@ -1,4 +1,4 @@
-"""Formulas and profiles of the subsurface methods of Cycles and EEVEE.
+"""Export to Blender: formulas and profiles of the subsurface methods of Cycles and EEVEE.
 
 They follow the kernel source of Blender 4.5, 5.0 and 5.2, which is part of each release.
 """
@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.export.fitting import fit_length_scale
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, get_numbers
-from dermis.apps.export.targets.blender.files import Versions, write_scene
+from dermis.apps.export.targets.blender.files import VersionRange, write_scene
 from dermis.base.tables import read_rows
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA
 
 Floats = NDArray[np.float64]
-Entry = Literal["straight", "skin"]
+WalkEntry = Literal["straight", "skin"]
 
 BURLEY_CUTOFF, BURLEY_CUTOFF_CDF = 16.0, 0.9963790093708328
 """Radius at which Cycles truncates Burley's profile [d], and the fraction of light within it [-]."""
@@ -34,7 +34,7 @@ Cdf = Callable[[Floats], Floats]
 _RADIUS, _SCALE = "Subsurface Radius", "Subsurface Scale"
 _METRES_PER_MM = 1e-3
 _4_PI = 4.0 * np.pi
-JENSEN_MM = 3.67, 1.37, 0.68
+JENSEN_DMFP_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
 _FIRST_VERSION = 4, 5
 _MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
@@ -42,7 +42,9 @@ _FAR_RADIUS = 1e9
 
 
 def burley_cdf(radius: ArrayLike) -> Floats:
-    """Return the fraction of light within radii [d] of Burley's profile as truncated by Cycles [-].
+    """Return the fraction of light within radii of Burley's profile as truncated by Cycles [-].
+
+    radius : radii in units of the profile's width d
 
     Source: [ChristensenBurley2015].
     """
@@ -51,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(colour: ArrayLike) -> Floats:
-    """Return the factor s(A) (3,) by which EEVEE divides the radius [-].
+    """Return Burley's factor s(A) (3,), by which EEVEE divides the radius for the profile's width [-].
 
     colour : (3,) base colour; A is the colour divided by its brightest channel
 
@@ -63,7 +65,7 @@ def burley_shape_factor(colour: ArrayLike) -> Floats:
 
 
 def legacy_albedo(colour: ArrayLike) -> Floats:
-    """Return the single-scattering albedo of a colour by the polynomials of Cycles before 5.2 [-]."""
+    """Return the single-scattering albedo for a base colour, as fitted in Cycles before 5.2 [-]."""
     A = np.asarray(colour, np.float64)
     blend = A**0.25
     dim = 1.8260523782 * np.arctan(5.112467903288 * A) ** 1.09686102424
@@ -72,18 +74,20 @@ def legacy_albedo(colour: ArrayLike) -> Floats:
 
 
 def hulst_albedo(colour: ArrayLike) -> Floats:
-    """Return the single-scattering albedo of a colour by van de Hulst's formula, as in Cycles 5.2 [-]."""
+    """Return the single-scattering albedo for a base colour by van de Hulst's formula, as in Cycles 5.2."""
     C = np.asarray(colour, np.float64)
     s = 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2) + 4.09712
     return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
 def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
-    """Return the ratio of mean free path to radius of RANDOM_WALK_SKIN [-].
+    """Return the mean free path divided by the radius, for the method RANDOM_WALK_SKIN of Cycles [-].
 
-    The radius is a diffuse mean free path; the albedo is the one whose dipole reflectance is the colour.
+    Cycles takes the radius as a diffuse mean free path, and the albedo whose dipole reflectance is the
+    colour.
 
-    eta : Subsurface IOR
+    colour : base colour
+    eta : value of Subsurface IOR
 
     Source: [Jensen2001].
     """
@@ -105,12 +109,12 @@ def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
     return np.asarray(0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * A * root)) * np.exp(-root))
 
 
-def walk_cdf(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
-    """Return the fraction of the incident light that a random walk returns within radii [-].
+def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
+    """Return the fraction of the incident light that Cycles' random walk returns within given radii [-].
 
     radius : radii [mean free paths]
     albedo : single-scattering albedo [-]
-    entry : "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
+    entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
     radii, within = _interpolate_albedo(round(walk_albedo, 7), entry)
@@ -121,19 +125,25 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: Entry) -> Floats:
 
 
 @cache
-def _interpolate_albedo(albedo: float, entry: Entry) -> tuple[Floats, Floats]:
-    """Return closely spaced radii [mean free paths], and the fraction of light within them [-]."""
+def _interpolate_albedo(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
+    """Return radii [mean free paths] and the fraction of light within each [-], for one albedo.
+
+    The table is interpolated to this albedo and to radii that are eight times as dense.
+    """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, within = _load_table()[entry]
+    roots, radii, within = _load_walk_table()[entry]
     fraction = PchipInterpolator(roots, within, axis=0)(np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1]))
     fine = np.geomspace(radii[0], radii[-1], 8 * len(radii))
     return fine, np.asarray(PchipInterpolator(np.log(radii), fraction)(np.log(fine)))
 
 
 @cache
-def _load_table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
-    """Return roots (n,), radii (m,) [mean free paths] and fractions (n, m) by entry."""
+def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
+    """Return the tabulated random walks of Cycles by entry: sqrt(1 - albedo), radii, and fractions of light.
+
+    Their shapes are (n,), (m,) [mean free paths] and (n, m) [-].
+    """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
         numbers = [float(row[name]) for name in ("root", "radius", "within")]
@@ -143,18 +153,18 @@ def _load_table() -> dict[Entry, tuple[Floats, Floats, Floats]]:
         columns = np.array(rows)
         roots, radii = np.unique(columns[:, 0]), np.unique(columns[:, 1])
         table[entry] = roots, radii, columns[:, 2].reshape(len(roots), len(radii))
-    return table  # type: ignore[return-value]  # the keys are values of `Entry`
+    return table  # type: ignore[return-value]  # the keys are values of `WalkEntry`
 
 
 class RandomWalk(NamedTuple):
-    """Random walk of Cycles for one colour.
+    """Random walk of Cycles for one channel of a base colour.
 
     albedo : single-scattering albedo [-]
-    entry : how the walk enters the medium
+    entry : direction in which light enters: "straight" along the normal, or "skin" for RANDOM_WALK_SKIN
     """
 
     albedo: float
-    entry: Entry
+    entry: WalkEntry
 
     def cdf(self, radius: Floats) -> Floats:
         """Return the fraction of the returned light within radii [mean free paths]."""
@@ -182,18 +192,18 @@ class Blender(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the radius for which the method's profile is closest to the reference."""
+        """Return the subsurface radius for which the method's profile is closest to the reference."""
         units = self._unit_cdfs(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
         radius = fitted / self._unit_lengths(subject, version)
         return self._parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths of skin as the radius."""
-        return self._parameters(JENSEN_MM, version)
+        """Return published diffuse mean free paths of skin as the subsurface radius."""
+        return self._parameters(JENSEN_DMFP_MM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile by the formulas of Cycles' kernel and EEVEE's shader."""
+        """Return the cumulative profile by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
@@ -205,15 +215,15 @@ class Blender(Target):
         return CumulativeProfile.from_function(within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a script with its files, or the .blend that the script saves.
+        """Write the Python script with the head and maps that it reads, or the .blend that the script saves.
 
         Raises DermisError for a .blend if DERMIS_BLENDER_PYTHON does not name a Python with bpy.
         """
         method = self.variant.replace("-", "_").upper()
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
-    def _valid_versions(self, version: str) -> Versions:
-        """Return the versions for which the parameters are valid."""
+    def _valid_versions(self, version: str) -> VersionRange:
+        """Return the first version in which the parameters are valid, and the next that changes them."""
         if self.variant != "random-walk":
             return list(_FIRST_VERSION), None
         return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
@@ -243,7 +253,7 @@ class Blender(Target):
         }[self.variant]
 
     def _unit_lengths(self, subject: Subject, version: str) -> Floats:
-        """Return d or the mean free path (3,) of each channel, for a radius of 1."""
+        """Return the Burley width or mean free path (3,) that Blender derives from a radius of 1."""
         if self.variant == "random-walk":
             return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
@@ -258,7 +268,7 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return the cumulative profile of each channel, for a length of 1."""
+        """Return each channel's cumulative profile as a function of r/d, or of r over the mean free path."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]
@@ -272,7 +282,7 @@ class Blender(Target):
 
 
 def _is_mfp(version: str) -> bool:
-    """Return whether the radius of a random walk is a mean free path in a version."""
+    """Return whether this version of Blender treats the radius of a random walk as a mean free path."""
     return tuple(map(int, version.split("."))) >= _MFP_VERSION
 
 

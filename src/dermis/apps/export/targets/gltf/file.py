@@ -1,4 +1,4 @@
-"""Encoding of the exported .glb file."""
+"""Encoding of a skin or head as a .glb file with material extensions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _STEPS = 1024
 def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
     """Return the .glb of the head, or of a ball, with its eyes, hairs, morph targets and bones.
 
-    extensions : extensions of the skin's material by name
-    draft : name of an extension that is not ratified; "" for none
+    extensions : JSON of each extension of the skin's material, by name
+    draft : name of an extension that is not ratified, to mark it in the file; "" for none
     """
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft} if draft else {}
@@ -43,7 +43,10 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
 
 
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
-    """Return additions to the skin's material, including a map of scattering colours for a colour map."""
+    """Return the skin material's extensions and uniform colour, and a map of multiscatter colours.
+
+    The map replaces the multiscatter factor in the draft extension if the head has a colour map.
+    """
     if not draft:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
         return SkinAdditions({} if head.maps.colour is not None else colour, extensions)

@@ -1,4 +1,4 @@
-"""Export to glTF: a .glb whose skin scatters light (draft extension) or transmits it (ratified one)."""
+"""Export to glTF: a .glb whose skin scatters light (draft extension) or transmits it (ratified extension)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, Value, floats, get_numbers
+from dermis.apps.export.target import Parameter, Parameters, ParameterValue, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.gltf.file import encode_glb
 from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_curve
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -45,13 +45,13 @@ class Gltf(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the volume whose random walk is closest to the profile, or the transmission of an ear."""
+        """Return the volume whose random walk is closest to the reference, or the transmission of an ear."""
         if self.variant == DIFFUSE:
-            return _diffuse_parameters(subject, *_transmission(subject))
+            return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for every colour, and the mean radius of the light for the distance."""
+        """Return the skin's colour for every colour, and the mean exit radius of light for the distance."""
         if self.variant == DIFFUSE:
             return _diffuse_parameters(subject, _NAIVE_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -59,15 +59,17 @@ class Gltf(Target):
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume; without scattering, light leaves where it arrives."""
+        """Return the profile of the volume; for transmission only, light leaves where it enters."""
         if self.variant == DIFFUSE:
             reflected = (1.0 - get_numbers(parameters, _FACTOR)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a .glb file whose skin has the extensions, none of which is required."""
-        extensions: dict[str, dict[str, Value | list[float]]] = {"KHR_materials_ior": {"ior": SKIN_ETA}}
+        """Write a .glb file whose skin material has the extensions as optional ones."""
+        extensions: dict[str, dict[str, ParameterValue | list[float]]] = {
+            "KHR_materials_ior": {"ior": SKIN_ETA}
+        }
         for one in parameters:
             extension, _, member = one.name.partition(".")
             if extension.startswith("KHR_"):
@@ -78,12 +80,14 @@ class Gltf(Target):
 
 
 def _scatter_parameters(volume: Volume) -> Parameters:
-    multiscatter = floats(volume.multiscatter)
+    multiscatter = flat_tuple(volume.multiscatter)
     return (
         Parameter("KHR_materials_transmission.transmissionFactor", 1.0, "-", "all light enters the volume"),
         Parameter("KHR_materials_volume.thicknessFactor", _THICKNESS_M, "m", "above 0 enables the volume"),
         Parameter(_DISTANCE, volume.distance_m, "m", "the largest mean free path"),
-        Parameter(_COLOUR, floats(volume.colour), "-", "fraction of the light without an event on that path"),
+        Parameter(
+            _COLOUR, flat_tuple(volume.colour), "-", "fraction of the light without an event on that path"
+        ),
         Parameter("KHR_materials_scatter.scatterStrengthFactor", 1.0, "-", "factor of the colour below"),
         Parameter(_MULTISCATTER, multiscatter, "-", "by van de Hulst's formula, or a map"),
         Parameter("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean free paths are reduced ones"),
@@ -92,17 +96,21 @@ def _scatter_parameters(volume: Volume) -> Parameters:
 
 
 def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Parameters:
-    """Return the parameters of the variant without scattering: colours and the transmitted fraction."""
+    """Return the parameters of the variant that transmits without scattering.
+
+    factor : fraction of the diffuse light that is transmitted [-]
+    colour : (3,) colour of the transmitted light
+    """
     return (
-        Parameter(_BASE, floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
+        Parameter(_BASE, flat_tuple(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
         Parameter(_FACTOR, float(factor), "-", f"transmitted fraction at {_EAR_MM:g} mm, as of an ear"),
-        Parameter(_TRANSMISSION_COLOUR, floats(colour), "-", "colour of the transmitted light"),
+        Parameter(_TRANSMISSION_COLOUR, flat_tuple(colour), "-", "colour of the transmitted light"),
         _IOR,
     )
 
 
-def _transmission(subject: Subject) -> tuple[float, Floats]:
-    """Return the transmitted fraction of the light that leaves an ear on both sides, and its colour.
+def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
+    """Return which fraction of the light leaving an ear does so on its far face [-], and its colour (3,).
 
     Source: [ChristensenBurley2015], integrated over a plane at a depth.
     """

@@ -1,4 +1,4 @@
-"""Scattering volume of glTF: a random walk under a refracting surface, inverted as in the draft extension."""
+"""Conversion between media and glTF's scattering volume: a random walk under a refracting surface."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ _MAX_COLOUR = 1.0 - 1e-12
 
 
 class Volume(NamedTuple):
-    """Parameters of KHR_materials_volume and KHR_materials_scatter that determine the profile.
+    """Parameters of KHR_materials_volume and KHR_materials_scatter that determine the diffusion profile.
 
-    distance_m, colour : attenuationDistance [m] and attenuationColor (3,)
-    multiscatter : multiscatterColorFactor (3,) [-]
+    distance_m, colour : attenuationDistance [m], and attenuationColor (3,): the transmittance over this
+        distance
+    multiscatter : (3,) multiscatterColorFactor: diffuse reflectance of the medium without its surface [-]
     """
 
     distance_m: float
@@ -29,19 +30,24 @@ class Volume(NamedTuple):
 
     @property
     def mean_free_path_mm(self) -> Floats:
-        """Return the mean free paths (3,) [mm]."""
+        """Return the mean free paths (3,) that follow from the attenuation [mm]."""
         return np.asarray(1e3 * self.distance_m / -np.log(np.clip(self.colour, _MIN_COLOUR, _MAX_COLOUR)))
 
 
 def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
-    """Return the volume of mean free paths (3,) [mm]; its distance is the largest of them."""
+    """Return the volume with given mean free paths (3,) [mm]; its distance is the longest of them.
+
+    multiscatter : (3,) multiscatter colour [-]
+    """
     path = np.asarray(mean_free_path_mm, np.float64)
     longest = float(path.max())
     return Volume(1e-3 * longest, np.exp(-longest / path), np.asarray(multiscatter, np.float64))
 
 
-def single_scattering(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Floats:
-    """Return the single-scattering albedo of a multiscatter colour by van de Hulst's formula [-].
+def single_scattering_albedo(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Floats:
+    """Return the single-scattering albedo for a multiscatter colour by van de Hulst's formula [-].
+
+    anisotropy : mean cosine of the scattering angle [-]
 
     Source: [dEon2016] equation 53.7, as used by KHR_materials_scatter.
     """
@@ -51,25 +57,29 @@ def single_scattering(multiscatter: ArrayLike, anisotropy: float = 0.0) -> Float
 
 
 def multiscatter_colour(albedo: ArrayLike) -> Floats:
-    """Return the multiscatter colour of an isotropic single-scattering albedo [-]."""
+    """Return the multiscatter colour for a single-scattering albedo with isotropic scattering [-].
+
+    This is the inverse of `single_scattering_albedo`.
+    """
     s = np.sqrt(np.clip(1.0 - np.asarray(albedo, np.float64), 0.0, 1.0))
     return np.asarray((1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s))
 
 
 def multiscatter_for_reflectance(energy: ArrayLike) -> Floats:
-    """Return the multiscatter colour for which a fraction (...,) of the entering light leaves again [-]."""
+    """Return the multiscatter colour with which skin returns a given fraction of the entering light [-]."""
     return multiscatter_colour(tabulated_albedo("skin", energy))
 
 
 def volume_curve(volume: Volume) -> CumulativeProfile:
-    """Return the cumulative profile of a volume."""
-    return half_space("skin", single_scattering(volume.multiscatter), volume.mean_free_path_mm)
+    """Return the cumulative profile of the light that a volume returns through its surface."""
+    return half_space("skin", single_scattering_albedo(volume.multiscatter), volume.mean_free_path_mm)
 
 
 def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume:
-    """Return the volume whose cumulative profile is closest to a curve.
+    """Return the volume whose cumulative profile is closest to a reference profile.
 
-    energy : (3,) total energy of the volume, by default that of the curve [-]
+    curve : reference profile
+    energy : (3,) light that the volume returns per incident light, by default that of `curve` [-]
     """
     medium = fit_homogeneous_medium(curve, energy)
     return volume_from_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

@@ -21,10 +21,10 @@ _SUBDIVISIONS = 4  # parts of each edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
-    """Return PLY files of the skin by name of the shape, relative to the head's centre [mm].
+    """Return the skin's surfaces as PLY files by shape name, relative to the head's centre [mm].
 
     "skin" has normals and uv, and "caps" closes its openings. "upper" and "upper_caps" are slightly outside;
-    they are the second layer of a matched surface.
+    they are the outer layer of the index-matched surface.
 
     Raises DermisError if the skin does not enclose a volume.
     """
@@ -47,11 +47,11 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
 
 
 class SubdividedTriangles(NamedTuple):
-    """Triangles that are subdivided evenly.
+    """Triangles of a mesh, each divided evenly into smaller ones.
 
-    triangle : (n,) original triangle of each new vertex
-    weights : (n, 3) barycentric weights of each new vertex in that triangle
-    corners : (m, 3) vertices of the new triangles
+    triangle : (n,) index of the original triangle in which each new vertex is
+    weights : (n, 3) barycentric weights of each new vertex in that original triangle
+    corners : (m, 3) indices of the new vertices in each new triangle
     """
 
     triangle: NDArray[np.int64]
@@ -60,9 +60,10 @@ class SubdividedTriangles(NamedTuple):
 
 
 def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) -> SubdividedTriangles:
-    """Divide each triangle into n^2 smaller ones, without vertices shared between original triangles.
+    """Divide each triangle into n^2 smaller ones, without sharing vertices between original triangles.
 
-    triangles : (t,) numbers of the triangles
+    triangles : (t,) indices of the original triangles
+    n : number of pieces of each edge
     """
     grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
@@ -77,7 +78,7 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
-    """Return PLY files of all materials except skin by index, relative to the head's centre [mm].
+    """Return a PLY file for each material except skin, by material index, relative to the head's centre [mm].
 
     Triangles are subdivided and have a colour per vertex instead of maps.
     """

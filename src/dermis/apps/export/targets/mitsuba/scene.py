@@ -1,4 +1,4 @@
-"""Scene of Mitsuba as files; `mitsuba scene.xml -D boundary=rough` renders it with another skin surface."""
+"""Files of a Mitsuba scene; `mitsuba scene.xml -D boundary=rough` selects the surface of the skin."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
 
 
 class IsotropicMedium(NamedTuple):
-    """Medium with isotropic scattering.
+    """Homogeneous medium with isotropic scattering.
 
-    sigma_t : (3,) extinction [1/mm]
+    sigma_t : (3,) extinction coefficient [1/mm]
     albedo : (3,) single-scattering albedo [-]
     """
 
@@ -42,13 +42,15 @@ class IsotropicMedium(NamedTuple):
 
 
 class SkinAppearance(NamedTuple):
-    """Media, surface and textures of the skin.
+    """Media and textures of the skin, and the meshes of the head's other materials.
 
-    media : medium for each kind of surface
-    roughness : Beckmann m, a number or (n, n)
-    transmittance : (n, n, 3) transmittance of a refracting surface in each direction; None for uniform skin
-    dimming : (n, n) fraction of the leaving light that a matched surface absorbs; None for uniform skin
-    opaque : PLY files of other materials by index
+    media : medium of the skin for each surface model in `BOUNDARIES`
+    roughness : Beckmann m, a number or a map (n, n)
+    transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
+        for uniform skin
+    dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
+        skin
+    opaque : PLY file of each other material, by material index
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -61,16 +63,23 @@ class SkinAppearance(NamedTuple):
 def scene_files(
     scene: Scene, appearance: SkinAppearance, boundary: Boundary, size: tuple[int, int], samples: int
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield names and contents of the files, with the scene first.
+    """Yield name and content of each file of the scene, with scene.xml first.
+
+    boundary : surface model of the skin that scene.xml selects by default
+    size : width and height of the picture [pixel]
+    samples : samples per pixel
 
     Raises DermisError for what Mitsuba does not support: lights without shadows, cameras with shifted lenses,
     and skin that does not enclose a volume.
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
-    yield "scene.xml", xml.document(_scene_elements(backend, scene, appearance, boundary, (*size, samples)))
+    yield (
+        "scene.xml",
+        xml.scene_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples))),
+    )
     for each in BOUNDARIES:
-        yield f"boundary_{each}.xml", xml.document(_skin_elements(backend, each, appearance, meshes))
+        yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
@@ -84,7 +93,7 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return a homogeneous medium [mm], with the largest extinction as its scale."""
+    """Return Mitsuba's description of a homogeneous medium [mm], with the largest extinction as its scale."""
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -99,9 +108,10 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_description(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return the surface of the skin for light from outside.
+    """Return Mitsuba's description of the skin's surface, which for index-matched skin is the outer layer.
 
-    transmittance : texture of the transmittance in each direction; None for 1
+    boundary : surface model of the skin
+    transmittance : texture that scales light on entry and again on exit; None for 1
     roughness : Beckmann m, a number or a texture
     """
     facets = {"distribution": "beckmann", "alpha": roughness}
@@ -117,7 +127,10 @@ def surface_description(
 
 
 def _lower_surface(dimmed: bool) -> SceneDict:
-    """Return the inner layer of a matched surface, which dims leaving light by the lightness of the skin."""
+    """Return the inner layer of an index-matched surface, which absorbs leaving light where skin is darker.
+
+    dimmed : whether the skin has a texture of the absorbed fraction
+    """
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
@@ -131,8 +144,9 @@ def _scene_elements(
     boundary: Boundary,
     picture: tuple[int, int, int],
 ) -> list[ET.Element]:
-    """Return all elements of the scene except the skin.
+    """Return the XML elements of camera, lights and other materials, and the inclusion of the skin's file.
 
+    boundary : surface model of the skin that is included by default
     picture : width and height [pixel], and samples per pixel
     """
     sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
@@ -151,14 +165,17 @@ def _scene_elements(
     for index in appearance.opaque:
         parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": opaque})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
-    elements = [xml.element(part, "", backend) for part in parts]
+    elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
 
 
 def _skin_elements(
     backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, meshes: Mapping[str, bytes]
 ) -> list[ET.Element]:
-    """Return the elements of the skin with one kind of surface."""
+    """Return the XML elements of the skin with one surface model: medium, surface and shapes.
+
+    meshes : PLY files of the skin's surfaces by shape name
+    """
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
     transmittance = None if appearance.transmittance is None else _texture("passing")
     parts = [
@@ -174,7 +191,7 @@ def _skin_elements(
     for name in (name for name in shapes if name in meshes):
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
         parts.append({**shape, "interior": xml.Ref("skin_medium")})
-    return [xml.element(part, "", backend) for part in parts]
+    return [xml.object_element(part, "", backend) for part in parts]
 
 
 def _opaque_file(index: int) -> str:

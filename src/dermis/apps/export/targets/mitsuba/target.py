@@ -1,8 +1,8 @@
-"""Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as it has no diffusion profiles.
+"""Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as Mitsuba has no diffusion profiles.
 
-A surface of index 1.4 around the medium corresponds to tissue. Light through it is found by random rays only,
-so an environment and area lights work. Point and spot lights need the index-matched surface, whose medium
-differs.
+A refracting surface of index 1.4 around the medium corresponds to tissue. Light through it is found by random
+rays only, so an environment and area lights work. Point and spot lights need the index-matched surface, for
+which another medium is fitted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dermis.apps.export.target import (
     Parameter,
     Parameters,
     Target,
-    floats,
+    flat_tuple,
     get_numbers,
     replace_values,
     write_files,
@@ -62,7 +62,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium closest to the profile for the brightest skin; textures dim the others."""
+        """Return the medium closest to the reference for the lightest skin, which textures then darken."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -75,13 +75,16 @@ class Mitsuba(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as albedo, and 1/d as extinction."""
-        extinction, albedo = floats(1.0 / fit_burley_width(subject.curve)), floats(subject.clipped_albedo())
+        """Return the skin's colour as albedo, and 1/d of a fitted Burley profile as extinction."""
+        extinction, albedo = (
+            flat_tuple(1.0 / fit_burley_width(subject.curve)),
+            flat_tuple(subject.clipped_albedo()),
+        )
         values = {_SIGMA: extinction, _ALBEDO: albedo, _TRANSMITTANCE: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of random walks through the medium, for light along the normal."""
+        """Return the profile of random walks through the medium, for light incident along the normal."""
         boundary = self._boundary
         names = _SIGMA, _ALBEDO, _TRANSMITTANCE
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
@@ -93,10 +96,12 @@ class Mitsuba(Target):
         return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the scene with one file per surface, meshes and textures."""
+        """Write the scene with one XML file for each surface model, and its meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        appearance = SkinAppearance(media, *textures(subject, colours), _opaque_meshes(scene, self.adapter))
+        appearance = SkinAppearance(
+            media, *skin_textures(subject, colours), _opaque_meshes(scene, self.adapter)
+        )
         return write_files(output, scene_files(scene, appearance, self._boundary, _SIZE, _SAMPLES))
 
     @property
@@ -105,16 +110,19 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium under a surface that is closest to a curve, as bright as the brightest skin.
+    """Return the medium whose profile under a surface is closest to `curve`, as bright as the lightest skin.
 
     Heads are lit from all directions. Under a matched surface, oblique light returns up to a quarter more
     light than light along the normal; refraction removes this difference.
+
+    curve : reference profile
+    boundary : surface model of the skin
     """
     energy = colours.medium_colour(boundary) / _boundary_factor(boundary)
     if boundary == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
     medium = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
-    return IsotropicMedium(floats(1.0 / medium.mfp_mm), floats(medium.albedo))
+    return IsotropicMedium(flat_tuple(1.0 / medium.mfp_mm), flat_tuple(medium.albedo))
 
 
 def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
@@ -122,12 +130,12 @@ def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_factor(boundary: Boundary) -> float:
-    """Return the light that enters a matched surface, relative to the reference."""
+    """Return the fraction of light that a matched surface transmits, or 1 for a refracting surface [-]."""
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
 def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
-    """Return the PLY files of the head's other materials."""
+    """Return a PLY file for each of the head's materials except skin, by material index."""
     if all(material.kind == "skin" for material in scene.head.mesh.materials):
         return {}
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
@@ -138,7 +146,7 @@ def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
 
 @dataclass(frozen=True, eq=False)
 class SkinColours:
-    """Colours of a skin: the medium has the brightest one, and textures dim it.
+    """Colours of a skin: the medium gets the brightest one, and textures dim it to the others.
 
     mean, peak : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
     lightness_ratio : luminance of the lightest texels relative to the mean [-]
@@ -149,12 +157,16 @@ class SkinColours:
     lightness_ratio: float
 
     def medium_colour(self, boundary: Boundary) -> Floats:
-        """Return the colour (3,) of the medium alone; matched surfaces change the lightness only."""
+        """Return the colour (3,) of the medium without textures.
+
+        Under a matched surface, textures can only change lightness, so the colour is the mean at peak
+        luminance.
+        """
         return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.peak, 0.97)
 
     def transmittance(self, boundary: Boundary) -> tuple[float, ...]:
-        """Return the mean transmittance (3,) of the textures, both ways [-]."""
-        return floats(self.mean / self.medium_colour(boundary))
+        """Return the mean factor (3,) by which the textures dim light that enters and leaves the skin [-]."""
+        return flat_tuple(self.mean / self.medium_colour(boundary))
 
 
 def skin_colours(subject: Subject) -> SkinColours:
@@ -172,12 +184,15 @@ def skin_colours(subject: Subject) -> SkinColours:
 
 
 def mean_roughness(subject: Subject) -> float:
-    """Return Beckmann's m of skin without a roughness map."""
+    """Return the Beckmann roughness m of the skin where no roughness map sets it."""
     return float(subject.skin.smoothing * subject.skin.roughness)
 
 
-def textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:
-    """Return roughness, transmittance of a refracting surface, and dimming of a matched one."""
+def skin_textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:
+    """Return the skin's roughness, transmittance for refracting surfaces, and dimming for matched ones.
+
+    Roughness is a number without a roughness map; the other two are None without a colour map.
+    """
     roughness: float | Map = mean_roughness(subject)
     maps = None if subject.head is None else subject.head.maps
     if maps is not None and maps.roughness is not None:

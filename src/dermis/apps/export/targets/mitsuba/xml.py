@@ -1,4 +1,4 @@
-"""Scene descriptions of Mitsuba as XML, written without Mitsuba."""
+"""Mitsuba scene descriptions as XML, written without the mitsuba package."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ _PLUGIN_KINDS = {plugin: kind for kind, plugins in _KINDS.items() for plugin in 
 
 
 class Transform:
-    """Transformation with Mitsuba's convention: each call is applied before the earlier ones."""
+    """Affine transformation with Mitsuba's convention: a method call applies before the earlier ones."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return the transformation that turns +Z towards the target, with Y up."""
+        """Return this transformation after one that puts a camera at `origin`, with +Z towards `target`."""
         forward = _unit(np.subtract(target, origin))
         left = _unit(np.cross(np.asarray(up, np.float64), forward))
         matrix = np.eye(4)
@@ -44,22 +44,25 @@ class Transform:
         return Transform(self.matrix @ matrix)
 
     def scale(self, factors: ArrayLike) -> Transform:
-        """Return the transformation that scales along the axes."""
+        """Return this transformation after a scaling along the axes.
+
+        factors : one factor, or (3,) factors of x, y and z
+        """
         return Transform(self.matrix @ np.diag([*np.broadcast_to(factors, 3), 1.0]))
 
 
 @dataclass(eq=False)
 class Bitmap:
-    """Picture that is written to its own file."""
+    """Image of a texture or light that is written to its own file."""
 
     values: NDArray[np.float32]
 
 
 @dataclass
 class XmlBackend:
-    """Replacement for the module `mitsuba` in functions that describe scenes.
+    """Substitute for the module `mitsuba` in functions that describe scenes, so that they need no Mitsuba.
 
-    bitmaps : pictures in the order in which they are written
+    bitmaps : images found so far, in the order in which they are written
     """
 
     bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
@@ -70,23 +73,29 @@ class XmlBackend:
 
 @dataclass(frozen=True)
 class Ref:
-    """Reference to an object by its id."""
+    """Reference to an object of the scene by its id."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Override:
-    """Value that `mitsuba -D NAME=...` replaces, with its type."""
+    """Property whose value `mitsuba -D NAME=...` sets.
+
+    kind : type of the property, such as "integer"
+    name : name of the option
+    """
 
     kind: str
     name: str
 
 
-def element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
-    """Return the XML element of a description.
+def object_element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
+    """Return the XML element of an object described by a dictionary.
 
-    backend : collects the pictures
+    description : properties of the object; "type" is the plugin
+    name : name of the object in its parent; "" for none
+    backend : collector of the images that the description contains
     """
     plugin = str(description["type"])
     node = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
@@ -97,12 +106,15 @@ def element(description: Mapping[str, object], name: str, backend: XmlBackend) -
 
 
 def bitmap_path(index: int) -> str:
-    """Return the path of a picture relative to the scene."""
+    """Return the path of an image relative to scene.xml.
+
+    index : index of the image in `XmlBackend.bitmaps`
+    """
     return f"textures/light_{index}.exr"
 
 
-def document(parts: list[ET.Element]) -> bytes:
-    """Return the scene of some elements as XML."""
+def scene_document(parts: list[ET.Element]) -> bytes:
+    """Return an XML file with a scene of the given elements."""
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
     ET.indent(root)
@@ -111,12 +123,12 @@ def document(parts: list[ET.Element]) -> bytes:
 
 
 def default_element(name: str, value: str) -> ET.Element:
-    """Return the default of a value that the command line may replace."""
+    """Return the element that sets the default of a parameter for `mitsuba -D`."""
     return ET.Element("default", {"name": name, "value": value})
 
 
 def include_element(filename: str) -> ET.Element:
-    """Return the inclusion of another file."""
+    """Return the element that includes another XML file."""
     return ET.Element("include", {"filename": filename})
 
 
@@ -139,7 +151,7 @@ def _property_element(key: str, value: object, backend: XmlBackend) -> ET.Elemen
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
             return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
-        return element(value, key, backend)
+        return object_element(value, key, backend)
     return _value_element(key, value)
 
 

@@ -1,4 +1,4 @@
-"""MaterialX documents of materials."""
+"""Conversion of OpenPBR materials to MaterialX documents."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from functools import cache
 
 import MaterialX
 
-from dermis.apps.export.targets.openpbr.materials import DISTANCES, MAPS, OpenPbrMaterial, Value, input_name
+from dermis.apps.export.targets.openpbr.materials import (
+    LENGTH_INPUTS,
+    MAP_TYPES,
+    InputValue,
+    OpenPbrMaterial,
+    input_name,
+)
 from dermis.base.errors import refuse
 
 
 def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
-    """Return a validated document; lengths are in metres, colours linear Rec. 709.
+    """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
 
-    shader : `OPEN_PBR` or `STANDARD`
-    prefix : prefix of the names of the maps beside the document
+    shader : node category of the surfaces, `OPEN_PBR` or `STANDARD`
+    prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()
     document.setColorSpace("lin_rec709")
@@ -30,7 +36,7 @@ def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: 
 
 @cache
 def standard_library() -> MaterialX.Document:
-    """Return MaterialX's standard definitions."""
+    """Return MaterialX's library of standard node definitions."""
     library = MaterialX.createDocument()
     folders, search_path = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
     MaterialX.loadLibraries(folders, search_path, library)
@@ -44,7 +50,7 @@ def _add_material(
     node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
     for key, value in definition.values.items():
         constant = node.setInputValue(input_name(shader, key), _value(value))
-        if key in DISTANCES:
+        if key in LENGTH_INPUTS:
             constant.setUnitType("distance")
             constant.setUnit("meter")
     if definition.maps:
@@ -60,8 +66,12 @@ def _add_material(
 
 
 def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Output:
-    """Add the nodes that read a picture, and return their output."""
-    map_type = MAPS[role]
+    """Add the nodes that read a map file to a graph, and return their output.
+
+    role : role of the map, such as "colour", which sets its type and colour space
+    file : path of the map
+    """
+    map_type = MAP_TYPES[role]
     image = graph.addNode("image", f"{role}_image", map_type.type)
     filename = image.setInputValue("file", file, "filename")
     if map_type.space:
@@ -75,5 +85,5 @@ def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Outp
     return output
 
 
-def _value(value: Value) -> MaterialX.Color3 | float:
+def _value(value: InputValue) -> MaterialX.Color3 | float:
     return MaterialX.Color3(*value) if isinstance(value, tuple) else float(value)

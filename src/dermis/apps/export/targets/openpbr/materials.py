@@ -1,4 +1,4 @@
-"""OpenPBR materials: input values, the maps of inputs, and their files."""
+"""OpenPBR materials of a head: input values, and maps of inputs with their files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import floats, write_files
+from dermis.apps.export.target import flat_tuple, write_files
 from dermis.human.person_file import relief_slopes
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
@@ -24,7 +24,7 @@ from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
-Value = float | tuple[float, ...]
+InputValue = float | tuple[float, ...]
 
 OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
 _STANDARD_NAMES: Mapping[str, str] = {
@@ -44,31 +44,34 @@ _MAX_NAME_LENGTH = 40
 _EYE_IOR = 1.376
 _ROUGHNESS = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
 _DEFAULT_ROUGHNESS = 0.8
-INPUTS: Mapping[str, str] = {
+MAP_INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
     "roughness": "specular_roughness",
     "specular": "specular_weight",
     "normal": "geometry_normal",
 }
 """Input of OpenPBR that each map sets."""
-DISTANCES = ("subsurface_radius",)
+LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
 
 def input_name(shader: str, name: str) -> str:
-    """Return the name of an OpenPBR input in a shader."""
+    """Return the name that an input of OpenPBR has in a shader.
+
+    shader : `OPEN_PBR` or `STANDARD`
+    """
     return name if shader == OPEN_PBR else _STANDARD_NAMES[name]
 
 
 class MapType(NamedTuple):
-    """Type and colour space of a map in MaterialX, and its colour space in USD's preview surface."""
+    """Type and colour space of a map in MaterialX, and its colour space in UsdPreviewSurface."""
 
     type: str
     space: str
     preview_space: str
 
 
-MAPS: Mapping[str, MapType] = {
+MAP_TYPES: Mapping[str, MapType] = {
     "colour": MapType("color3", "srgb_texture", "sRGB"),
     "roughness": MapType("float", "", "raw"),
     "specular": MapType("float", "", "raw"),
@@ -79,15 +82,15 @@ MAPS: Mapping[str, MapType] = {
 
 @dataclass(frozen=True)
 class OpenPbrMaterial:
-    """Values and maps of a material's inputs.
+    """OpenPBR material: values of its inputs, and the maps that set other inputs.
 
     name : any text
-    values : values of inputs; lengths in metres
-    maps : roles of maps by input
+    values : value of each input without a map; lengths in metres
+    maps : role of the map of each input with a map, such as "colour"
     """
 
     name: str
-    values: Mapping[str, Value]
+    values: Mapping[str, InputValue]
     maps: Mapping[str, str]
 
 
@@ -98,14 +101,14 @@ def skin_material(
     colour: tuple[float, ...],
     roles: Iterable[str],
 ) -> OpenPbrMaterial:
-    """Return the material of skin.
+    """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
-    colour : colour without a colour map, linear Rec. 709 [-]
-    roles : roles of the existing maps
+    colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
+    roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
-    values: dict[str, Value] = {
+    values: dict[str, InputValue] = {
         "base_color": colour,
         "subsurface_weight": 1.0,
         "subsurface_color": colour,
@@ -116,16 +119,16 @@ def skin_material(
         "specular_ior": SKIN_ETA,
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
-    mapped = {INPUTS[role]: role for role in roles}
+    mapped = {MAP_INPUTS[role]: role for role in roles}
     return OpenPbrMaterial(name, {key: value for key, value in values.items() if key not in mapped}, mapped)
 
 
 def opaque_material(material: Material) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part of the head other than skin."""
+    """Return the OpenPBR material of teeth, tongue, lashes or another material of the head except skin."""
     name = material.name.casefold()
     roughness = next((value for part, value in _ROUGHNESS.items() if part in name), _DEFAULT_ROUGHNESS)
-    values: dict[str, Value] = {
-        "base_color": floats(material.colour),
+    values: dict[str, InputValue] = {
+        "base_color": flat_tuple(material.colour),
         "specular_roughness": roughness,
         "specular_ior": _EYE_IOR if "eye" in name else SKIN_ETA,
     }
@@ -133,25 +136,26 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
 
 
 def eye_material(name: str) -> OpenPbrMaterial:
-    """Return the material of an eyeball with a colour map."""
-    values: dict[str, Value] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
+    """Return the OpenPBR material of an eyeball with a colour map."""
+    values: dict[str, InputValue] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
     return OpenPbrMaterial(name, values, {"base_color": "eye"})
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
-    """Return the material of hairs: an opaque surface of their mean colour.
+    """Return the OpenPBR material of hairs: an opaque surface of their mean colour.
 
-    absorption : (n, 3) absorption inside the hairs [1/mm]
+    absorption : (n, 3) absorption coefficient inside the hairs [1/mm]
+    radius_mm : radius of the hairs [mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
     """
-    colour = floats(np.exp(-5.888 * np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)))
-    values: dict[str, Value] = {"base_color": colour, "specular_roughness": 0.4, "specular_ior": 1.55}
+    colour = flat_tuple(np.exp(-5.888 * np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)))
+    values: dict[str, InputValue] = {"base_color": colour, "specular_roughness": 0.4, "specular_ior": 1.55}
     return OpenPbrMaterial("hair", values, {})
 
 
 def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """Return the maps of a skin by role, scaled as they are stored in files.
+    """Return the maps of a skin by role, with the values that OpenPBR expects.
 
     slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
     """
@@ -171,7 +175,7 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 
 def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
-    """Return 8-bit PNG files by role."""
+    """Return maps as 8-bit PNG files by role."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
         return dict(zip(arrays, pool.map(_png, arrays, arrays.values()), strict=True))
 
@@ -184,13 +188,16 @@ def _png(role: str, values: Floats) -> bytes:
 
 
 def file_prefix(file: Path, subject: Subject) -> str:
-    """Return the prefix of the names of files beside a target's main file."""
+    """Return the prefix of the names of map and mesh files beside a target's main file."""
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
     return f"{identifier or subject.identifier}_"
 
 
 def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
-    """Write the maps of the head's skin, and return their paths by role."""
+    """Write the maps of the head's skin as PNG files, and return their paths by role.
+
+    prefix : prefix of the file names
+    """
     if subject.head is None:
         return {}
     files = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
@@ -199,13 +206,13 @@ def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
 
 
 def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
-    """Return the materials by their number in the subject's mesh.
+    """Return the OpenPBR materials of the subject's mesh by material index.
 
     mfp_mm : (3,) mean free paths of the skin [mm]
-    roles : roles of the existing maps
+    roles : roles of the maps that replace uniform values of the skin
     """
     red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
-    colour, known_roles = floats(subject.clipped_albedo()), list(roles)
+    colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
     mesh = subject.head_or_ball.mesh
 
     def definition(material: Material) -> OpenPbrMaterial:

@@ -1,7 +1,7 @@
 """Export to OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
 
 OpenPBR interprets the radius as the mean free path of a random walk through an index-matched medium,
-independent of its phase function. The parameters are fitted to the profile of such a walk.
+independent of its phase function. The parameters are fitted so that such a walk has the skin's profile.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.apps.export.fitting import burley_curve, curve_error, fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
+from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     STANDARD,
@@ -38,9 +38,10 @@ _SHADERS = {
 
 
 class OpenPbr(Target):
-    """Export to a MaterialX document with one material per part of the head.
+    """Export to a MaterialX document with one material for each material of the head.
 
-    Variants that end in "profile" are for renderers that interpret the radius as the d of a profile.
+    Variants that end in "profile" are for renderers that interpret the radius as the width d of a Burley
+    profile.
     """
 
     name = "openpbr"
@@ -59,16 +60,16 @@ class OpenPbr(Target):
 
     @property
     def shader(self) -> str:
-        """Return the category of the material's node."""
+        """Return the node category of the surface: OpenPBR or Standard Surface."""
         return _SHADERS[self.variant or "open-pbr"]
 
     @property
     def is_profile(self) -> bool:
-        """Return whether the radius is the d of a profile instead of a mean free path."""
+        """Return whether the radius is the width d of a Burley profile instead of a mean free path."""
         return self.variant.endswith("profile")
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the random walk, or the profile, closest to the reference."""
+        """Return the radii for which the random walk or Burley profile is closest to the reference."""
         if self.is_profile:
             d = fit_burley_width(subject.curve)
             return surface_parameters(subject, self.shader, d, "largest d of the profiles")
@@ -77,12 +78,12 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the published diffuse mean free paths as the radius."""
+        """Return published diffuse mean free paths as the radius, which is a mean free path in OpenPBR."""
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_path_mm(subject), meaning)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the random walk, or of MaterialX's profile."""
+        """Return the cumulative profile of the random walk, or MaterialX's Burley profile, for the radii."""
         radius = get_radii_mm(parameters, self.shader)
         if self.is_profile:
             return materialx_profile(radius, subject)
@@ -104,17 +105,19 @@ class OpenPbr(Target):
 
 
 def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:
-    """Return the parameters of a shader with radii (3,) [mm].
+    """Return the parameters of a surface with given subsurface radii.
 
-    meaning : meaning of the largest radius
+    shader : node category of the surface, `OPEN_PBR` or `STANDARD`
+    radius_mm : (3,) subsurface radii [mm]
+    meaning : meaning of the largest radius, for the report
     """
-    longest, skin, colour = float(radius_mm.max()), subject.skin, floats(subject.clipped_albedo())
+    longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))
     inputs = (
         ("subsurface_weight", 1.0, "-", "all light that is not reflected enters the skin"),
         ("subsurface_color", colour, "-", "diffuse reflectance; the mean of a colour map"),
         ("subsurface_radius", _METRES_PER_MM * longest, "m", meaning),
-        ("subsurface_radius_scale", floats(radius_mm / longest), "-", "each channel's relative to that"),
+        ("subsurface_radius_scale", flat_tuple(radius_mm / longest), "-", "each channel's relative to that"),
         ("subsurface_scatter_anisotropy", 0.0, "-", "the lengths are reduced ones"),
         ("specular_ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
         ("specular_weight", skin.strength, "-", "factor of the specular reflection; the mean of a map"),
@@ -124,13 +127,16 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning
 
 
 def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
-    """Return the errors of renderers that interpret the mean free path as the d of a profile."""
+    """Return a sentence on the errors in renderers that treat the mean free path as a Burley width d.
+
+    mfp_mm : (3,) exported mean free paths [mm]
+    """
     errors = curve_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
     return f"interpreted as d, errors at shadow edges are {', '.join(f'{error:.3f}' for error in errors)}"
 
 
 def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
-    """Return the radii (3,) of the parameters [mm]."""
+    """Return the subsurface radii (3,) in a surface's parameters [mm]."""
     longest = get_numbers(parameters, input_name(shader, "subsurface_radius"))[0] / _METRES_PER_MM
     return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
 
@@ -141,9 +147,9 @@ def fitted_path_mm(subject: Subject) -> Floats:
 
 
 def published_path_mm(subject: Subject) -> Floats:
-    """Return the diffuse mean free paths (3,) as published for tissue, or d without tissue [mm].
+    """Return the diffuse mean free paths (3,) of the tissue, or its Burley widths if that is unknown [mm].
 
-    Source: 1 / sigma_tr of the lowest layer, [Jensen2001].
+    The mean free paths are 1 / sigma_tr of the lowest layer, [Jensen2001].
     """
     layer = lowest_layer(subject)
     if layer is None:
@@ -152,7 +158,7 @@ def published_path_mm(subject: Subject) -> Floats:
 
 
 def lowest_layer(subject: Subject) -> Layer | None:
-    """Return the lowest layer of a tissue with three channels, or None."""
+    """Return the lowest layer of the subject's tissue if its coefficients are given for RGB, or None."""
     tissue = subject.tissue
     if tissue is None or tissue.rgb is not None or tissue.medium.channels != 3:
         return None
@@ -160,16 +166,22 @@ def lowest_layer(subject: Subject) -> Layer | None:
 
 
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the cumulative profile of a random walk whose albedo follows from a colour.
+    """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
     The albedo is given by van de Hulst's formula. The energy is the subject's, times the error of that
     formula.
+
+    colour : (3,) base colour
+    mfp_mm : (3,) mean free paths [mm]
     """
     return subject.rescale_energy(half_space("walk", albedo_from_colour(colour), mfp_mm))
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the cumulative profile of MaterialX's specification, in which the radius is d."""
+    """Return the cumulative Burley profile by MaterialX's specification, in which the radius is its width d.
+
+    mfp_mm : (3,) exported radii [mm]
+    """
     return burley_curve(mfp_mm, subject.curve.energy)
 
 

@@ -1,1 +1,1 @@
-"""Web pages based on a JavaScript library, shared by Babylon.js and three.js."""
+"""Web pages based on a JavaScript library, with the code that Babylon.js and three.js share."""

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats
+from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple
 from dermis.apps.export.targets.gltf.file import encode_glb
 from dermis.apps.export.targets.pages.html import escape_script, render_page
 from dermis.base.errors import refuse
@@ -38,10 +38,11 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class LibraryFile:
-    """File of an npm package.
+    """JavaScript file of an npm package, with the hash by which it is checked.
 
-    name : name by which modules of the page import it; "" for a script without imports
-    sha384 : SHA-384 of its bytes, in base64
+    package, version, path : name and version of the package, and path of the file in it
+    sha384 : SHA-384 of the file, in base64
+    name : name by which modules of the page import the file; "" for a script without imports
     """
 
     package: str
@@ -52,7 +53,7 @@ class LibraryFile:
 
     @property
     def url(self) -> str:
-        """Return the URL from which the page loads the file."""
+        """Return the public URL from which the page loads the file."""
         return f"{_CDN_URL}/{self.package}@{self.version}/{self.path}"
 
     @property
@@ -68,7 +69,7 @@ class LibraryFile:
     def read(self, folder: Path) -> str:
         """Return the text of the file from a node_modules folder of npm.
 
-        DermisError : if it is missing or belongs to another version
+        DermisError : if it is missing or differs from the expected version
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
         file = folder / self.package / self.path
@@ -98,11 +99,11 @@ class EnginePage(Target):
     """Files of the library, by version."""
 
     def with_library(self, folder: str | Path) -> EnginePage:
-        """Return the target with an installed library to embed in its page."""
+        """Return the target with an npm folder whose library is embedded in the page."""
         return replace(self, library_folder=Path(folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the page."""
+        """Write the page with the head, its parameters, camera and lights."""
         libraries, sources = self.library_elements(version)
         script = (_HERE / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")
         text = render_page(
@@ -121,7 +122,7 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the HTML that loads or contains the library, and the allowed sources of scripts."""
+        """Return the HTML that loads or embeds the library, and its sources for the page's policy."""
 
     def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
@@ -138,15 +139,16 @@ class EnginePage(Target):
 
 
 def html_safe_json(value: Json) -> str:
-    """Return JSON without characters that begin or end HTML elements."""
+    """Return a value as JSON without characters that begin or end HTML elements."""
     text = json.dumps(value, ensure_ascii=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def module_url(text: str, names: Mapping[str, str]) -> str:
-    """Return a data URL with a JavaScript module.
+    """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
 
-    names : names by which the page knows imported modules, by the names in the text
+    text : source of the module
+    names : name in the page by the name in an import statement of the module
     """
     for old, new in names.items():
         text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)
@@ -154,29 +156,34 @@ def module_url(text: str, names: Mapping[str, str]) -> str:
 
 
 def material_parameters(subject: Subject) -> Parameters:
-    """Return the parameters of the skin's surface in both libraries."""
+    """Return the surface parameters that the skin has in both Babylon.js and three.js."""
     return (
-        Parameter("albedo", floats(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
+        Parameter("albedo", flat_tuple(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
         Parameter("ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
     )
 
 
 def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
-    """Return the scene's camera relative to the head's file: positions [m], vertical angle of view [rad].
+    """Return the scene's camera as JSON: positions in the page's scene [m], vertical angle of view [rad].
 
-    centre_mm : point relative to which the camera is positioned
+    centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
     """
     camera, centre = scene.camera, np.array(centre_mm)
     position, target = (_METRES_PER_MM * (centre + one) for one in (camera.position, camera.target))
     fov = 2.0 * math.atan(camera.half_tangent)
-    return {"position": floats(position), "target": floats(target), "up": floats(camera.up), "fov": fov}
+    return {
+        "position": flat_tuple(position),
+        "target": flat_tuple(target),
+        "up": flat_tuple(camera.up),
+        "fov": fov,
+    }
 
 
 def page_light(light: Light) -> Json:
-    """Return a light as a directional light with its irradiance at the head."""
+    """Return a light as JSON: a directional light with the irradiance that the light has at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:
         direction = np.subtract(light.target, light.position)
     direction = direction / np.linalg.norm(direction)
-    return {"direction": floats(direction), "irradiance": floats(light.irradiance)}
+    return {"direction": flat_tuple(direction), "irradiance": flat_tuple(light.irradiance)}

@@ -1,4 +1,4 @@
-"""HTML files that contain all of their scripts and styles, and a policy that allows no others."""
+"""HTML files with embedded scripts and styles, and a Content-Security-Policy that allows no others."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ def render_page(
     sources: Sequence[str] = (),
     **fields: str,
 ) -> str:
-    """Return the text of a folder's page.html with its page.css, a script and other fields.
+    """Return the HTML of a page from the template page.html and the style page.css of a folder.
 
-    title, note : texts, which are escaped
+    title, note : plain texts, which are escaped
     script : script from `escape_script`
     policy : Content-Security-Policy directives other than those of scripts and styles
-    sources : sources of other scripts, as in a Content-Security-Policy
+    sources : allowed sources of other scripts, as in a Content-Security-Policy
+    fields : HTML or data of the template's other placeholders, by name
     """
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *sources])

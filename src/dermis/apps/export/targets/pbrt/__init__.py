@@ -1,1 +1,1 @@
-"""Export to pbrt: a scene with skin as the material `subsurface`."""
+"""Export to pbrt: a scene whose skin has the material `subsurface`."""

@@ -33,9 +33,11 @@ _MAX_BOUNCES = 100
 
 
 def directive(word: str, kind: str, parameters: DirectiveParameters | None = None) -> str:
-    """Return a directive such as `Material "subsurface" "float eta" [ 1.4 ]`.
+    """Return a directive of a scene file, such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
-    parameters : values by type and name, each a text, a Boolean, numbers, or an array of numbers
+    word : first word of the directive, such as "Material"
+    kind : pbrt's name of the implementation, such as "subsurface"
+    parameters : text, Boolean, number or array of numbers by type and name, such as "float eta"
     """
     texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([word, f'"{kind}"', *texts])
@@ -50,7 +52,7 @@ def _text(value: ArrayLike) -> str:
 
 
 def camera_lines(camera: Camera, file: str) -> Lines:
-    """Return the directives of camera, film and integrator, which precede WorldBegin.
+    """Return the directives of camera, film and integrator, which precede the directive WorldBegin.
 
     file : name of the image that pbrt writes
     """
@@ -73,7 +75,7 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of the lights; unsupported ones are omitted with a note."""
+    """Return the directives of lights and environment, omitting with a note those that pbrt lacks."""
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT, "pbrt"), start=1):
         if PBRT[light.kind] is _unsupported:
@@ -88,10 +90,10 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
 
 
 def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
-    """Return a binary PLY file of some triangles of a mesh, with normals and texture coordinates (v upwards).
+    """Return selected triangles of a mesh as a binary PLY file with normals and uv (v upwards).
 
-    faces : (t,) mask of the triangles
-    centre_mm : origin of the file's coordinates
+    faces : (t,) mask of the selected triangles
+    centre_mm : (3,) point that becomes the origin of the file [mm]
     """
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
     uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])

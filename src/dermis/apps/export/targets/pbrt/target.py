@@ -1,4 +1,4 @@
-"""Export to pbrt: fit of its subsurface material, which uses a table of photon beam diffusion."""
+"""Export to pbrt: its subsurface material, fitted with pbrt's own table of photon beam diffusion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.export.fitting import fit_scale, scale_lengths
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers, write_files
+from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
 from dermis.apps.export.targets.openpbr.materials import encode_map_files, file_prefix, map_arrays
 from dermis.apps.export.targets.openpbr.target import published_path_mm
 from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
@@ -35,12 +35,12 @@ _BALL_DISTANCE, _BALL_FRAME = 10.0, 1.4  # camera distance and visible height, r
 
 
 class DiffusionTable(NamedTuple):
-    """Cumulative profiles of pbrt's subsurface material at one index of refraction.
+    """Radial profiles of pbrt's subsurface material, by albedo, at one index of refraction.
 
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
     reflectance : (n,) diffuse reflectance at each albedo
-    reflectance_within : (n, m) part of the diffuse reflectance within each radius
+    reflectance_within : (n, m) part of the diffuse reflectance that leaves within each radius
     """
 
     albedo: Floats
@@ -49,7 +49,10 @@ class DiffusionTable(NamedTuple):
     reflectance_within: Floats
 
     def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Return the diffuse reflectance within radii [mean free paths], for a given total reflectance."""
+        """Return the reflectance within radii for the albedo whose total reflectance is `reflectance`.
+
+        radius : radii [mean free paths]
+        """
         row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
         low = int(min(row, _ALBEDO_COUNT - 2))
         first, second = self.reflectance_within[low : low + 2]
@@ -59,7 +62,9 @@ class DiffusionTable(NamedTuple):
 
 @cache
 def diffusion_table(eta: float) -> DiffusionTable:
-    """Return pbrt's table for isotropic scattering in a medium with an index of refraction.
+    """Return pbrt's diffusion table for isotropic scattering.
+
+    eta : index of refraction of the medium
 
     Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
     """
@@ -75,7 +80,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
     """Return the radiant exitance (m,) of light scattered more than once, for an extinction of 1.
 
-    radius : (m,) radii [mean free paths]
+    radius : (m,) distances from a beam of unit power [mean free paths]
     """
     D = (2.0 - albedo) / 3.0
     decay = np.sqrt((1.0 - albedo) / D)
@@ -95,7 +100,10 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once, per unit albedo, for an extinction of 1."""
+    """Return the radiant exitance (m,) of light scattered once, per unit albedo, for an extinction of 1.
+
+    radius : (m,) distances from a beam of unit power [mean free paths]
+    """
     critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
     depth = critical_depth + _depths()[:, None]
     path = np.hypot(radius, depth)
@@ -110,7 +118,11 @@ def _depths() -> Floats:
 
 
 def _integrate_spline(x: Floats, values: Floats) -> Floats:
-    """Return the integrals (n, m) from x[0] to each x of Catmull-Rom splines through values (n, m)."""
+    """Return the running integrals (n, m) of Catmull-Rom splines, from x[0] to each x.
+
+    x : (m,) increasing knots
+    values : (n, m) values of each spline at the knots
+    """
     slope = np.empty_like(values)
     slope[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / (x[2:] - x[:-2])
     slope[:, 0] = (values[:, 1] - values[:, 0]) / (x[1] - x[0])
@@ -137,22 +149,22 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free path with which pbrt is closest to the profile."""
+        """Return the reflectance, and the mean free paths for which pbrt is closest to the reference."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour, and published diffuse mean free paths used as mean free paths."""
+        """Return the skin's colour, and published diffuse mean free paths in place of mean free paths."""
         return _parameters(subject, published_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile that pbrt tabulates for the parameters."""
+        """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
         reflectance = np.array(get_numbers(parameters, _REFLECTANCE))
         curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _PATH))
         return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the scene, a mesh for each material, and the maps."""
+        """Write the scene, a PLY mesh for each material, and the maps."""
         file = self.main_file(output, subject)
         prefix = file_prefix(file, subject)
         scene = subject.scene or _ball_scene(subject.head_or_ball)
@@ -162,7 +174,7 @@ class Pbrt(Target):
 
 
 def _unit_curve(reflectance: Floats) -> CumulativeProfile:
-    """Return the cumulative profile for (3,) reflectances, with radii in mean free paths."""
+    """Return pbrt's cumulative profile for reflectances (3,), with radii in mean free paths."""
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
@@ -174,10 +186,10 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
 
 
 def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
-    skin, colour = subject.skin, floats(subject.clipped_albedo())
+    skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_PATH, floats(path_mm), "mm", meaning),
+        Parameter(_PATH, flat_tuple(path_mm), "mm", meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
@@ -187,7 +199,7 @@ def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
 
 
 def _ball_scene(ball: Head) -> Scene:
-    """Return a scene that shows a ball in the middle of the picture."""
+    """Return a scene that shows a ball in the middle of the picture, for a skin without a head."""
     x, y, z = (float(one) for one in -np.array(ball.centre_mm))
     size = float(ball.mesh.size_mm[1])
     camera = Camera(position=(x, y, z + _BALL_DISTANCE * size), target=(x, y, z), frame_mm=_BALL_FRAME * size)
@@ -197,7 +209,10 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the scene, and the contents of the other files by name."""
+    """Return the directives of the scene, and the contents of its mesh and image files by file name.
+
+    prefix : prefix of the names of mesh and image files
+    """
     head = scene.head
     textures = skin_textures(subject, prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
@@ -208,21 +223,28 @@ def _scene_lines(
         material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm)
         is_skin = material.kind == "skin"
-        text = _skin_material(parameters, textures.bindings) if is_skin else _opaque_material(material.colour)
+        text = (
+            _skin_material(parameters, textures.material_textures)
+            if is_skin
+            else _opaque_material(material.colour)
+        )
         shape = directive("Shape", "plymesh", {"string filename": name})
         lines += ["AttributeBegin", text, shape, "AttributeEnd"]
     return lines, files
 
 
-def _skin_material(parameters: Parameters, bindings: dict[str, tuple[str, str]]) -> str:
-    """Return the directive of the skin's material, whose inputs with maps refer to textures."""
+def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
+    """Return the directive of the skin's material, with textures in place of values where there are maps.
+
+    material_textures : type and texture or file of each material parameter with a map, see `SkinTextures`
+    """
     types = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
     for one in parameters:
-        binding_type, value = bindings.get(one.name, (types.get(one.name, "float"), one.value))
-        values[f"{binding_type} {one.name}"] = value
-    if "normalmap" in bindings:
-        values["string normalmap"] = bindings["normalmap"][1]
+        input_type, value = material_textures.get(one.name, (types.get(one.name, "float"), one.value))
+        values[f"{input_type} {one.name}"] = value
+    if "normalmap" in material_textures:
+        values["string normalmap"] = material_textures["normalmap"][1]
     return directive("Material", "subsurface", values)
 
 
@@ -231,25 +253,26 @@ def _opaque_material(colour: tuple[float, float, float]) -> str:
     return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **roughness})
 
 
-class Textures(NamedTuple):
+class SkinTextures(NamedTuple):
     """Textures of the skin in a pbrt scene.
 
-    lines : directives that define them
-    files : contents of the image files by name
-    bindings : type, and name of the texture or file, by the parameter of the material that uses it
+    lines : directives that define the textures
+    files : contents of the image files by file name
+    material_textures : pbrt type, and name of the texture or image file, by the parameter of the skin's
+        material that uses it
     """
 
     lines: Lines
     files: dict[str, bytes]
-    bindings: dict[str, tuple[str, str]]
+    material_textures: dict[str, tuple[str, str]]
 
 
-def skin_textures(subject: Subject, prefix: str) -> Textures:
-    """Return the textures of a head; a skin without a head has none.
+def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
+    """Return the textures for the maps of the subject's head; a skin without a head has none.
 
-    prefix : prefix of the names of the files
+    prefix : prefix of the names of the image files
     """
-    textures = Textures([], {}, {})
+    textures = SkinTextures([], {}, {})
     if subject.head is None:
         return textures
     arrays = map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head))
@@ -260,12 +283,12 @@ def skin_textures(subject: Subject, prefix: str) -> Textures:
         file = f"{prefix}{role}.png"
         textures.files[file] = data
         if role == "normal":
-            textures.bindings["normalmap"] = "string", file
+            textures.material_textures["normalmap"] = "string", file
             continue
         texture_type, encoding, parameter = _TEXTURES[role]
         options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
         textures.lines.append(directive(f'Texture "{role}" "{texture_type}"', "imagemap", options))
-        textures.bindings[parameter] = "texture", role
+        textures.material_textures[parameter] = "texture", role
     return textures
 
 

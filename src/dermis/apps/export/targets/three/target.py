@@ -1,4 +1,4 @@
-"""Export to a web page with three.js, in which lights and head can be moved; its skin diffuses no light."""
+"""Export to a web page with three.js, on which lights and head can be moved; its skin diffuses no light."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Three(EnginePage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of MeshPhysicalMaterial's surface, which has no subsurface scattering."""
+        """Return the surface parameters of MeshPhysicalMaterial, which has no subsurface scattering."""
         return (
             *material_parameters(subject),
             Parameter("specularIntensity", 1.0, "-", "reflectance given by the index of refraction"),
@@ -54,15 +54,15 @@ class Three(EnginePage):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return `parameters` with the material's default index of refraction."""
+        """Return the exported parameters, but with MeshPhysicalMaterial's default index of refraction."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of light that leaves the skin where it enters."""
+        """Return the cumulative profile of light that leaves the skin where it enters: 1 at every radius."""
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the import map of the library's modules, and their sources for the page's policy."""
+        """Return the import map of three.js, and the sources of its modules for the page's policy."""
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}

@@ -1,7 +1,7 @@
 """Export to Unity HDRP: a DiffusionProfileSettings asset, and the maps of a head.
 
-In DiffusionProfileSettings.cs, the width d of the lobe is the scattering colour times the multiplier [mm], if
-the world scale is the length of a scene unit in metres.
+In DiffusionProfileSettings.cs, the width d of the Burley profile is the scattering colour times the
+multiplier [mm], if the world scale is the length of a scene unit in metres.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
     Parameters,
+    ParameterValue,
     Target,
-    Value,
-    floats,
+    flat_tuple,
     get_numbers,
     replace_values,
     write_files,
@@ -37,7 +37,7 @@ _FILE_VERSIONS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multip
 
 
 class Unity(Target):
-    """Export to a diffusion profile of Unity HDRP; the material's base colour must be the skin's."""
+    """Export to a DiffusionProfileSettings asset; the user sets the skin's colour as base colour in Unity."""
 
     name = "unity"
     title = "Unity HDRP"
@@ -51,10 +51,10 @@ class Unity(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the scattering colour and multiplier of Burley profiles fitted to the skin."""
+        """Return the scattering colour and multiplier with which HDRP is closest to the reference."""
         d = fit_burley_width(subject.curve)
         return (
-            *_distances(d, version),
+            *_scattering_distances(d, version),
             Parameter(_SCALE, 1.0, "m", "metres per scene unit"),
             Parameter(_IOR, _SKIN_IOR, "-", "of the specular reflection"),
             Parameter(_TRANSMISSION, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
@@ -63,12 +63,12 @@ class Unity(Target):
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
-        colour = floats(subject.clipped_albedo())
-        values: dict[str, Value] = {_COLOUR: colour, _MULTIPLIER: _NAIVE_MULTIPLIER_MM}
+        colour = flat_tuple(subject.clipped_albedo())
+        values: dict[str, ParameterValue] = {_COLOUR: colour, _MULTIPLIER: _NAIVE_MULTIPLIER_MM}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile that the engine computes from its parameters."""
+        """Return the cumulative Burley profile that HDRP derives from scattering colour and multiplier."""
         colour, scale = np.array(get_numbers(parameters, _COLOUR)), get_numbers(parameters, _SCALE)[0]
         multiplier = 1.0 if version == _BEFORE_14 else get_numbers(parameters, _MULTIPLIER)[0]
         return burley_curve(colour * multiplier / scale, subject.curve.energy)
@@ -81,10 +81,13 @@ class Unity(Target):
         return [asset, *write_files(asset.parent, maps)]
 
 
-def _distances(d_mm: Floats, version: str) -> Parameters:
-    """Return the widths of the lobes: a colour before HDRP 14, a colour and a multiplier since."""
+def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
+    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier since.
+
+    d_mm : (3,) widths of the Burley profiles [mm]
+    """
     if version == _BEFORE_14:
-        return (Parameter(_COLOUR, floats(d_mm), "mm", "d as a linear HDR colour"),)
+        return (Parameter(_COLOUR, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
     profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
         Parameter(_COLOUR, profile.scattering_colour, "-", "d relative to its largest channel, linear"),
@@ -93,7 +96,7 @@ def _distances(d_mm: Floats, version: str) -> Parameters:
 
 
 def asset_text(name: str, parameters: Parameters, version: str) -> str:
-    """Return the text of the asset, without the hash that the editor adds when it first opens it."""
+    """Return the YAML of the asset; the editor adds the profile's hash when it first opens it."""
     values = {one.name: one.value for one in parameters}
     colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR, _TRANSMISSION))
     low, high = get_numbers(parameters, _THICKNESS)

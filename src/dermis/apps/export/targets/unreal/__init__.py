@@ -1,1 +1,1 @@
-"""Export to Unreal Engine: a script for the editor that creates a subsurface profile."""
+"""Export to Unreal Engine: a script for the editor that creates a SubsurfaceProfile asset."""

@@ -1,7 +1,8 @@
 """Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
-In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the lobe is the mean free path over
-0.6 s(A), where s is Burley's factor for perpendicular light; the scaling of searchlight profiles cancels.
+In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
+over 0.6 s(A), where A is the albedo and s Burley's factor for perpendicular light; the scaling of searchlight
+profiles cancels.
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ import numpy as np
 
 from dermis.apps.export.fitting import burley_curve, fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, Value, floats, get_numbers, write_files
+from dermis.apps.export.target import (
+    Parameter,
+    Parameters,
+    ParameterValue,
+    Target,
+    flat_tuple,
+    get_numbers,
+    write_files,
+)
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
@@ -29,7 +38,7 @@ _BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
 class Unreal(Target):
-    """Export to a subsurface profile of Unreal Engine with Burley's kernel, for scenes in cm."""
+    """Export to a SubsurfaceProfile of Unreal Engine with Burley's kernel, for scenes in cm."""
 
     name = "unreal"
     title = "Unreal Engine"
@@ -44,7 +53,7 @@ class Unreal(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the mean free paths for which the engine computes Burley profiles fitted to the skin."""
+        """Return the mean free paths for which the engine's Burley profile is closest to the reference."""
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
         profile = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_burley_width(subject.curve)))
         path_cm = np.array(profile.mean_free_path_colour) * profile.mean_free_path_distance_cm
@@ -58,18 +67,18 @@ class Unreal(Target):
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), path / _MM_PER_CM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile that the engine's screen-space pass computes from its parameters."""
+        """Return the cumulative Burley profile that the engine's screen-space pass renders."""
         colour = np.maximum(get_numbers(parameters, COLOUR), _MIN_ENGINE_COLOUR)
         path = _MM_PER_CM * colour * get_numbers(parameters, DISTANCE)[0] * get_numbers(parameters, SCALE)[0]
         albedo = np.array(get_numbers(parameters, ALBEDO))
         return burley_curve(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the script, and the maps of a head beside it."""
+        """Write the editor script, and the maps of a head beside it."""
         file, maps = self.main_file(output, subject), subject.encode_maps()
         names = {role: f"{file.stem}_{role}.png" for role in maps}
         imported = {role: name for role, name in names.items() if role in _IMPORTED}
-        file.write_text(_script(subject, parameters, imported, version), encoding="utf-8")
+        file.write_text(_editor_script(subject, parameters, imported, version), encoding="utf-8")
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
 
@@ -80,8 +89,10 @@ def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     return (
         Parameter("enable_burley", True, "-", "Burley's profile instead of six Gaussians"),
         Parameter("enable_mean_free_path", True, "-", "else the editor converts these values on loading"),
-        Parameter(ALBEDO, floats(albedo), "-", "A of s(A); does not affect the colour"),
-        Parameter(COLOUR, floats(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"),
+        Parameter(ALBEDO, flat_tuple(albedo), "-", "A of s(A); does not affect the colour"),
+        Parameter(
+            COLOUR, flat_tuple(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"
+        ),
         Parameter(DISTANCE, distance, "cm", "mean free path at a colour of 1"),
         Parameter(SCALE, 1.0, "-", "1 for a scene in centimetres"),
         *(() if version in _BEFORE_58 else (depth,)),
@@ -89,10 +100,10 @@ def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     )
 
 
-def _script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], version: str) -> str:
-    """Return the text of a Python script that creates the profile and imports the maps beside it.
+def _editor_script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], version: str) -> str:
+    """Return a Python script for the editor that creates the profile and imports the maps beside it.
 
-    maps : names of the map files by role
+    maps : file names of the maps by role
     """
     settings = [f"    {json.dumps(one.name)}: {_value(one.value)},  # {one.unit}\n" for one in parameters]
     files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in maps.items()]
@@ -104,7 +115,7 @@ def _script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], v
     return text
 
 
-def _value(value: Value) -> str:
+def _value(value: ParameterValue) -> str:
     if isinstance(value, tuple):
         return f"unreal.LinearColor({', '.join(f'{x:.6g}' for x in value)}, 1.0)"
     return f"{value:.6g}" if isinstance(value, float) else repr(value)

@@ -23,10 +23,10 @@ METRES_PER_MM = 1e-3
 
 
 class Polygons(NamedTuple):
-    """Polygons of a mesh: its quads, then its single triangles.
+    """Polygons of a mesh: first the quads, then triangles that belong to no quad.
 
-    vertex_counts : (f,) 4 or 3 vertices of each polygon
-    vertices : (n,) vertex indices, polygon after polygon
+    vertex_counts : (f,) number of vertices of each polygon, 4 or 3
+    vertices : (n,) vertex indices of all polygons, one polygon after another
     material : (f,) material index of each polygon
     """
 
@@ -36,7 +36,7 @@ class Polygons(NamedTuple):
 
 
 def mesh_polygons(mesh: Mesh) -> Polygons:
-    """Return the polygons of a mesh, in which two triangles of a quad are joined."""
+    """Return the polygons of a mesh, with the two triangles of each quad joined."""
     halves, triangles = mesh.quads, mesh.triangles
     single = np.delete(np.arange(len(triangles)), halves.ravel())
     quads = np.column_stack([triangles[halves[:, 0]], triangles[halves[:, 1]][:, 1]])
@@ -48,14 +48,14 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the (p,) index of a vertex at each point of the mesh."""
+    """Return (p,) the index of the first vertex at each point; vertices on uv seams share points."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
 def add_mesh(
     stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
-    """Add the mesh in its rest pose to the stage; return the subset of each material that it uses.
+    """Add the mesh in its rest pose to the stage; return the geometry subset of each material index.
 
     deformable : the head's mesh with all morph targets at 0
     """
@@ -80,7 +80,7 @@ def add_mesh(
 
 
 def texture_coordinates(head: Head) -> Floats:
-    """Return (v, 2) texture coordinates with v downwards; those of eyes refer to the eye pictures."""
+    """Return (v, 2) texture coordinates with v downwards; those of eyes refer to the painted eye textures."""
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
@@ -91,7 +91,10 @@ def texture_coordinates(head: Head) -> Floats:
 
 
 def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
-    """Add (v, 2) texture coordinates of the vertices, with v upwards, to a mesh."""
+    """Add texture coordinates to a mesh as face-varying values.
+
+    uv : (v, 2) texture coordinates of the vertices, with v upwards
+    """
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
     primvar = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying)
@@ -116,15 +119,16 @@ def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) ->
 
 
 def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
-    """Return positions in metres."""
+    """Return positions converted from mm to the metres of the stage."""
     return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Add blend shapes and a skeleton to a mesh, and an animation with their rest pose.
+    """Add blend shapes, a skeleton and a rest animation to the head, so that programs can pose it.
 
     root : path of the UsdSkelRoot
-    mesh : the mesh that they deform
+    mesh : mesh that blend shapes and skeleton deform
+    deformable : the head's mesh with all morph targets at 0
     """
     path = root.AppendChild("skeleton")
     skeleton = UsdSkel.Skeleton.Define(stage, path)
@@ -136,7 +140,7 @@ def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: Def
     _bind_joints(binding, deformable)
     rest.CreateJointsAttr(joints)
     rest.SetTransforms(skeleton.GetRestTransformsAttr().Get())
-    names = valid_names(deformable.rig.targets.names)
+    names = unique_usd_names(deformable.rig.targets.names)
     if names:
         _add_blend_shapes(stage, mesh, deformable, names)
         binding.CreateBlendShapesAttr(names)
@@ -147,8 +151,8 @@ def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: Def
         rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
 
 
-def valid_names(names: Sequence[str]) -> list[str]:
-    """Return unique names of letters, digits and underscores, as USD requires."""
+def unique_usd_names(names: Sequence[str]) -> list[str]:
+    """Return the names made unique, and reduced to letters, digits and underscores as USD requires."""
     valid: list[str] = []
     for name in names:
         identifier = Tf.MakeValidIdentifier(name)
@@ -158,11 +162,11 @@ def valid_names(names: Sequence[str]) -> list[str]:
 
 
 def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
-    """Set the joints of a skeleton and return their paths; a head without bones gets one joint."""
+    """Set the joints of a USD skeleton and return their paths; a head without bones gets a single joint."""
     joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
         joints = []
-        for name, parent in zip(valid_names(skeleton.names), skeleton.parent.tolist(), strict=True):
+        for name, parent in zip(unique_usd_names(skeleton.names), skeleton.parent.tolist(), strict=True):
             joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
         rest, bind = _bone_transforms(skeleton)
     prim.CreateJointsAttr(joints)
@@ -172,7 +176,7 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """Return (b, 4, 4) rest transforms from bones to their parents, and bind transforms to the head [m]."""
+    """Return rest transforms from each bone to its parent, and bind transforms to the head; (b, 4, 4) [m]."""
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))

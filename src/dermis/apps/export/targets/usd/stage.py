@@ -1,6 +1,6 @@
 """USD stage of a head in metres, Y up.
 
-Materials are OpenPBR as MaterialX nodes, with UsdPreviewSurface for programs that do not support them.
+Materials are OpenPBR as MaterialX nodes, with UsdPreviewSurface for programs that do not support OpenPBR.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
-from dermis.apps.export.targets.openpbr.materials import MAPS, OpenPbrMaterial, Value, hair_material
-from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, valid_names
+from dermis.apps.export.targets.openpbr.materials import MAP_TYPES, InputValue, OpenPbrMaterial, hair_material
+from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, unique_usd_names
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.head import Head
 
@@ -27,16 +27,16 @@ _UV = "st"
 
 
 def build_stage(head: Head, name: str, definitions: Mapping[int, OpenPbrMaterial], prefix: str) -> Usd.Stage:
-    """Return the stage of a head.
+    """Return the stage with a head's mesh, hairs, rig and materials.
 
     name : display name of the head
-    definitions : materials by their index in the mesh
+    definitions : OpenPBR materials by material index in the mesh
     prefix : prefix of the file names of the maps, which are beside the stage
     """
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    root = Sdf.Path("/" + valid_names([name])[0])
+    root = Sdf.Path("/" + unique_usd_names([name])[0])
     deformable = DeformableMesh(head)
     root_type = UsdSkel.Root if _has_motion(deformable) else UsdGeom.Xform
     top = root_type.Define(stage, root).GetPrim()
@@ -66,7 +66,7 @@ def _add_materials(
     prefix: str,
 ) -> None:
     UsdGeom.Scope.Define(stage, scope)
-    names = valid_names([definitions[kind].name for kind in subsets])
+    names = unique_usd_names([definitions[kind].name for kind in subsets])
     for (kind, subset), name in zip(subsets.items(), names, strict=True):
         material = _add_material(stage, scope.AppendChild(name), definitions[kind], prefix)
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
@@ -85,7 +85,7 @@ def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
 def _add_material(
     stage: Usd.Stage, path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
 ) -> UsdShade.Material:
-    """Add a material to the stage and return it.
+    """Add an OpenPBR material with its preview surface to the stage and return it.
 
     prefix : prefix of the file names of the maps
     """
@@ -108,7 +108,7 @@ def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, pref
         uv_node.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV)
         uv = uv_node.CreateOutput("out", Sdf.ValueTypeNames.Float2)
     for key, role in definition.maps.items():
-        map_type, types = MAPS[role], Sdf.ValueTypeNames
+        map_type, types = MAP_TYPES[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[map_type.type]
         image = _add_shader(material, f"{role}_image", _NODES[map_type.type])
         file = image.CreateInput("file", types.Asset)
@@ -126,7 +126,10 @@ def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, pref
 
 
 def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str) -> None:
-    """Add the UsdPreviewSurface of a material, which has its colour but no subsurface scattering."""
+    """Add a UsdPreviewSurface with the material's colour, without subsurface scattering.
+
+    prefix : prefix of the file names of the maps
+    """
     types = Sdf.ValueTypeNames
     surface = _add_shader(material, "preview", "UsdPreviewSurface")
     for key, value in definition.values.items():
@@ -142,7 +145,7 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
             uv = uv_node.CreateOutput("result", types.Float2)
         texture = _add_shader(material, f"preview_{role}", "UsdUVTexture")
         texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
-        texture.CreateInput("sourceColorSpace", types.Token).Set(MAPS[role].preview_space)
+        texture.CreateInput("sourceColorSpace", types.Token).Set(MAP_TYPES[role].preview_space)
         texture.CreateInput("st", types.Float2).ConnectToSource(uv)
         for wrap in ("wrapS", "wrapT"):
             texture.CreateInput(wrap, types.Token).Set("clamp")
@@ -163,6 +166,6 @@ def _add_shader(material: UsdShade.Material, name: str, kind: str) -> UsdShade.S
     return shader
 
 
-def _set_input(shader: UsdShade.Shader, name: str, value: Value) -> None:
+def _set_input(shader: UsdShade.Shader, name: str, value: InputValue) -> None:
     types = Sdf.ValueTypeNames
     shader.CreateInput(name, types.Color3f if isinstance(value, tuple) else types.Float).Set(value)

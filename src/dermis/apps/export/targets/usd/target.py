@@ -37,11 +37,11 @@ class Usd(OpenPbr):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of OpenPBR whose random walk is closest to the profile."""
+        """Return the OpenPBR parameters for which the random walk is closest to the reference profile."""
         return (*super().parameters(subject, version), _UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths used as mean free paths."""
+        """Return published diffuse mean free paths in place of OpenPBR's mean free paths."""
         return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -50,19 +50,22 @@ class Usd(OpenPbr):
         file = self.main_file(output, subject, _BINARY)
         prefix = file_prefix(file, subject)
         if file.suffix.lower() != _PACKAGE:
-            return [file, *_write(subject, parameters, file, prefix)]
+            return [file, *_write_stage(subject, parameters, file, prefix)]
         from pxr import UsdUtils
 
         with TemporaryDirectory(prefix="dermis-") as folder:
             stage = Path(folder) / f"{prefix}stage{_BINARY}"
-            _write(subject, parameters, stage, prefix)
+            _write_stage(subject, parameters, stage, prefix)
             if not UsdUtils.CreateNewUsdzPackage(str(stage), str(file)):
                 refuse(output.name, "a package that USD can write", "it failed", "Write a .usdc instead")
         return [file]
 
 
-def _write(subject: Subject, parameters: Parameters, file: Path, prefix: str) -> list[Path]:
-    """Write the stage, and the maps beside it; return the paths of the maps."""
+def _write_stage(subject: Subject, parameters: Parameters, file: Path, prefix: str) -> list[Path]:
+    """Write the stage file, and the maps beside it; return the paths of the maps.
+
+    prefix : prefix of the file names of the maps
+    """
     from dermis.apps.export.targets.usd.stage import build_stage
 
     maps, head = write_maps(subject, file.parent, prefix), subject.head_or_ball

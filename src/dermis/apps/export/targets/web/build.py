@@ -1,4 +1,4 @@
-"""Captured frames of a scene for the web page, for two kinds of adapter and several picture sizes."""
+"""Frames of a scene captured for the web page, for GPUs and software adapters and several picture sizes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.target import floats
+from dermis.apps.export.target import flat_tuple
 from dermis.apps.export.targets.web.frame_json import Json, NamedFrame, PictureMap, PictureMaps, frames_json
 from dermis.apps.export.targets.web.maps import (
     MapPictures,
@@ -29,7 +29,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 OnRenderer = Callable[[Renderer, Scene, Settings], None]
-TECHNIQUES = ("texture-space", "none")
+PAGE_TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
 INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
@@ -38,18 +38,18 @@ INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 
 @dataclass
 class PageContent:
-    """Content of the web page.
+    """Data that the web page embeds: frames, buffers, maps and the poster.
 
-    forms : description of the frames for each kind of adapter, see `dermis.frame.capture.ADAPTER_KINDS`
-    packer : bytes of buffers and textures
+    frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
+    packer : compressed buffers and textures
     maps : maps encoded as pictures
-    pictures : WebP files, in the order of their numbers
-    picture_entries : by role, mip level and layer: number of the picture, number of the byte run of its value
-        curves, and number of its colour channels
-    poster : picture shown until the page renders
+    pictures : WebP files of the maps, in the order in which entries refer to them
+    picture_entries : index in `pictures`, byte run of the value curves, and number of colour channels, by
+        role, mip level and layer of a map
+    poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
-    forms: dict[str, Json] = field(default_factory=dict)
+    frames_by_kind: dict[str, Json] = field(default_factory=dict)
     packer: Packer = field(default_factory=Packer)
     maps: MapPictures = field(default_factory=MapPictures)
     pictures: list[bytes] = field(default_factory=list)
@@ -57,7 +57,10 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
-        """Add a picture and its curves unless present; return its entry of `picture_entries`."""
+        """Add one layer of a map with its value curves unless present; return its entry of `picture_entries`.
+
+        key : role, mip level and layer
+        """
         if key not in self.picture_entries:
             picture = self.maps.pictures[key]
             curves = self.packer.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
@@ -68,12 +71,14 @@ class PageContent:
 
 @dataclass(frozen=True)
 class PageRequest:
-    """Scene and settings from which the content of a page is built.
+    """Scene, sliders and settings for which the frames of the page are captured.
 
-    settings : settings of all frames; size and technique are replaced
-    sizes : sides of the pictures of each kind of adapter, see `PICTURE_SIDES`; without sizes, it is not
-        supported
-    interactive : quality during interaction by kind of adapter, see `INTERACTIVE_QUALITY`; full if absent
+    settings : settings of all frames, except size and technique, which each frame sets
+    sizes : sides of the square pictures by kind of adapter [pixel], see `PICTURE_SIDES`; a page does not run
+        on an adapter of a kind without sizes
+    adapter : adapter on which the frames are captured
+    interactive : reduced quality while the user drags a control, by kind of adapter, see
+        `INTERACTIVE_QUALITY`; full quality for a kind that is absent
     """
 
     scene: Scene
@@ -83,45 +88,57 @@ class PageRequest:
     adapter: str = "auto"
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
-    def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
-        """Yield the settings of each frame, and how many hairs are merged into one (0 at full quality)."""
-        for technique in TECHNIQUES:
-            for side in self.sizes[form]:
+    def frames(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
+        """Yield the settings of each frame, and the number of hairs merged into one (0 at full quality).
+
+        adapter_kind : kind of adapter, "gpu" or "software"
+        """
+        for technique in PAGE_TECHNIQUES:
+            for side in self.sizes[adapter_kind]:
                 yield self.settings_for(side, technique), 0
-            if form in self.interactive:
-                side, samples, merged_hairs = self.interactive[form]
+            if adapter_kind in self.interactive:
+                side, samples, merged_hairs = self.interactive[adapter_kind]
                 yield self.settings_for(side, technique).model_copy(update={"samples": samples}), merged_hairs
 
-    def settings_for(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
-        """Return the settings of a frame; without diffusion it has no interreflection either.
+    def settings_for(self, side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
+        """Return the settings of a frame with a given picture side and technique.
 
-        Links between surfaces for a second layout would add 0.6 MB to the page.
+        Interreflection is off without diffusion, as links for a second atlas layout would add 0.6 MB to the
+        page.
+
+        side : side of the square picture [pixel]
         """
-        diffusion = {"technique": technique, "interreflection": technique == TECHNIQUES[0]}
+        diffusion = {"technique": technique, "interreflection": technique == PAGE_TECHNIQUES[0]}
         return self.settings.model_copy(update={"size": (side, side), **diffusion})
 
 
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
-    """Return the content of the page.
+    """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : called with each kind's renderer, whose maps are by then those that the page decodes
+    on_renderer : called for each kind of adapter with its renderer, scene and settings, when the renderer has
+        the maps that the page will decode; tests compare its pictures with the page's
     """
     content = PageContent()
-    for form in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
-        renderer = capture_renderer(form, request.adapter)
-        content.forms[form] = _build_form(content, renderer, request, form)
-        settings = request.settings_for(request.sizes[form][0])
+    for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
+        renderer = capture_renderer(adapter_kind, request.adapter)
+        content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, request, adapter_kind)
+        settings = request.settings_for(request.sizes[adapter_kind][0])
         on_renderer(renderer, request.scene, settings)
         if content.poster is None:
             content.poster = renderer.draw(request.scene, settings).srgb8()
     return content
 
 
-def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, form: str) -> Json:
-    """Return the description of the frames for one kind of adapter."""
+def _capture_frames(
+    content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
+) -> Json:
+    """Capture the frames for one kind of adapter, add their data to `content` and return their description.
+
+    adapter_kind : kind of adapter, "gpu" or "software"
+    """
     capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
-    for settings, merged_hairs in request.frames(form):
+    for settings, merged_hairs in request.frames(adapter_kind):
         inputs = renderer.prepare(request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
@@ -131,14 +148,14 @@ def _build_form(content: PageContent, renderer: Renderer, request: PageRequest, 
     captured_frames = [frame.captured for frame in frames]
     picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
     steps = quantise_hairs(renderer, capture, captured_frames)
-    form_json = frames_json(capture, frames, picture_maps, steps, content.packer)
-    for frame_json, changes in zip(form_json["frames"], slider_changes, strict=True):
+    kind_json = frames_json(capture, frames, picture_maps, steps, content.packer)
+    for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
-    form_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
+    kind_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
     assert base is not None
-    form_json["hands"] = _interaction(request.scene, base)
-    form_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
-    return form_json
+    kind_json["hands"] = _interaction_json(request.scene, base)
+    kind_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
+    return kind_json
 
 
 def _frame_changes(
@@ -149,7 +166,10 @@ def _frame_changes(
     base: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
-    """Return the changes of a frame at the nodes of each slider."""
+    """Return by slider how the records and buffers of a frame differ at each of its nodes.
+
+    base : inputs of the frame with all sliders at their defaults
+    """
     capture = FrameCapture(renderer.device)
 
     def changes(inputs: FrameInputs | None) -> Json | None:
@@ -165,13 +185,13 @@ def _frame_changes(
 
 
 def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int, int, int]]]:
-    """Return the picture entries of each mip level and layer of a map."""
+    """Return the entries in `PageContent.picture_entries` of each mip level and layer of a map."""
     layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == map_.role)
     return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the index of the colour map, and the pictures that replace it at sampled slider positions."""
+    """Return the index of the colour map, and by slider the pictures that replace it at the nodes."""
     number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}
@@ -187,7 +207,10 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 def _colour_entry(
     content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture entry of the colour map at a slider's node; None if it is unchanged."""
+    """Return the picture entry of the colour map in a slider node's scene; None if the map is unchanged.
+
+    name : role under which the picture is stored
+    """
     if scene is None:
         return None
     if (name, 0, 0) not in content.maps.pictures:
@@ -200,12 +223,15 @@ def _colour_entry(
     return *content.add_picture((name, 0, 0))[:2], 3
 
 
-def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
-    """Return the camera, the lights that can be dragged, and the outline that shadow maps must enclose."""
+def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
+    """Return what the page needs to move camera and lights: views, lights and the head's outline.
+
+    The page fits shadow maps to the outline.
+    """
     camera, settings = scene.camera, inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
-        "centre": [*floats(scene.head.centre_mm)],
+        "centre": [*flat_tuple(scene.head.centre_mm)],
         "camera": {
             "position": list(camera.position),
             "target": list(camera.target),
@@ -223,7 +249,7 @@ def _interaction(scene: Scene, inputs: FrameInputs) -> Json:
 
 
 def _movable_light(light: Light) -> Json | None:
-    """Return the description of a spot light with shadows; None for other lights, which cannot be dragged."""
+    """Return the JSON of a spot light with shadows; None for other lights, which the user cannot drag."""
     if not isinstance(light, SpotLight) or not light.shadows:
         return None
     return {"position": list(light.position), "target": list(light.target), "softness": light.softness_mm}

@@ -1,4 +1,4 @@
-"""JSON description of captured frames, which the page's player reads."""
+"""JSON description of captured frames, which the JavaScript player on the page reads."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from dermis.frame.features.post.picture import Picture
 from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
 Json = dict[str, Any]
-_TABLES = "triangle_table", "triangle_buffer"
+_TRIANGLE_TABLES = "triangle_table", "triangle_buffer"
 
 
 @dataclass(frozen=True)
 class NamedFrame:
     """Captured frame with its name and output picture.
 
-    picture : output of the frame
+    name : technique of the frame
+    captured : passes and uniform records of the frame
+    picture : output of the frame on the device
     size : width and height of the picture [pixel]
-    merged_hairs : number of coarse hairs merged into one during interaction; 0 at full quality
+    merged_hairs : number of hairs drawn as one thicker hair during interaction; 0 at full quality
     """
 
     name: str
@@ -33,11 +35,11 @@ class NamedFrame:
 
 
 class PictureMap(NamedTuple):
-    """Map whose first mip levels are stored as pictures.
+    """Map of the head whose first mip levels are stored as WebP pictures.
 
-    role : binding of the map in shaders
+    role : name of the map's binding in shaders, such as "colour_map"
     mips : number of mip levels stored as pictures
-    mip_passes : passes that compute the other levels on the device; None if these are stored as texels
+    mip_passes : passes that compute further levels on the device; None if those are stored as texels
     """
 
     role: str
@@ -56,16 +58,18 @@ def frames_json(
     steps: dict[int, tuple[float, ...]],
     packer: Packer,
 ) -> Json:
-    """Return the description of frames, whose bytes are added to the packer and referred to by number.
+    """Return the JSON of frames with their shaders, resources and passes, and add their data to the packer.
 
-    steps : steps of the columns of quantised float buffers, by the index of the buffer
+    Resources are created with zeros, so that data which is all zero is not stored.
 
-    New resources are filled with zeros, so content of zeros is not stored.
+    picture_maps : maps that are stored as pictures, by resource index
+    steps : quantisation step of each column of quantised float buffers, by resource index
+    packer : collector of the data, to which the JSON refers by byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
-    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TABLES))
-    for number in read_before_written(capture, captured_frames):
+    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
+    for number in resources_read_first(capture, captured_frames):
         if number in steps:
             floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
             contents[number] = [packer.add_floats(floats, steps[number])]
@@ -87,12 +91,18 @@ def frames_json(
 
 
 def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
-    """Return a function that packs a table's three columns, stored one after the other, separately."""
+    """Return a function that packs each third of a buffer separately and returns the byte run of all.
+
+    The buffers are triangle tables: three columns of equal length, one after the other.
+    """
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
 def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
-    """Return the bytes of a buffer, or of each mip level of a texture with all its layers."""
+    """Return the bytes of a texture by mip level, with all layers of a level joined, or of a buffer.
+
+    number : resource index
+    """
     parts, layers = capture.read_content(number), capture.resources[number].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
@@ -113,14 +123,17 @@ def _frame_json(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
 
 
 def _view_record(captured: CapturedFrame, stage: str) -> int:
-    """Return the index of the record with the view matrices of a stage's passes; -1 for none."""
+    """Return the index of the uniform record with a stage's view matrices; -1 if it has none.
+
+    stage : "visibility" or "shadows"
+    """
     views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
     records = (-1 - k for one in captured.passes if one.stage == stage for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
 def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
-    """Return the passes of a frame; data that the host writes is replaced by its buffer and byte run."""
+    """Return the passes of a frame; bytes that the host writes become a buffer index and a byte run."""
     writes = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
 
@@ -130,7 +143,7 @@ def _program_json(one: Json) -> Json:
 
 
 def _struct_json(dtype: np.dtype[Any]) -> Json:
-    """Return the size of a struct [bytes], and of each member the offset and size in words of 4 bytes."""
+    """Return the size of a uniform struct [bytes], and offset and size of each member in words of 4 bytes."""
     members = {name: _member_json(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
     return {"size": dtype.itemsize, "members": members}
 
@@ -143,7 +156,7 @@ def _member_json(kind: np.dtype[Any], offset: int) -> list[int] | Json:
 
 
 def _camel_keys(value: object) -> object:
-    """Return a nested description with keys in camel case, as WebGPU requires."""
+    """Return nested dictionaries with their keys in camel case, as WebGPU's JavaScript interface requires."""
     if isinstance(value, dict):
         return {_camel_case(name): _camel_keys(one) for name, one in value.items()}
     return value
@@ -154,8 +167,8 @@ def _camel_case(name: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def read_before_written(capture: FrameCapture, frames: Frames) -> list[int]:
-    """Return the sorted indices of resources that some pass reads before any pass writes them.
+def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
+    """Return the sorted indices of resources that a frame reads before writing, whose data the page stores.
 
     Views are replaced by their textures, so that a texture counts as written if any part of it is.
     """
@@ -169,7 +182,7 @@ def read_before_written(capture: FrameCapture, frames: Frames) -> list[int]:
 
 
 def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
-    """Return the resources bound under one of the given names, with that name."""
+    """Return the resources that shaders bind under one of the given names: that name by resource index."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
@@ -178,27 +191,36 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
 
 
 def base_resource(capture: FrameCapture, number: int) -> int:
-    """Return the index of a view's texture; other resources return their own index."""
+    """Return the index of the texture of a texture view; any other resource index is returned unchanged.
+
+    number : resource index
+    """
     return int(capture.resources[number].get("of", number))
 
 
 def read_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
-    """Yield the indices of the resources that a pass may read."""
-    yield from (k for k, entry in _entries(capture, one) if _reads(entry))
+    """Yield the indices of the resources that a pass may read.
+
+    one : the pass
+    """
+    yield from (k for k, entry in _bound_entries(capture, one) if _reads(entry))
     if one.raster and one.raster["indices"] >= 0:
         yield int(one.raster["indices"])
 
 
 def written_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
-    """Yield the indices of the resources that a pass writes."""
+    """Yield the indices of the resources that a pass may write.
+
+    one : the pass
+    """
     if one.written:
         yield one.written[0]
-    yield from (k for k, entry in _entries(capture, one) if _writes(entry))
+    yield from (k for k, entry in _bound_entries(capture, one) if _writes(entry))
     if one.raster:
         yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
 
 
-def _entries(capture: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
+def _bound_entries(capture: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
     if one.program is not None:
         bindings = capture.programs[one.program]["bindings"]
         yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)

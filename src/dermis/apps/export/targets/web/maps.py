@@ -1,4 +1,4 @@
-"""Maps of captured frames stored as WebP pictures, with 8 bits per channel and a value curve per channel."""
+"""Maps of captured frames as WebP pictures, with 8 bits per channel and a curve that decodes each channel."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _COLOUR_CHANNELS = 3
 
 @dataclass(frozen=True)
 class Picture:
-    """One layer of a map, encoded as a picture.
+    """One layer of a map, encoded as a WebP picture.
 
-    data : WebP file; channels of maps other than colours are stacked below each other in grey
-    curves : (c, 256) value of each of the 256 levels of a channel
-    texels : (h, w, c) texels as they are decoded
+    data : WebP file; for maps other than colours a grey picture with the channels below each other
+    curves : (c, 256) value that each of the 256 levels of a channel decodes to
+    texels : (h, w, c) texels decoded from the picture
     """
 
     data: bytes
@@ -43,8 +43,9 @@ class Picture:
 
 
 def encode_picture(texels: Halves, colours: bool) -> Picture:
-    """Return texels (h, w, c) encoded as a picture.
+    """Return one layer of a map encoded as a WebP picture.
 
+    texels : (h, w, c) texels
     colours : whether the first three channels are a colour; further channels are then constant
     """
     curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
@@ -62,7 +63,10 @@ def encode_picture(texels: Halves, colours: bool) -> Picture:
 
 
 def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (256,) increasing values between the extremes of `values`, with smaller steps near 0."""
+    """Return the 256 increasing values to which a channel is quantised, with smaller steps near 0.
+
+    values : texels of the channel, whose minimum and maximum are the ends of the curve
+    """
     limits = np.array([values.min(), values.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
     root = np.linspace(first, last, _STEPS)
@@ -70,7 +74,7 @@ def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _nearest_steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the index of the value of a curve that is nearest to each of `values`."""
+    """Return for each texel the index of the nearest value of an increasing curve."""
     midpoints = 0.5 * (curve[1:] + curve[:-1])
     return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
 
@@ -98,34 +102,41 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """Pictures of all maps.
+    """WebP pictures of all maps that the page stores, by role, mip level and layer.
 
-    Only the first mip level is stored if the device can compute the others.
+    Where the device can compute further mip levels, only the first is stored.
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the picture of a role was encoded."""
+        """Return whether texels equal those from which the stored picture of a role was encoded."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
-        """Replace the textures of maps by their decoded pictures, and return these by index."""
+        """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
+
+        The renderer then shows the same maps as the page. Returns the maps by resource index.
+        """
         maps = {}
         for number, role in _picture_textures(capture, frames).items():
             texture, description = capture.resource_at(number), capture.resources[number]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
             mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(description["mips"]))
-            levels = [self._layers(capture, number, role, mip) for mip in range(mips)]
+            levels = [self._decoded_layers(capture, number, role, mip) for mip in range(mips)]
             small_mips = range(mips, description["mips"] if mips > 1 else 0)
             levels += [read_texels(capture, number, mip) for mip in small_mips]
             update_map(renderer, texture, levels)
             maps[number] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
         return maps
 
-    def _layers(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
-        """Return the (l, h, w, c) decoded texels of a mip level."""
+    def _decoded_layers(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
+        """Return the (l, h, w, c) texels of a mip level as decoded from its pictures, which are added.
+
+        number : resource index
+        mip : mip level
+        """
         layers = read_texels(capture, number, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
@@ -151,7 +162,10 @@ def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Quantise the hair knots in the device's buffers; return the step of each column by buffer."""
+    """Round hair knots in the device's buffers so that they compress well.
+
+    Returns the quantisation step of each column by resource index.
+    """
     buffers = resources_bound_as(capture, frames, ("knots",))
     for number in buffers:
         knots = capture.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
@@ -161,7 +175,10 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
 
 
 def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
-    """Return the (l, h, w, c) texels of a mip level of a half-float texture."""
+    """Return the (l, h, w, c) texels of a mip level of a half-float texture.
+
+    number : resource index
+    """
     width, height, layers = capture.resources[number]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
     parts = capture.read_content(number)[mip * layers : (mip + 1) * layers]
@@ -169,7 +186,7 @@ def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.floa
 
 
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
-    """Return half-float textures that are bound as maps and large enough for pictures, with their roles."""
+    """Return the roles of half-float map textures that are large enough for pictures, by resource index."""
     return {
         number: role
         for number, role in resources_bound_as(capture, frames, _MAP_ROLES).items()

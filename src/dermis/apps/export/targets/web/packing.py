@@ -1,4 +1,4 @@
-"""Compression of buffers: rows are differenced and split into byte planes before gzip (see packed.js)."""
+"""Compression of buffers: differences of rows are split into byte planes before gzip (see packed.js)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Bytes = NDArray[np.uint8]
 ByteRun = tuple[int, int, int, int, int, tuple[float, ...]]
 """Offset and size of a run of bytes, bytes per word, words per row, order of the differences between rows,
 and the step of each float in a row. With 0 bytes per word, the steps are numbers of runs to concatenate."""
-_ESCAPED = frozenset({0, 13, ord("<")})  # characters that a script element would change or end at
+_ESCAPED = frozenset({0, 13, ord("<")})  # characters that HTML changes in, or that end, a script element
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _ORDERS = (0, 1, 2)
 _SAMPLE_BYTES, _SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
@@ -24,7 +24,10 @@ _WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
 class Packer:
-    """Collector of byte runs for one compressed file, in which equal runs are stored once."""
+    """Collector of byte runs for one compressed file, in which equal runs are stored once.
+
+    A run is the data of a buffer, texture or record; `runs` describes how each is encoded.
+    """
 
     def __init__(self) -> None:
         self.runs: list[ByteRun] = []
@@ -33,21 +36,26 @@ class Packer:
         self._end = 0
 
     def add(self, data: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
-        """Add a run of bytes and return its number.
+        """Add a run of bytes and return its index in `runs`.
 
-        layouts : bytes per word, words per row, and order of the differences; the best of them is used
+        layouts : possible layouts of the run, of which the one that compresses best is used: bytes per word,
+            words per row, and order of the differences
         """
         raw = np.frombuffer(data, np.uint8)
         return self._add(raw, list(layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, parts: Iterable[Bytes]) -> int:
-        """Add a run that concatenates other runs, each with its own layout, and return its number."""
+        """Add a run that concatenates parts, each encoded with its own layout; return its index in `runs`."""
         numbers = tuple(self.add(one) for one in parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """Add (n, c) floats that are multiples of (c,) steps, powers of two, and return their number."""
+        """Add floats as integer multiples of a step for each column, and return the index of the run.
+
+        values : (n, c) floats that are multiples of the steps
+        steps : (c,) steps, powers of two
+        """
         words = np.rint(values / np.array(steps)).astype(np.int32)
         layouts = [(4, len(steps), order) for order in _ORDERS]
         return self._add(words.view(np.uint8).reshape(-1), layouts, steps)
@@ -69,12 +77,18 @@ class Packer:
 
 
 def quantise(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np.float32]:
-    """Return (n, c) floats rounded to multiples of (c,) steps."""
+    """Return floats (n, c) rounded to multiples of a step for each column.
+
+    steps : (c,) steps
+    """
     return np.asarray(np.rint(values / np.array(steps)) * np.array(steps), np.float32)
 
 
 def encode_seven_bits(data: bytes) -> str:
-    """Return bytes as text of 7 bits per character; code points that HTML would change are 256 higher."""
+    """Return bytes as text with 7 bits per character, so that HTML can contain them.
+
+    Code points that HTML would change are increased by 256.
+    """
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
     codes = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
@@ -82,10 +96,11 @@ def encode_seven_bits(data: bytes) -> str:
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
-    """Return the bytes of rows of words: all first bytes, then all second bytes, and so on.
+    """Return the bytes of a table of words by byte column, which compresses better than row by row.
 
+    raw : the table, row by row
     word, row : bytes per word and words per row
-    order : how often differences between rows are taken first
+    order : number of times that rows are replaced by their differences from the previous rows
     """
     words = raw.view(_WORDS[word]).copy()
     for _ in range(order):
@@ -100,7 +115,10 @@ def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
 
 
 def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
-    """Return the layout with which a sample of the bytes compresses best."""
+    """Return the layout with which a sample of the bytes compresses best.
+
+    layouts : bytes per word, words per row, and order of the differences
+    """
     sample = raw
     if len(raw) > _SAMPLE_COUNT * _SAMPLE_BYTES:
         starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) for k in range(_SAMPLE_COUNT)]

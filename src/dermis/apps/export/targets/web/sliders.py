@@ -1,4 +1,4 @@
-"""Sliders of the page, as changes in the records and buffers of a captured frame."""
+"""Sliders of the web page, stored as changes of the uniform records and buffers of a captured frame."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ PIGMENT_FACTORS = (0.4, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the page that interpolates a frame between nodes.
+    """Slider of the web page, which interpolates a frame between values at which it was captured (nodes).
 
-    values : increasing values of the nodes, among them `default_value`, at which the frame was captured
-    scenes : scene of each node; None for the default
+    values : increasing values of the nodes; one of them is `default_value`
+    default_value : value with which the page starts
+    scenes : scene at each node; None for the node of the default
     changes_pose_only : whether the scenes differ from the default in the head's pose only
     """
 
@@ -47,10 +48,10 @@ class Slider:
 def node_inputs(
     slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield the frame inputs of each node of a slider; None for the default.
+    """Yield the frame inputs at each node of a slider; None for the node of the default value.
 
-    prepare : returns the frame inputs of a scene
-    base : frame inputs of the default
+    prepare : function that returns the frame inputs of a scene
+    base : frame inputs of the default scene
     """
     for scene in slider.scenes:
         if scene is None:
@@ -63,9 +64,12 @@ def node_inputs(
 
 
 def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
-    """Return the changes of a node's records and buffers: index, first word, and run of the differences.
+    """Return how records and written buffers of a slider node's frame differ from the default frame.
 
-    Integers are not compared: those of the base are used, also as indices of interreflection links.
+    Each change is the index of the record or pass, the first word that differs, and the byte run of the
+    differences. Integers, such as indices of interreflection links, are kept from the default frame.
+
+    base, node : captured frames at the default value and at the node
 
     DermisError : the node's frame has different passes
     """
@@ -73,30 +77,32 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Js
     if stages[0] != stages[1]:
         refuse("slider", "the same passes at each of its nodes", "they differ", "Remove the slider")
     pairs = enumerate(zip(base.records, node.records, strict=True))
-    records = [(k, (_floats(one), _floats(other))) for k, ((_, one), (_, other)) in pairs]
+    records = [(k, (_record_floats(one), _record_floats(other))) for k, ((_, one), (_, other)) in pairs]
     passes = enumerate(zip(base.passes, node.passes, strict=True))
-    written = [(k, (_written(one), _written(other))) for k, (one, other) in passes if one.written]
+    written = [
+        (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
+    ]
     return {"records": _differences(records, packer), "written": _differences(written, packer)}
 
 
-def _floats(record: UniformRecord) -> Floats:
-    """Return the words of a record as floats, with 0 in place of integers."""
+def _record_floats(record: UniformRecord) -> Floats:
+    """Return the 4-byte words of a uniform record as floats, with 0 in place of integers."""
     floats = np.frombuffer(record.tobytes(), "<f4").copy()
-    floats[~_is_float(record.dtype)] = 0.0
+    floats[~_float_word_mask(record.dtype)] = 0.0
     return floats
 
 
-def _is_float(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Return the mask of the words of a record that are floats."""
+def _float_word_mask(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
+    """Return a mask of the 4-byte words of a record that hold floats."""
     is_float = np.zeros(dtype.itemsize // 4, np.bool_)
     for member, offset, *_ in (dtype.fields or {}).values():
         words = slice(offset // 4, (offset + member.itemsize) // 4)
         base, count = member.base, int(np.prod(member.shape, dtype=int))
-        is_float[words] = np.tile(_is_float(base), count) if base.fields else base.kind == "f"
+        is_float[words] = np.tile(_float_word_mask(base), count) if base.fields else base.kind == "f"
     return is_float
 
 
-def _written(one: CapturedPass) -> Floats:
+def _written_floats(one: CapturedPass) -> Floats:
     return np.frombuffer(one.written[1] if one.written else b"", "<f4")
 
 
@@ -142,7 +148,7 @@ def _expression_sliders(scene: Scene) -> list[Slider]:
 
 
 def _pigment_sliders(scene: Scene) -> list[Slider]:
-    """Return sliders of melanin and blood, which change both the diffusion and the painted colour."""
+    """Return sliders of melanin and blood, which change the diffusion profile and the painted colour map."""
     pigments, maps = scene.skin.pigments, scene.head.maps
     if pigments is None or not isinstance(maps, PaintedMaps) or scene.skin.albedo != "map":
         return []

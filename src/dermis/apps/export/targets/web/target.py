@@ -1,4 +1,4 @@
-"""Export to a web page that holds captured frames of a head and the WebGPU player that draws them."""
+"""Export to a web page with captured frames of a head and the WebGPU player that replays them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import gaussian_curve
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, Target, floats, get_numbers
+from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.pages.html import escape_script, render_page
 from dermis.apps.export.targets.web import build
 from dermis.apps.export.targets.web.maps import with_reduced_maps
@@ -28,7 +28,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.settings import Settings
 
-MODULES = (
+PLAYER_MODULES = (
     "graph",
     "packed",
     "device",
@@ -50,12 +50,12 @@ _MAX_MAP_SIDE = 1024
 
 
 def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
-    """Return the HTML of the page.
+    """Return the HTML of the page with all its data and scripts.
 
     title, note : plain text, which is escaped
     """
     scene = {
-        "forms": content.forms,
+        "forms": content.frames_by_kind,
         "blobs": content.packer.runs,
         "images": [len(one) for one in content.pictures],
         "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in sliders],
@@ -75,8 +75,8 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
 
 
 def player_script() -> str:
-    """Return the modules of the player joined into one script."""
-    texts = ((_HERE / f"{name}.js").read_text("utf-8") for name in MODULES)
+    """Return the JavaScript modules of the player joined into one script."""
+    texts = ((_HERE / f"{name}.js").read_text("utf-8") for name in PLAYER_MODULES)
     return "".join(_EXPORT.sub("", _IMPORT.sub("", text)) for text in texts)
 
 
@@ -89,7 +89,7 @@ def _webp(picture: NDArray[np.uint8]) -> bytes:
 
 
 class Web(Target):
-    """Export to a web page that needs no library, server or network."""
+    """Export to a web page that renders the head with WebGPU and needs no library, server or network."""
 
     name = "web"
     title = "WebGPU"
@@ -102,19 +102,19 @@ class Web(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the sum of Gaussians with which the page diffuses light."""
+        """Return the side of the atlas, and the Gaussians with which the page diffuses light."""
         profile = self._profile(subject)
         return (
             Parameter("atlas", _ATLAS_SIDE, "texel", "side of the map in which light is diffused"),
-            Parameter("variance", floats(profile.variance_mm2), "mm2", "of each Gaussian"),
+            Parameter("variance", flat_tuple(profile.variance_mm2), "mm2", "of each Gaussian"),
             *(
-                Parameter(f"weight.{colour}", floats(weight), "-", "of each Gaussian")
+                Parameter(f"weight.{colour}", flat_tuple(weight), "-", "of each Gaussian")
                 for colour, weight in zip(("red", "green", "blue"), profile.weight.T, strict=True)
             ),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the same parameters, as users of the page cannot set any."""
+        """Return the exported parameters, as users of the page cannot choose any."""
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -123,7 +123,7 @@ class Web(Target):
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the page."""
+        """Capture the frames of the scene and write the page with them."""
         scene = subject.scene
         if scene is None:
             actual = f"got the skin {subject.name}"
