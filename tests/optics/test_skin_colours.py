@@ -13,7 +13,7 @@ from dermis.optics.diffusion.models import hankel_transform
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN as FACE
 from dermis.optics.pigments.parameters import SkinParameters
-from dermis.optics.pigments.skin import mixed_layers, spectral_medium
+from dermis.optics.pigments.skin import dj2006_layers, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.skin_colours import colour_table
 from dermis.optics.tissue import load_tissue
@@ -35,7 +35,7 @@ def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floa
 def test_layers_of_many_shares_are_those_of_each_skin() -> None:
     """Layers are equal bit for bit."""
     fractions = np.array([0.0, 0.01, 0.3, 1.0])
-    mixed = mixed_layers(FACE, fractions)
+    mixed = dj2006_layers(FACE, fractions)
     for row, fraction in enumerate(fractions):
         alone = spectral_medium("dj2006", replace(FACE, melanin=fraction, blood=fraction)).layers
         for many, one in zip(mixed, alone, strict=True):

@@ -1,4 +1,4 @@
-"""Reflectance of scattering half-spaces by the directions of incident and emerging light."""
+"""Reflectance of scattering half-spaces as a function of the directions of incident and emerging light."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 TABLE_STEPS = 64
-"""Intervals from 0 to 1 between which tables are interpolated."""
+"""Number of intervals into which tables over [0, 1] divide their argument."""
 DIRECTION_ROWS = 32
-"""Rows of tables over directions."""
+"""Number of incident directions in tables; the square roots of their cosines are evenly spaced."""
 _NODES = 32
 _MAX_ALBEDO = 1.0 - 1e-8
 CACHE_SIZE = 256
-"""Columns of tables that are kept in memory."""
+"""Number of table columns that each function caches."""
 
 
 def interpolate_table(column: Callable[[float], Floats], position: float) -> Floats:
-    """Return a table column at a position in [0, 1] by linear interpolation between cached columns.
+    """Interpolate linearly between the two table columns next to a position in [0, 1].
 
-    column : function that returns the column at a multiple of 1 / TABLE_STEPS; it should be cached
+    column : function from a multiple of 1 / TABLE_STEPS in [0, 1] to a column of the table, an array; it is
+        called twice and should cache its results
     """
     scaled = min(max(position, 0.0), 1.0) * TABLE_STEPS
     low = min(int(scaled), TABLE_STEPS - 1)
@@ -32,25 +33,29 @@ def interpolate_table(column: Callable[[float], Floats], position: float) -> Flo
 
 
 def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
-    """Return `interpolate_table` at positions (c,), with the columns in the last axis."""
+    """Interpolate a table at c positions in [0, 1]; the last axis of the result is c.
+
+    column : function that returns a column of the table, see `interpolate_table`
+    """
     values = np.atleast_1d(np.asarray(positions, np.float64)).tolist()
     return np.stack([interpolate_table(column, value) for value in values], axis=-1)
 
 
 @dataclass(frozen=True)
 class AngularResponse:
-    """Angular dependence of the reflectance of a half-space, relative to a diffuse surface.
+    """Directional factors of the reflectance of a half-space, by which a shader scales diffuse light.
 
-    Light from a direction returns `relative_reflectance` times the total of the profile. It emerges uniformly
-    in all directions, except for light that scattered once, which adds `single_scattering` times (1/(a + b)
-    minus its mean over exit directions), with the cosines a and b of both directions below the surface.
+    The reflectance for light from a direction is `relative_reflectance` times that at normal incidence. The
+    light emerges uniformly in all directions, except for light that scattered once: it adds
+    `single_scattering` times 1/(a + b), minus the mean of this kernel over exit directions, where a and b are
+    the cosines of the incident and the exit direction below the surface.
 
     eta : index of refraction relative to air [-]
-    relative_reflectance : (DIRECTION_ROWS, c) by evenly spaced square roots of the incident cosine; 1 at
-        normal incidence [-]
-    relative_diffuse_reflectance : (c,) for uniform light from all directions [-]
-    single_scattering : (c,) strength of the single-scattering term [-]
-    mean_kernel : mean of 1/(a + b) over both directions [-]
+    relative_reflectance : (DIRECTION_ROWS, c) reflectance over that at normal incidence, at incident cosines
+        in air whose square roots are evenly spaced from 0 to 1 [-]
+    relative_diffuse_reflectance : (c,) reflectance for uniform light over that at normal incidence [-]
+    single_scattering : (c,) factor of the single-scattering kernel [-]
+    mean_kernel : mean of 1/(a + b) over incident and exit directions [-]
     """
 
     eta: float
@@ -61,13 +66,12 @@ class AngularResponse:
 
 
 def angular_response(total: ArrayLike, eta: float) -> AngularResponse:
-    """Return the angular response of half-spaces with given reflectances at normal incidence.
+    """Return the angular response of isotropically scattering half-spaces with given reflectances.
 
-    total : (c,) reflectance of light that enters perpendicularly [-]
+    total : (c,) reflectance of the half-space in each channel for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
 
-    Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for the
-    separation of single scattering.
+    Sources: [Chandrasekhar1960] for the half-space; [Jensen2001] for the separation of single scattering.
     """
     columns = interpolate_columns(partial(_response_column, eta), total)
     table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
@@ -75,7 +79,9 @@ def angular_response(total: ArrayLike, eta: float) -> AngularResponse:
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H function at cosines from the normal, in their shape [-].
+    """Return Chandrasekhar's H function of a half-space at cosines from its normal [-].
+
+    albedo : single-scattering albedo [-]
 
     Source: [Chandrasekhar1960] section 39, the integral over the imaginary axis.
     """
@@ -88,26 +94,32 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_reflectance(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
-    """Return the reflectance of a half-space by the cosine of the incident direction in air [-]."""
+    """Return the reflectance of a half-space for light at incident cosines in air [-].
+
+    albedo : single-scattering albedo of the half-space [-]
+    """
     return _HalfSpace(albedo, eta).reflectance(refracted_cosine(cosine, eta))
 
 
 def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the mean of 1/(a + b) over exit directions b, by the incident cosine in air [-]."""
+    """Return the mean of 1/(a + b) over exit directions, for light that arrives at a given cosine in air [-].
+
+    a and b are the cosines of the incident and the exit direction below the surface.
+    """
     a, critical = np.maximum(refracted_cosine(cosine, eta), 1e-4), critical_cosine(eta)
     return np.asarray(2.0 * eta**2 * (1.0 - critical - a * np.log((a + 1.0) / (a + critical))))
 
 
 def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the cosine below the surface of light with a given cosine in air [-]."""
+    """Return the cosine from the normal below the surface of light at incident cosines in air [-]."""
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 
 class _HalfSpace:
-    """Isotropically scattering half-space below a smooth surface, discretised by direction.
+    """Isotropically scattering half-space below a smooth surface, at discrete directions.
 
-    Light is reflected back and forth between medium R and surface r: the series R + R r R + ... is solved
-    directly.
+    The medium reflects light by an operator R and the surface reflects it back inside by an operator r. Their
+    multiple reflections R + R r R + ... are summed by solving one linear system.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:
@@ -123,24 +135,32 @@ class _HalfSpace:
         )
 
     def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
-        """Return radiance over pi at the nodes, (nodes, n), for light from n cosines."""
+        """Return the radiance that the medium reflects to each direction, over pi, (directions, n).
+
+        mu : (n,) cosines of the incident light below the surface
+        H : (n,) H function at these cosines
+        """
         return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
-        """Return the fraction of light from cosines below the surface that leaves the medium."""
+        """Return the fraction of light at given cosines below the surface that leaves the medium [-]."""
         mu = np.atleast_1d(np.asarray(cosine, np.float64))
         source = self._reflected_radiance(mu, h_function(mu, self._albedo))
         leaving = self.leaving @ np.linalg.solve(self._transport, source)
         return np.asarray(leaving.reshape(np.shape(cosine)))
 
     def diffuse_reflectance(self) -> float:
-        """Return the fraction of uniform light that leaves the medium again."""
+        """Return the fraction of light that enters from a uniform sky and leaves the medium again [-]."""
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _response_column(eta: float, total: float) -> Floats:
-    """Return relative and relative diffuse reflectance and single scattering, (DIRECTION_ROWS + 2,)."""
+    """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
+
+    The first DIRECTION_ROWS elements are the relative reflectance, the last two the relative diffuse
+    reflectance and the factor of single scattering.
+    """
     albedo = albedo_for_reflectance(total, eta)
     space = _HalfSpace(albedo, eta)
     normal = float(space.reflectance(1.0))
@@ -153,13 +173,16 @@ def _response_column(eta: float, total: float) -> Floats:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _mean_kernel(eta: float) -> float:
-    """Return the mean of 1/(a + b) over both directions."""
+    """Return the mean of 1/(a + b) over the cosines a and b of incident and exit directions [-]."""
     mu, weight = gauss_legendre(0.0, 1.0)
     return float((2.0 * weight * mu * mean_single_scattering_kernel(mu, eta)).sum())
 
 
 def albedo_for_reflectance(total: float, eta: float) -> float:
-    """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence."""
+    """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence [-].
+
+    It inverts the reflectance of an isotropically scattering half-space numerically.
+    """
     from scipy.optimize import brentq
 
     def excess(albedo: float) -> float:
@@ -172,7 +195,7 @@ def albedo_for_reflectance(total: float, eta: float) -> float:
 
 
 def internal_reflectance(cosine: Floats, eta: float) -> Floats:
-    """Return the Fresnel reflectance of the surface for unpolarised light from inside [-]."""
+    """Return the Fresnel reflectance for unpolarised light that meets the surface from below [-]."""
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
     along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
@@ -180,12 +203,12 @@ def internal_reflectance(cosine: Floats, eta: float) -> Floats:
 
 
 def critical_cosine(eta: float) -> float:
-    """Return the cosine of the critical angle of total internal reflection."""
+    """Return the cosine from the normal at which total internal reflection begins [-]."""
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
 def gauss_legendre(low: float, high: float, count: int = _NODES) -> tuple[Floats, Floats]:
-    """Return nodes and weights of Gauss-Legendre quadrature on an interval."""
+    """Return nodes and weights of Gauss-Legendre quadrature from `low` to `high`, (count,) each."""
     nodes, weights = _unit_gauss_legendre(count)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
 

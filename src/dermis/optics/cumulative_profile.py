@@ -1,4 +1,4 @@
-"""Cumulative diffusion profiles, by which profiles of different models and renderers are compared."""
+"""Cumulative diffusion profiles, by which diffusion models and renderers are compared."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _ANGLES = 256  # samples of the integral in `edge_response`
 
 
 def radii() -> Floats:
-    """Return the radii of all cumulative profiles, (n,) [mm]: 0, then log-spaced in steps of 2 %."""
+    """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced by 2 %."""
     return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADII)])
 
 
 @dataclass(frozen=True)
 class CumulativeProfile:
-    """Fraction of the light emerging around a narrow beam by radius, in red, green and blue.
+    """Fraction of the emerging light that leaves within each radius of a narrow beam, in red, green and blue.
 
-    radii_mm : (n,) increasing from 0 [mm]
-    fraction : (n, 3) of all emerging light, fraction within each radius, 0 to 1 [-]
-    energy : (3,) emerging light per light that enters [-]
+    radii_mm : (n,) radii, increasing from 0 [mm]
+    fraction : (n, 3) light that emerges within each radius over all emerging light, 0 to 1 [-]
+    energy : (3,) all emerging light over the light that enters [-]
     """
 
     radii_mm: Floats
@@ -35,20 +35,20 @@ class CumulativeProfile:
 
     @classmethod
     def from_function(cls, within: Callable[[Floats], Floats], energy: ArrayLike) -> CumulativeProfile:
-        """Return the profile of a function in closed form.
+        """Sample a function of radius as a cumulative profile.
 
-        within : function from radii (n,) [mm] to the fraction of all emerging light within them, (n,
-            3)
-        energy : (3,) emerging light per light that enters [-]
+        within : function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-]
+        energy : (3,) all emerging light over the light that enters [-]
         """
         grid = radii()
         return cls(grid, np.asarray(within(grid), np.float64), np.asarray(energy, np.float64))
 
     @classmethod
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
-        """Return the cumulative form of a radial profile with three channels.
+        """Sum the ring energies of a radial profile with three channels to a cumulative profile.
 
-        entering_fraction : of the incident light, if the radial profile is per incident light [-]
+        entering_fraction : fraction of the incident light that enters, by which a profile per incident power
+            is divided [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])
@@ -63,10 +63,12 @@ class CumulativeProfile:
         return np.stack(columns, axis=-1)
 
     def edge_response(self, distance_mm: ArrayLike) -> Floats:
-        """Return the emerging light at signed distances x from a straight shadow edge, (..., 3) [-].
+        """Return the radiosity near a straight shadow edge, relative to full light, (..., 3) [-].
 
-        One half-plane is lit uniformly, where x is positive. The response is 1/2 + 1/pi int asin(min(1, x/r))
-        dP(r), by parts 1/2 + 1/pi int_0^(pi/2) P(x / sin t) dt: 1 far inside the light and 0 far outside.
+        distance_mm : signed distances x from the edge, positive in the uniformly lit half-plane [mm]
+
+        With the fraction P(r) of light within a radius r, the response is 1/2 + 1/pi int_0^(pi/2) P(x / sin
+        t) dt at x > 0, and 1 minus the response at -x elsewhere.
         """
         x = np.asarray(distance_mm, np.float64)
         t = (np.arange(_ANGLES) + 0.5) * (0.5 * np.pi / _ANGLES)
@@ -74,16 +76,21 @@ class CumulativeProfile:
         return np.asarray(0.5 + 0.5 * np.sign(x)[..., None] * mean)
 
     def radius_at_fraction(self, fraction: float) -> Floats:
-        """Return the radius within which a fraction of the emerging light leaves, (3,) [mm]."""
+        """Return the radius within which a given fraction of the emerging light leaves, (3,) [mm]."""
         return np.array([np.interp(fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile of the same shape with other totals, (3,)."""
+        """Return a profile with unchanged fractions and a new total reflectance, (3,) [-]."""
         return CumulativeProfile(self.radii_mm, self.fraction, np.asarray(energy, np.float64))
 
 
 def interpolate_cumulative(radius_mm: Floats, edges_mm: Floats, fraction: Floats) -> Floats:
-    """Interpolate a cumulative table (k, 3) that starts at radius 0 monotonically at other radii."""
+    """Interpolate tabulated fractions of light within radii by a monotonic spline, (n, c) [-].
+
+    radius_mm : (n,) radii of the result [mm]
+    edges_mm : (k,) tabulated radii, the first 0 [mm]
+    fraction : (k, c) tabulated fractions [-]
+    """
     from scipy.interpolate import PchipInterpolator
 
     interpolate = PchipInterpolator(np.log(edges_mm[1:]), fraction[1:], axis=0)

@@ -1,4 +1,4 @@
-"""Homogeneous medium that is equivalent to a diffusion profile, and its lateral offset of oblique light."""
+"""Homogeneous medium equivalent to a diffusion profile, and the lateral offset of oblique light in it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ _ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offse
 
 
 def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium:
-    """Return the half-space with a given reflectance whose Hankel transform is as wide as a profile's.
+    """Return the homogeneous half-space with a given reflectance and the width of a profile, per channel.
 
-    Widths are compared by the frequency at which the transform has fallen to half of its total.
+    The width is the inverse of the frequency at which the Hankel transform has fallen to half of its value at
+    0.
 
-    total : (c,) reflectance of light that enters perpendicularly [-]
+    total : (c,) reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     """
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
@@ -44,11 +45,12 @@ def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
-    """Return properties of the half-space with a given reflectance, (2,).
+    """Return albedo and inverse width of the half-space with a given reflectance, a table column (2,).
 
-    The first is the square root of 1 minus the single-scattering albedo [-], the second the frequency at
-    which the Hankel transform of R(r) has fallen to half of its total [1/mean free path]. Tables of photon
-    counts, which are narrower, or layered diffusion are used as for the profile.
+    The first element is the square root of 1 minus the single-scattering albedo [-], the second the frequency
+    at which the Hankel transform of R(r) has fallen to half of its value at 0 [1/mean free path]. If
+    `from_photons` is true and a table of photon counts exists, R(r) is from this table, otherwise from
+    layered diffusion.
     """
     albedo = albedo_for_total(total, eta, from_photons)
     kind = kind_for_index(eta) if from_photons else None
@@ -63,8 +65,9 @@ def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
 def albedo_for_total(total: float, eta: float, from_photons: bool = False) -> float:
     """Return the single-scattering albedo of the half-space with a given total reflectance [-].
 
-    total : reflectance of light that enters perpendicularly [-]
-    from_photons : use tables of photon counts where they exist, not layered diffusion
+    total : reflectance for light at normal incidence [-]
+    eta : index of refraction relative to air [-]
+    from_photons : invert tables of photon counts where they exist, not layered diffusion
     """
     from scipy.optimize import brentq
 
@@ -86,12 +89,16 @@ def _unit_medium(albedo: float, eta: float) -> Medium:
 
 
 def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: float) -> float:
-    """Return the Hankel transform of one channel of a sum of Gaussians (variance, weight)."""
+    """Return the Hankel transform of a sum of Gaussians in one channel at a frequency [-].
+
+    gaussians : variance [mm2] and weight of each Gaussian
+    frequency : frequency [1/mm]
+    """
     return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
 def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> float:
-    """Return the Hankel transform of the first channel of a cumulative profile, divided by its total."""
+    """Return the Hankel transform of a profile's first channel at a frequency, over its total [-]."""
     from scipy.special import j0
 
     edges = cumulative.radii_mm
@@ -100,13 +107,13 @@ def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> fl
 
 
 def _reflectance_transform(medium: Medium, frequency: float) -> float:
-    """Return the Hankel transform of R(r) of a half-space."""
+    """Return the Hankel transform of R(r) of a half-space with one channel at a frequency [1/mm] [-]."""
     A = boundary_mismatch(medium.eta, "exact")
     return float(layered_diffusion.solve_reflectance(np.array([frequency]), medium, A)[0, 0])
 
 
 def _half_frequency(transform: Callable[[float], float]) -> float:
-    """Return the frequency at which a transform has fallen to half of its total [1/mm]."""
+    """Return the frequency at which a Hankel transform has fallen to half of its value at 0 [1/mm]."""
     from scipy.optimize import brentq
 
     total = transform(float(hankel.ZERO_FREQUENCY[0]))
@@ -115,12 +122,12 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
 
 
 def oblique_offset_mm(medium: Medium) -> float:
-    """Return the lateral offset of the mean exit point at grazing incidence, as channel mean [mm].
+    """Return the lateral offset of the mean exit point for grazing light, averaged over channels [mm].
 
-    medium : one layer
+    medium : medium of one layer
 
-    At other angles of incidence, the offset is the sine of the angle times this length, in the direction of
-    propagation.
+    At an angle t from the normal the offset is sin t times this length, in the direction of propagation along
+    the surface.
 
     Source: [WangJacques1995].
     """

@@ -22,13 +22,13 @@ _ADVICE = "Correct the profile's table"
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Diffusion profile R(r) = sum of weight * exp(-r^2 / 2v) / (2 pi v), from narrow to wide.
+    """Diffusion profile R(r) = sum of w exp(-r^2 / 2v) / (2 pi v) over Gaussians.
 
-    name : preset or file
-    variance_mm2 : (k,) increasing [mm2]
-    weight : (k, c) light that each Gaussian spreads, for c channels; the renderer needs three, linear Rec.
-        709 [-]
-    from_photons : whether the sum is fitted to photon counts, not to diffusion
+    name : name of the preset or file
+    variance_mm2 : (k,) variances v, increasing [mm2]
+    weight : (k, c) weights w, the light that each Gaussian spreads in c channels; the renderer needs three,
+        linear Rec. 709 [-]
+    from_photons : whether the sum was fitted to photon counts, not to diffusion
 
     Source: [dEonLuebke2007] section 14.4.
 
@@ -71,7 +71,7 @@ class GaussianSum:
         return np.asarray(self.weight.sum(axis=0))
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """Return R at distances r from a narrow beam of unit power, (..., c) [1/mm2]."""
+        """Return the profile R(r) at distances r from a narrow beam of unit power, (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         gaussians = np.exp(-(r**2) / (2 * self.variance_mm2)) / (2 * np.pi * self.variance_mm2)
         return np.asarray(gaussians @ self.weight)
@@ -82,11 +82,17 @@ class GaussianSum:
         return np.asarray(-np.expm1(-(r**2) / (2 * self.variance_mm2)) @ self.weight)
 
     def hankel(self, frequency: ArrayLike) -> Floats:
-        """Return the integral of 2 pi r R(r) J0(s r) at frequencies s [1/mm], (..., c) [-]."""
+        """Return the Hankel transform of R(r) at frequencies s [1/mm], (..., c) [-].
+
+        It is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
+        """
         s = np.asarray(frequency, dtype=np.float64)[..., None]
         return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)
 
     def inner_product(self, other: GaussianSum) -> Floats:
-        """Return the integral of r R(r) S(r) with another profile S, (c,) [1/mm2]."""
+        """Return the integral of r R(r) S(r) over r, where S is another sum of Gaussians, (c,) [1/mm2].
+
+        It measures the least-squares error between two profiles.
+        """
         gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other.variance_mm2))
         return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other.weight))

@@ -1,4 +1,4 @@
-"""Homogeneous half-spaces from tables of Monte Carlo photon counts."""
+"""Diffusion profiles of homogeneous half-spaces, from tables of Monte Carlo photon counts."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from dermis.optics.media import SKIN_ETA, Floats, Medium
 from dermis.optics.radial import RadialProfile, missing_light_warnings, radius_grid, ring_edges
 
 HalfSpaceKind = Literal["skin", "matched", "walk"]
-"""Surface and illumination of a tabulated half-space.
+"""Name of a tabulated half-space, which tells its surface and illumination.
 
 "skin" has a smooth surface of index 1.4 and "matched" an index-matched one, both lit perpendicularly; "walk"
 has an index-matched surface that is lit uniformly from all directions.
 """
 
-SOURCES = ("Wang1995",)
-ALBEDOS = 0.02, 0.99999
+PHOTON_TABLE_SOURCES = ("Wang1995",)
+TABULATED_ALBEDO_RANGE = 0.02, 0.99999
 """Smallest and largest single-scattering albedo of the tables [-]."""
 _SCALAR_COLUMNS = ("kind", "albedo", "total")
 CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
-"""Name of the model of tabulated photon counts."""
-_MIN_STEP, _MAX_STEP = 0.05, 0.4  # of log r for slopes: larger where few photons leave
-_STEP = 0.02  # times the root of the mean free path over r
+"""Name of the profile model that uses tabulated photon counts."""
+_MIN_STEP, _MAX_STEP = 0.05, 0.4  # step of log r for derivatives: larger where few photons leave
+_STEP = 0.02  # step of log r, over the square root of mean free path / r
 
 
-class _Table(NamedTuple):
-    """Table of photon counts by `_root_absorption` of the albedo.
+class _PhotonTable(NamedTuple):
+    """Monte Carlo photon counts of half-spaces over a = sqrt(1 - albedo), with splines between them.
 
-    scale : (m,) values of `_root_absorption`, increasing
-    edges : (k,) radii of the rings [mean free path]
-    fraction : interpolates the fraction of emerging light within the edges
-    totals : interpolates the total reflectance
+    scale : (m,) values of a, increasing [-]
+    edges : (k,) radii of the ring edges [mean free path]
+    fraction : function from a to the fraction of the emerging light within each edge
+    totals : function from a to the total reflectance
     """
 
     scale: Floats
@@ -48,19 +48,22 @@ class _Table(NamedTuple):
 
 
 def kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the perpendicularly lit kind of half-space for an index of refraction; None without a table."""
+    """Return the tabulated kind of half-space, lit perpendicularly, for an index of refraction.
+
+    The result is None if no table exists for the index.
+    """
     return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
 
 
 def half_space(kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of a half-space in three channels.
+    """Return the cumulative profile of a half-space in three channels from a photon-count table.
 
-    albedo : (3,) of single scattering, 0 to 1; clamped to the range of the table [-]
-    mean_free_path_mm : (3,) [mm]
+    albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
+    mean_free_path_mm : (3,) mean free path [mm]
 
     Source: [Wang1995].
     """
-    table = _table(kind)
+    table = _photon_table(kind)
     return CumulativeProfile.from_function(
         fractions_within(kind, albedo, mean_free_path_mm), table.totals(_table_position(table, albedo))
     )
@@ -69,11 +72,12 @@ def half_space(kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayL
 def fractions_within(
     kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
-    """Return a function from radii (n,) [mm] to the fraction of emerging light within them, (n, 3).
+    """Return a function from radii (n,) [mm] to the fraction of emerging light within each, (n, 3).
 
-    albedo, mean_free_path_mm : as in `half_space`
+    albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
+    mean_free_path_mm : (3,) mean free path [mm]
     """
-    table = _table(kind)
+    table = _photon_table(kind)
     fraction = table.fraction(_table_position(table, albedo))
     mean_free_path = np.asarray(mean_free_path_mm, np.float64)
 
@@ -89,13 +93,13 @@ def fractions_within(
 
 def tabulated_albedo(kind: HalfSpaceKind, total: ArrayLike) -> Floats:
     """Return the single-scattering albedos of half-spaces with given total reflectances [-]."""
-    table = _table(kind)
+    table = _photon_table(kind)
     fine = np.linspace(table.scale[0], table.scale[-1], 2000)
     root = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])
     return np.asarray(1.0 - root**2)
 
 
-def _table_position(table: _Table, albedo: ArrayLike) -> Floats:
+def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
     return np.clip(_root_absorption(albedo), table.scale[0], table.scale[-1])
 
 
@@ -105,7 +109,7 @@ def _root_absorption(albedo: ArrayLike) -> Floats:
 
 
 @cache
-def _table(kind: HalfSpaceKind) -> _Table:
+def _photon_table(kind: HalfSpaceKind) -> _PhotonTable:
     from scipy.interpolate import PchipInterpolator
 
     rows = [row for row in read_rows("dermis.optics", "data/half_space") if row["kind"] == kind]
@@ -117,20 +121,23 @@ def _table(kind: HalfSpaceKind) -> _Table:
     splines: Any = [PchipInterpolator(scale[order], values[order], axis=0) for values in (fraction, total)]
     edges = np.array([0.0, *map(float, columns)])
     from_axis = lambda position: np.pad(splines[0](position), ((0, 0), (1, 0)))  # noqa: E731
-    return _Table(scale[order], edges, from_axis, splines[1])
+    return _PhotonTable(scale[order], edges, from_axis, splines[1])
 
 
 def has_photon_table(medium: Medium) -> bool:
-    """Return whether a medium is a half-space in three channels within the range of the tables."""
+    """Return whether a photon-count table covers a medium: a half-space with three channels.
+
+    Its index of refraction and its reduced albedos must be in the tables.
+    """
     layer = medium.layers[0]
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
-    low, high = ALBEDOS
+    low, high = TABULATED_ALBEDO_RANGE
     inside = (layer.alpha_prime >= low) & (layer.alpha_prime <= high)
     return single and kind_for_index(medium.eta) is not None and bool(inside.all())
 
 
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
-    """Return the cumulative profile of a medium from tables, or None for media that they do not cover.
+    """Return the cumulative profile of a medium from a photon-count table, or None without a table.
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
@@ -141,7 +148,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 
 
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
-    """Return R(r) of a medium from tables, or None for media that they do not cover.
+    """Return the radial profile of a medium from a photon-count table, or None without a table.
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
@@ -162,5 +169,5 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
         edges_mm=edges,
         ring_energy=rings,
         warnings=tuple(missing_light_warnings(cumulative.energy, rings)),
-        sources=(*medium.sources, *SOURCES),
+        sources=(*medium.sources, *PHOTON_TABLE_SOURCES),
     )

@@ -1,4 +1,4 @@
-"""Turbid media: layers that absorb and scatter, in colour channels or wavelengths, by name and from files."""
+"""Turbid media: layers with absorption and scattering coefficients, by name and from TOML files."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dermis.base.tables import read_rows
 Floats = NDArray[np.float64]
 
 SKIN_ETA = 1.4
-"""Index of refraction of skin, as in most of the cited works [-]."""
-_SOURCES = {"jensen2001": ("Jensen2001",), "donner-jensen-2005": ("DonnerJensen2005",)}
+"""Index of refraction of skin relative to air, as in most of the cited works [-]."""
+_TABLE_SOURCES = {"jensen2001": ("Jensen2001",), "donner-jensen-2005": ("DonnerJensen2005",)}
 _DJ3_NOTE = (
     "the printed coefficients are read in 1/cm. Read in 1/mm, as the 2007 deck does, red light would "
     "travel 0.02083 mm between events in the epidermis and nearly all of it would leave within 0.1 mm. The "
@@ -28,19 +28,19 @@ _DJ3_NOTE = (
 _ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
 _MIN_SCATTERING, _MAX_COEFFICIENT = 1e-6, 1e6  # clear water, ten times the absorption of a metal [1/mm]
 _MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
-_KEYS = ("absorption_per_mm", "scattering_per_mm")
+_COEFFICIENT_KEYS = ("absorption_per_mm", "scattering_per_mm")
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Homogeneous layer with coefficients for c channels or wavelengths.
+    """Homogeneous layer of a medium, with coefficients for c channels or wavelengths.
 
-    sigma_a : (c,) absorption [1/mm]
-    sigma_s_prime : (c,) reduced scattering [1/mm]
-    thickness_mm : infinity for a half-space [mm]
-    name : of the layer, for tables and messages
+    sigma_a : (c,) absorption coefficients [1/mm]
+    sigma_s_prime : (c,) reduced scattering coefficients [1/mm]
+    thickness_mm : thickness; infinity for a half-space [mm]
+    name : name of the layer in tables and messages
 
-    Source: names after [Jensen2001] section 2.
+    Source: [Jensen2001] section 2 for the symbols.
     """
 
     sigma_a: Floats
@@ -78,11 +78,11 @@ class Layer:
 class Medium:
     """Stack of layers below a smooth surface, topmost first; below the last layer there is air.
 
-    name : preset or file
-    layers : at least one; only the last may be semi-infinite
+    name : name of the preset or file
+    layers : one or more layers; only the last may be semi-infinite
     eta : index of refraction of all layers relative to air; 1 for an index-matched surface [-]
-    notes : remarks on the numbers, for the user
-    sources : citation keys
+    notes : remarks on the origin of the coefficients, shown to the user
+    sources : keys of the bibliography
     """
 
     name: str
@@ -92,7 +92,7 @@ class Medium:
     sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the layers."""
+        """Check the index of refraction and the layers."""
         if not self.layers:
             refuse(self.name, "at least one layer", "got none", "Add one")
         checked_number(f"{self.name}: index of refraction", self.eta, *_ETA_RANGE)
@@ -112,11 +112,11 @@ class Medium:
         return bool(np.isinf(self.layers[-1].thickness_mm))
 
     def with_eta(self, eta: float) -> Medium:
-        """Return the same layers with another index of refraction."""
+        """Return the medium with another index of refraction."""
         return replace(self, eta=eta)
 
     def channel(self, index: int) -> Medium:
-        """Return the medium of one channel or wavelength."""
+        """Return the medium with only one of its channels or wavelengths."""
         channel = slice(index, index + 1)
         layers = tuple(
             replace(layer, sigma_a=layer.sigma_a[channel], sigma_s_prime=layer.sigma_s_prime[channel])
@@ -143,9 +143,9 @@ def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
 
 @cache
 def media() -> Mapping[str, Medium]:
-    """Return the named media, with the index of refraction of skin."""
+    """Return the published media by name ("skin1", "dj3" ...), with the index of refraction of skin."""
     named: dict[str, Medium] = {}
-    for table, sources in _SOURCES.items():
+    for table, sources in _TABLE_SOURCES.items():
         for name, layers in _read_media(table).items():
             notes = (_DJ3_NOTE,) if name == "dj3" else ()
             named[name] = Medium(name, tuple(layers), SKIN_ETA, notes, sources)
@@ -153,10 +153,10 @@ def media() -> Mapping[str, Medium]:
 
 
 def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
-    """Return the medium described by a parsed TOML file.
+    """Return the medium that a parsed TOML file describes.
 
-    document : `eta` and, topmost first, `[[layers]]` with `absorption_per_mm` and `scattering_per_mm` (lists
-        of 3), and `thickness_mm` in all layers but the last
+    document : optional `name` and `eta`, and `[[layers]]`, topmost first, with `absorption_per_mm` and
+        `scattering_per_mm` (lists of 3), and `thickness_mm` in all layers but the last
 
     Raises DermisError for any other content.
     """
@@ -172,11 +172,11 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
 
 
 def _layer_from_table(culprit: str, table: Mapping[str, Any]) -> Layer:
-    unknown = sorted(set(table) - {"name", "thickness_mm", *_KEYS})
+    unknown = sorted(set(table) - {"name", "thickness_mm", *_COEFFICIENT_KEYS})
     if unknown:
-        known = ", ".join(("name", "thickness_mm", *_KEYS))
+        known = ", ".join(("name", "thickness_mm", *_COEFFICIENT_KEYS))
         refuse(culprit, known, f"got {', '.join(unknown)}", "Take it out or correct its name")
-    absorption, scattering = (_rgb_coefficients(culprit, table, key) for key in _KEYS)
+    absorption, scattering = (_rgb_coefficients(culprit, table, key) for key in _COEFFICIENT_KEYS)
     thickness = table.get("thickness_mm", np.inf)
     if thickness != np.inf:
         thickness = checked_number(
@@ -200,8 +200,9 @@ def _read_media(table: str) -> dict[str, list[Layer]]:
 
 
 def albedo_from_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
-    """Return the single-scattering albedo of the half-space with a given colour, in the colour's shape [-].
+    """Return the single-scattering albedo of the half-space with a given diffuse reflectance [-].
 
+    colour : diffuse reflectance of any shape, 0 to 1 [-]
     g : mean cosine of the scattering angle [-]
 
     Source: van de Hulst's formula inverted, [dEon2016] eq. 53.7.

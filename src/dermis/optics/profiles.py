@@ -1,4 +1,4 @@
-"""Diffusion profiles by name or file: the published table, tables and fits in files, and tissue."""
+"""Diffusion profiles as sums of Gaussians: the published preset, files, and fits to tissue."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ PUBLISHED_PRESET = "gpu-gems-3"
 GAUSSIAN_TERMS = 6
 PHOTON_MODELS = "counted", "montecarlo"
 """Models whose profiles come from photon counts."""
-_HEADER = ["variance_mm2", "red", "green", "blue"]
-_FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
+_CSV_HEADER = ["variance_mm2", "red", "green", "blue"]
+_CSV_FORMAT = "a CSV file with the columns " + ",".join(_CSV_HEADER)
 _CACHED_FILES = 16
-_ADVICE = "Correct the profile's table"
+_PROFILE_ADVICE = "Correct the profile's table"
 
 
 def preset_names() -> tuple[str, ...]:
@@ -45,8 +45,8 @@ def load_profile(
 ) -> GaussianSum:
     """Return the diffusion profile of a preset or a file as a sum of Gaussians.
 
-    Tissue without Gaussians of its own is fitted with six: half-spaces of one medium from tables of photon
-    counts, other tissue by layered diffusion.
+    Tissue has no table of Gaussians and is fitted with six: half-spaces of one medium from tables of photon
+    counts, all other tissue by layered diffusion.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def load_profile(
     pigments : Mapping of str to float, optional
         Fields of `SkinParameters` that replace those of a skin made of pigments.
     initial : GaussianSum, optional
-        Fit of similar pigments to start from, which is several times faster.
+        Fit of a similar skin from which the new fit starts, which is several times faster.
 
     Returns
     -------
@@ -91,36 +91,36 @@ def load_profile(
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
-    """Return the Gaussians that a preset or a file lists, or None for tissue, which has to be fitted.
+    """Return the Gaussians stored in a preset or file, or None for tissue, which has to be fitted.
 
-    Raises DermisError when it is neither, or when its numbers are not a valid profile.
+    Raises DermisError for an unknown name, and for Gaussians that are not a valid profile.
     """
     if str(name) == PUBLISHED_PRESET:
-        return _published()
+        return _published_profile()
     if str(name) in tissue_names():
         return None
     path = Path(name)
     state = _file_state(path)
     if not state and path.suffix.lower() != ".toml":
-        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
+        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_CSV_FORMAT}"
         refuse(f"profile {name}", expected, "there is no such file", "Check the name")
     return _read_gaussians(path, state)
 
 
 @lru_cache(_CACHED_FILES)
 def _read_gaussians(path: Path, state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians of a file, cached because each frame requests them.
+    """Return the Gaussians of a file, cached because each frame requests them; None for tissue.
 
-    state : state of the file as returned by `_file_state`
+    state : state of the file as returned by `_file_state`, so that a changed file is read again
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
         return _from_toml(path, document) if "variances_mm2" in document else None
-    return _parse_csv(str(path), read_text(path, _FILE_FORM))
+    return _parse_csv(str(path), read_text(path, _CSV_FORMAT))
 
 
 def _file_state(path: Path) -> tuple[int, ...]:
-    """Return modification time, size and inode of a file; empty if it does not exist."""
+    """Return modification time, size and inode of a file, to detect changes; empty if it does not exist."""
     try:
         status = path.stat()
     except (OSError, ValueError):  # no such file, an invalid name, or a folder without access
@@ -129,27 +129,27 @@ def _file_state(path: Path) -> tuple[int, ...]:
 
 
 def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any]) -> None:
-    """Write Gaussians to a .toml file atomically.
+    """Write a sum of Gaussians to a .toml file atomically.
 
-    metadata : further entries: text, numbers, and lists of these
+    metadata : further entries of the file by key: text, numbers, and lists of these
 
     Raises DermisError when the file cannot be written.
     """
     lines = ["# Written by dermis profile. Lengths in mm; red, green, blue are linear Rec. 709."]
-    lines += [f"{key} = {_toml(value)}" for key, value in metadata.items()]
-    lines += [f"variances_mm2 = {_toml(profile.variance_mm2)}", "weights = ["]
-    lines += [f"    {_toml(row)}," for row in profile.weight]
+    lines += [f"{key} = {_toml_value(value)}" for key, value in metadata.items()]
+    lines += [f"variances_mm2 = {_toml_value(profile.variance_mm2)}", "weights = ["]
+    lines += [f"    {_toml_value(row)}," for row in profile.weight]
     with atomic_file(path) as temporary:
         temporary.write_text("\n".join([*lines, "]", ""]), encoding="utf-8")
 
 
-def _toml(value: Any) -> str:
+def _toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, np.ndarray):
-        return _toml(value.tolist())
+        return _toml_value(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_toml, value))}]"
+        return f"[{', '.join(map(_toml_value, value))}]"
     if isinstance(value, float):
         return repr(float(value))  # the repr of NumPy scalars contains their type
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
@@ -161,12 +161,12 @@ def _fit_preset(name: str) -> GaussianSum:
 
 
 def fit_profile(tissue: Tissue, name: str | Path, initial: GaussianSum | None = None) -> GaussianSum:
-    """Fit six Gaussians to the default profile of a tissue.
+    """Fit six Gaussians to the diffusion profile that the default model yields for a tissue.
 
-    Fits to photon counts are made to conserve energy: their profiles are steeper than those of diffusion, and
-    the fit would lose up to 2 % of the light.
+    Fits to photon counts keep the total reflectance: their profiles are steeper than those of diffusion, and
+    a free fit would lose up to 2 % of the light.
 
-    initial : fit of a similar tissue to start from, several times faster
+    initial : fit of a similar tissue from which the new fit starts, several times faster
 
     Raises DermisError when the fit is not a valid profile.
     """
@@ -174,9 +174,10 @@ def fit_profile(tissue: Tissue, name: str | Path, initial: GaussianSum | None = 
 
 
 def fit_radial(radial: RadialProfile, name: str, initial: GaussianSum | None = None) -> GaussianSum:
-    """Fit six Gaussians to a radial profile; fits to photon counts conserve energy.
+    """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
-    initial : as in `fit_profile`
+    name : name of the fitted profile
+    initial : fit of a similar profile from which the new fit starts, several times faster
     """
     return _fit_rings(radial.rings(), radial.model, name, initial)
 
@@ -188,7 +189,7 @@ def _fit_rings(rings: RingTarget, model: str, name: str, initial: GaussianSum | 
 
 
 @cache
-def _published() -> GaussianSum:
+def _published_profile() -> GaussianSum:
     file = resources.files("dermis.optics").joinpath(f"data/{PUBLISHED_PRESET}.csv")
     return _parse_csv(PUBLISHED_PRESET, file.read_text("utf-8"))
 
@@ -203,19 +204,21 @@ def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
 
 def _parse_csv(name: str, text: str) -> GaussianSum:
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines or [cell.strip() for cell in lines[0].split(",")] != _HEADER:
+    if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
         actual = f"its first line is {lines[0] if lines else 'missing'!r}"
-        refuse(f"profile {name}", _FILE_FORM, actual, _ADVICE)
+        refuse(f"profile {name}", _CSV_FORMAT, actual, _PROFILE_ADVICE)
     try:
         table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]], dtype=np.float64)
     except ValueError:
         table = np.empty((0, 4))
     if table.ndim != 2 or table.shape[1:] != (4,) or len(table) == 0:
-        refuse(f"profile {name}", "rows of four numbers", "it has other rows", _ADVICE)
+        refuse(f"profile {name}", "rows of four numbers", "it has other rows", _PROFILE_ADVICE)
     return _rgb_sum(name, table[:, 0], table[:, 1:])
 
 
 def _rgb_sum(name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
     if weight.ndim != 2 or weight.shape[1:] != (3,):
-        refuse(f"profile {name}", "weights in red, green and blue", f"got shape {weight.shape}", _ADVICE)
+        refuse(
+            f"profile {name}", "weights in red, green and blue", f"got shape {weight.shape}", _PROFILE_ADVICE
+        )
     return GaussianSum(f"profile {name}", variance_mm2, weight)

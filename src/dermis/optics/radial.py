@@ -12,26 +12,26 @@ from dermis.optics.media import Floats
 
 NOTABLE_FRACTION, TINY = 0.01, float(np.finfo(np.float64).tiny)
 MIN_RADIUS_MM, MAX_RADIUS_MM = 1e-4, 60.0
-"""Range of radii of a profile, over which errors are integrated [mm]."""
+"""Smallest and largest radius of a sampled profile; errors are integrated between them [mm]."""
 
 
 @dataclass(frozen=True)
 class RadialProfile:
-    """Diffusion profile around a point of entry, sampled at radii and integrated over rings, in c channels.
+    """Diffusion profile sampled at radii and integrated over rings, in c channels.
 
-    name : of the medium
-    model : by which the profile was computed
-    radius_mm : (n,) increasing [mm]
+    name : name of the medium
+    model : name of the model that computed the profile
+    radius_mm : (n,) radii r, increasing [mm]
     reflectance : (n, c) R(r) [1/mm2]
-    total : (c,) integral of 2 pi r R(r) [-]
-    edges_mm : (k + 1,) of the rings, starting at 0 [mm]
+    total : (c,) total reflectance, the integral of 2 pi r R(r) [-]
+    edges_mm : (k + 1,) radii of the ring edges, starting at 0 [mm]
     ring_energy : (k, c) light that emerges through each ring [-]
-    standard_error : (n, c) of R(r) if it is from photon counts, else None [1/mm2]
-    total_error : (c,) standard error of the total, likewise [-]
-    incident : whether the profile is per incident power (surface reflection excluded), not per power that
+    standard_error : (n, c) standard error of R(r) if it is from photon counts, else None [1/mm2]
+    total_error : (c,) standard error of the total if it is from photon counts, else None [-]
+    incident : whether R(r) is per incident power (surface reflection excluded) instead of per power that
         enters
-    warnings : reasons to doubt these numbers
-    sources : citation keys
+    warnings : known inaccuracies of the profile, shown to the user
+    sources : keys of the bibliography
     """
 
     name: str
@@ -49,37 +49,42 @@ class RadialProfile:
 
     @property
     def finite_at_centre(self) -> bool:
-        """Return whether R(r) is finite at the point of entry, which it is not for a beam."""
+        """Return whether R(r) is finite at r = 0, so that it can be fitted at points."""
         return self.model not in ("layered", "montecarlo", "counted")
 
     def points(self) -> PointTarget:
-        """Return the target for fits of R(r)."""
+        """Return R(r) at points as the target of a fit."""
         return PointTarget(self.radius_mm, self.reflectance, self.total)
 
     def rings(self) -> RingTarget:
-        """Return the target for fits of ring energies, also valid if R(r) is infinite at its centre."""
+        """Return the ring energies as the target of a fit, also valid if R(r) is infinite at r = 0."""
         return RingTarget(self.edges_mm, self.ring_energy, self.total)
 
 
 def ring_edges(rings: int = 120) -> Floats:
-    """Return the edges of a disc and log-spaced rings around it, (rings + 1,) [mm]."""
+    """Return the radii that bound a disc and the log-spaced rings around it, (rings + 1,) [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, MAX_RADIUS_MM, rings)])
 
 
 def radius_grid(count: int = 600) -> Floats:
-    """Return log-spaced radii, (count,) [mm]."""
+    """Return the log-spaced radii at which profiles are sampled, (count,) [mm]."""
     return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, count)
 
 
 def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
-    """Resample values (m, c) from a log-spaced grid at other radii, with a cubic spline in log r, (n, c)."""
+    """Resample (m, c) values from a log-spaced grid at n radii, by a cubic spline in log r, (n, c)."""
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))
 
 
 def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:
-    """Return the light that emerges within each radius, (n, c) [-], for R(r) on a log-spaced grid."""
+    """Return the light that emerges within each of n radii, the integral of 2 pi r R(r), (n, c) [-].
+
+    radius_mm : (n,) radii [mm]
+    grid_mm : (m,) log-spaced radii of the samples [mm]
+    reflectance : (m, c) R(r) at the radii of the grid [1/mm2]
+    """
     from scipy.integrate import cumulative_simpson
 
     rate = 2.0 * np.pi * grid_mm[:, None] ** 2 * reflectance  # per unit of log r
@@ -90,7 +95,11 @@ def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> 
 
 
 def missing_light_warnings(total: Floats, ring_energy: Floats) -> list[str]:
-    """Return a warning if a notable fraction of the total (c,) is not in the rings (k, c)."""
+    """Return a warning if at least 1 % of the total reflectance emerges outside the rings.
+
+    total : (c,) total reflectance [-]
+    ring_energy : (k, c) light through each ring [-]
+    """
     missing = float(((total - ring_energy.sum(axis=0)) / np.maximum(np.abs(total), TINY)).max())
     if missing < NOTABLE_FRACTION:
         return []
@@ -98,7 +107,7 @@ def missing_light_warnings(total: Floats, ring_energy: Floats) -> list[str]:
 
 
 def gaussian_radial_profile(gaussians: GaussianSum) -> RadialProfile:
-    """Return the radial profile of a sum of Gaussians."""
+    """Sample a sum of Gaussians as a radial profile, to compare it with profiles of other models."""
     radius, edges = radius_grid(), ring_edges()
     return RadialProfile(
         name=gaussians.name,

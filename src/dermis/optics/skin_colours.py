@@ -1,4 +1,4 @@
-"""Colours of many skins at once, from a table over melanin and blood."""
+"""Diffuse colours of many skins at once, from a table over melanin and blood."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.optics.diffusion.hankel import ZERO_FREQUENCY
 from dermis.optics.diffusion.models import hankel_transform
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.parameters import SkinParameters
-from dermis.optics.pigments.skin import mixed_layers
+from dermis.optics.pigments.skin import dj2006_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
@@ -22,19 +22,21 @@ _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 @dataclass(frozen=True)
 class ColourTable:
-    """Colours of skins that differ only in melanin and blood.
+    """Table of diffuse reflectance over melanin (first axis) and blood (second axis).
 
-    colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, by melanin, then blood, both
-        at squares of evenly spaced numbers from 0 to 1 [-]
+    colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, at fractions of melanin and
+        blood whose square roots are evenly spaced from 0 to 1 [-]
     """
 
     colours: Floats
 
     def lookup(self, melanin: Floats, blood: Floats) -> Floats:
-        """Return colours (k, 3) of skins with given fractions (k,) of melanin and blood, 0 to 1 [-].
+        """Interpolate the diffuse reflectance (k, 3) of k skins, linear Rec. 709 [-].
 
-        Interpolation is bilinear in the square roots, in which reflectance is nearly linear: the largest
-        error is 0.004, for very little blood, and 0.0015 for fractions of 0.001 and more.
+        melanin, blood : (k,) fractions of the epidermal and of the dermal volume, 0 to 1 [-]
+
+        Interpolation is bilinear in the square roots, in which reflectance is nearly linear. The error is at
+        most 0.0015 for fractions of at least 0.001, and at most 0.004 for less blood.
         """
         n = len(self.colours)
         (i, u), (j, v) = (_cell_and_offset(fraction, n) for fraction in (melanin, blood))
@@ -46,19 +48,19 @@ class ColourTable:
 
 
 def _cell_and_offset(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the table cell of each fraction, and the position within it from 0 to 1, (k, 1)."""
+    """Return the table cell of each fraction (k,), and the position within the cell from 0 to 1, (k, 1)."""
     position = np.sqrt(np.clip(fraction, 0.0, 1.0)) * (nodes - 1)
     cell = np.minimum(position.astype(np.int64), nodes - 2)
     return cell, (position - cell)[:, None]
 
 
 def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable:
-    """Return the colours of skins by melanin and blood, from layered diffusion.
+    """Compute the diffuse reflectance of skins over melanin and blood by layered diffusion.
 
-    parameters : of the skin; its own melanin and blood are ignored
-    nodes : along each side of the table
+    parameters : parameters of the skins; melanin and blood are ignored
+    nodes : number of fractions along each axis of the table
     """
-    epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
+    epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
     blood = np.arange(nodes)
     spectra = []
     for melanin in np.array_split(np.arange(nodes), -(-nodes // _ROWS_PER_BATCH)):
@@ -72,5 +74,8 @@ def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable
 
 
 def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:
-    """Return some rows of a stacked layer with their channels concatenated."""
+    """Return a layer whose channels are those of the selected rows of stacked layers, concatenated.
+
+    layer : stacked layers, with coefficients (n, c)
+    """
     return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENTS})

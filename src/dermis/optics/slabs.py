@@ -1,4 +1,4 @@
-"""Slabs of anisotropically scattering media by adding and doubling."""
+"""Reflection and transmission of slabs with anisotropic scattering, by adding and doubling."""
 
 from __future__ import annotations
 
@@ -25,26 +25,27 @@ from dermis.optics.angular_response import (
 
 Floats = NDArray[np.float64]
 NODES = 16
-"""Quadrature nodes of directions that leave a slab, and as many of directions that are totally reflected."""
+"""Number of discrete directions that leave a slab, and of directions that are totally reflected."""
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness at which a slab equals a half-space [mean free paths]."""
-_MIN_OPTICAL_DEPTH = 1e-6  # optical depth in which light scatters at most once
-_EXTRAPOLATION_POINTS = 3  # cosines from which values beyond the last one are extrapolated
+_MIN_OPTICAL_DEPTH = 1e-6  # optical depth of a slab in which light scatters at most once
+_EXTRAPOLATION_POINTS = 3  # number of cosines from which values beyond the last cosine are extrapolated
 _MIN_REFLECTANCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseMatrices:
-    """Phase function of a medium averaged over azimuth, at discrete directions.
+    """Phase function averaged over azimuth, as matrices between m discrete directions.
 
-    The forward peak is treated as unscattered light, so that the scaled medium scatters less than the true
-    one.
+    Light in the forward peak of the phase function is treated as unscattered. The scaled medium without the
+    peak therefore scatters less than the true medium.
 
     albedo : single-scattering albedo of the scaled medium [-]
-    extinction : extinction coefficient of the scaled medium over the reduced extinction [-]
-    unscaled_extinction : the same of the true medium [-]
-    backward, forward : (m, m) from cosines to cosines, into the opposite hemisphere and into the same; 1 for
-        isotropic scattering [-]
+    extinction : extinction coefficient of the scaled medium over the reduced extinction coefficient [-]
+    unscaled_extinction : extinction coefficient of the true medium over the reduced extinction coefficient
+        [-]
+    backward, forward : (m, m) phase function from cosine to cosine, into the opposite hemisphere and into the
+        hemisphere of incidence; 1 for isotropic scattering [-]
     """
 
     albedo: float
@@ -55,12 +56,12 @@ class PhaseMatrices:
 
 
 def phase_matrices(albedo: float, g: float, cosine: Floats, terms: int) -> PhaseMatrices:
-    """Return the Henyey-Greenstein phase function expanded in Legendre polynomials.
+    """Expand the Henyey-Greenstein phase function in Legendre polynomials between discrete directions.
 
-    albedo : reduced [-]
-    g : mean cosine, at least 0 and less than 1 [-]
-    cosine : (m,) of the directions
-    terms : of the series; the remainder is treated as unscattered
+    albedo : reduced albedo [-]
+    g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
+    cosine : (m,) cosines of the directions from the normal
+    terms : number of polynomials; the rest of the series is treated as unscattered light
 
     Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
@@ -81,12 +82,12 @@ def phase_matrices(albedo: float, g: float, cosine: Floats, terms: int) -> Phase
 
 @dataclass(frozen=True, eq=False)
 class Slabs:
-    """Reflected and transmitted power of slabs of n thicknesses for m incident directions.
+    """Power reflected and transmitted by slabs in air, for n thicknesses and m incident directions.
 
-    cosine : (m,) incident cosines below the surface, of directions that light from air has [-]
-    flux : (m,) fraction of uniform light from air at each cosine; sums to 1
-    reflected, transmitted : (n, m) fraction that scattered and leaves on the side of entry or on the far side
-        [-]
+    cosine : (m,) cosines of incident light after refraction into the slab [-]
+    flux : (m,) fraction of the light that enters from a uniform sky at each cosine; sums to 1 [-]
+    reflected, transmitted : (n, m) fraction of the light that has scattered and leaves on the side of entry,
+        or on the far side [-]
     """
 
     cosine: Floats
@@ -98,13 +99,15 @@ class Slabs:
 def solve_slabs(
     albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES, g: float = 0.0
 ) -> Slabs:
-    """Compute slabs by adding and doubling; exact except for the discretisation of directions.
+    """Compute reflection and transmission of slabs by adding and doubling.
 
-    albedo : of single scattering, reduced if scattering is anisotropic [-]
+    The result is exact except for the discretisation of directions.
+
+    albedo : single-scattering albedo; the reduced albedo if scattering is anisotropic [-]
     optical_depth : (n,) thickness in (reduced) mean free paths, above 0 [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    nodes : as `NODES`
-    g : mean cosine of scattering, at least 0 [-]
+    nodes : number of directions that leave the slab, and of directions that are totally reflected
+    g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
     """
@@ -118,10 +121,11 @@ def solve_slabs(
 def solve_doubled_slabs(
     albedo: float, smallest_depth: ArrayLike, doublings: int, eta: float, nodes: int = NODES, g: float = 0.0
 ) -> Slabs:
-    """Compute slabs of given depths and all their doublings, in the time of the thickest alone.
+    """Compute slabs of given thicknesses and all their doublings, in the time of the thickest alone.
 
+    albedo, eta, nodes, g : as for `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
-    doublings : number of doublings; the n (doublings + 1) slabs are ordered by doubling, then as
+    doublings : number d of doublings; the n (d + 1) slabs are ordered by the number of doublings, then by
         `smallest_depth`
     """
     transport = _Transport.create(albedo, eta, nodes, g)
@@ -133,11 +137,11 @@ def solve_doubled_slabs(
 
 
 def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
-    """Return cosines, fractions of uniform light and emerging radiance of a half-space by directions.
+    """Return discrete directions, their fractions of uniform light, and emerging radiance of a half-space.
 
-    Cosines (m,) are below the surface. Fractions (m,) are those of uniform light that enters at each cosine.
-    Radiance (m, m) is by exit direction, then entry direction, per light that enters: its mean weighted by
-    the fractions is the reflectance.
+    The directions are cosines (m,) below the surface. The fractions (m,) are those of the light that enters
+    from a uniform sky. The radiance (m, m), by exit and entry direction, is per light that enters: its mean
+    over exit directions, weighted by the fractions, is the reflectance.
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
@@ -151,12 +155,13 @@ def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class _Transport:
-    """Discrete directions in a medium, with their internal reflection and scattering.
+    """Discrete directions in a medium, with internal reflection at its faces and scattering between them.
 
-    mu, flux : (m,) cosines, and fractions of uniform light inside
-    internal : (m,) reflectance of the faces from inside
-    escapes : (m,) whether light at this cosine leaves through a face
-    phase : how the medium scatters
+    mu : (m,) cosines from the normal [-]
+    flux : (m,) fraction of uniform light inside the medium at each cosine [-]
+    internal : (m,) reflectance of the faces from inside [-]
+    escapes : (m,) mask of the cosines that are not totally reflected at a face
+    phase : phase function between the cosines
     """
 
     mu: Floats
@@ -172,12 +177,19 @@ class _Transport:
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
     def doublings(self, depth: float) -> int:
-        """Return how often a slab in which light scatters at most once must be doubled to reach a depth."""
+        """Return the number of doublings from a slab with only single scattering to a given depth.
+
+        depth : thickness in reduced mean free paths [-]
+        """
         return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
 def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floats) -> Slabs:
-    """Return slabs between two faces, lit from air."""
+    """Return slabs between two faces, lit from air, from the operators of the medium without faces.
+
+    R, T : (n, m, m) reflection and transmission, radiance over pi per power from each direction
+    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
+    """
     flux, escapes = transport.flux, transport.escapes
     reflected, transmitted = _add_faces(R * flux, T * flux, unscattered, transport.internal, R, T)
     leaving = flux * (1.0 - transport.internal)
@@ -193,13 +205,13 @@ def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floa
 
 
 def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
-    """Return unscattered light that leaves on the side of entry and on the far side, (n, m) each."""
+    """Return the unscattered light that leaves on the side of entry and on the far side, (n, m) each [-]."""
     down = (1.0 - internal) * unscattered / (1.0 - (unscattered * internal) ** 2)
     return down * unscattered * internal, down
 
 
 def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights of cosines below the surface: escaping ones, then totally reflected ones."""
+    """Return nodes and weights over cosines in a medium: escaping directions, then totally reflected ones."""
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
     parts = [gauss_legendre(low, high, nodes) for low, high in spans]
@@ -210,12 +222,12 @@ def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
 def _doubling_steps(
     transport: _Transport, tau: Floats, doublings: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield reflection, transmission and unscattered light of very thin slabs, then of each doubling.
+    """Yield reflection, transmission and unscattered light of thin slabs, and again after each doubling.
 
     Reflection and transmission are (n, m, m): radiance over pi per power from each direction. Unscattered
     light is (n, m).
 
-    tau : (n,) first thickness in reduced mean free paths
+    tau : (n,) initial thicknesses in reduced mean free paths
     """
     mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
     t = transport.phase.extinction * tau[:, None, None]
@@ -236,10 +248,15 @@ def _doubling_steps(
 def _add_faces(
     up: Floats, down: Floats, unscattered: Floats, internal: Floats, R: Floats, T: Floats
 ) -> tuple[Floats, Floats]:
-    """Return scattered radiance over pi below the upper and above the lower face, per power that enters.
+    """Add internal reflection at both faces to a slab lit by one unit of power per direction.
 
-    up, down : (n, m, m) reflection and transmission operators of the slab
-    internal : (m,) reflectance of a face from inside
+    R, T : (n, m, m) reflection and transmission of the slab without faces, radiance over pi
+    up, down : (n, m, m) R and T as operators, multiplied by the flux of the directions
+    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
+    internal : (m,) reflectance of a face from inside [-]
+
+    Returns the scattered radiance over pi that meets the upper face from below, and the lower face from
+    above.
     """
     if not internal.any():
         return R, T
@@ -256,13 +273,17 @@ def _add_faces(
 
 
 def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
-    """Return `angular_response` of half-spaces with anisotropic scattering and the same reduced coefficients.
+    """Return the angular response of half-spaces with anisotropic scattering.
 
-    The single-scattering term changes by the difference of least-squares fits to all pairs of directions.
+    Their reduced coefficients are those of isotropic half-spaces with the reflectances `total`.
 
-    total : (c,) reflectance of half-spaces that scatter isotropically [-]
+    total : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
-    g : mean cosine of scattering, at least 0 [-]
+    g : mean cosine of the scattering angle, at least 0 [-]
+
+    The single-scattering factor is fitted to the emerging radiance of all pairs of directions by least
+    squares, with g and with isotropic scattering; the difference of both fits is added to the factor of
+    `angular_response`.
     """
     isotropic = angular_response(total, eta)
     if g == 0.0:
@@ -277,7 +298,11 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _response_column(eta: float, g: float, total: float) -> Floats:
-    """Return relative and relative diffuse reflectance and single scattering, (DIRECTION_ROWS + 2,)."""
+    """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
+
+    The first DIRECTION_ROWS elements are the relative reflectance, the last two the relative diffuse
+    reflectance and the factor of single scattering.
+    """
     a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, NODES, g)
     reflectance = fraction @ radiance
     normal = float(_interpolate(a, reflectance, np.ones(1))[0])
@@ -293,7 +318,12 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
 
 
 def _interpolate(known: Floats, values: Floats, cosine: Floats) -> Floats:
-    """Interpolate values at cosines; beyond the known cosines, extrapolate."""
+    """Interpolate samples over cosines linearly, and extrapolate beyond them by a polynomial.
+
+    known : (m,) cosines of the samples
+    values : (m,) samples
+    cosine : cosines of the result
+    """
     order = np.argsort(known)
     x, y = known[order], values[order]
     found = np.interp(cosine, x, y)

@@ -1,4 +1,4 @@
-"""Transmittance and lost reflectance of thin parts of a half-space, as weights of its profile's Gaussians."""
+"""Light through thin parts such as ears, as weights of Gaussians over the thickness of the part."""
 
 from __future__ import annotations
 
@@ -26,31 +26,33 @@ from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, NODES, Slabs, solve_doubled_
 
 Floats = NDArray[np.float64]
 THICKNESS_ROWS = 32
-"""Number of thicknesses in the tables."""
-_DEEP_ENOUGH = 10.0  # mean free paths beyond which relative transmittance by direction is constant
-_UNIFORM_NODES = 8  # quadrature nodes for uniform light
+"""Number of thicknesses of the tables in `ThinParts`."""
+_DEEP_ENOUGH = (
+    10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
+)
+_UNIFORM_NODES = 8  # number of discrete directions for uniform light
 _MIN_DEPTHS, _DOUBLINGS = (
     1e-4 * np.array([1.0, 2.0**0.5]),
     25,
-)  # smallest slabs that are solved, and how often they are doubled [mean free paths]
+)  # thinnest slabs that are solved [mean free paths], and how often they are doubled
 _DEPTHS = (_MIN_DEPTHS * 2.0 ** np.arange(_DOUBLINGS + 1)[:, None]).ravel()
-_MIN_TRANSMITTANCE = 1e-300  # of black slabs of the largest depth
-_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which profiles are compared [1/mean free path]
+_MIN_TRANSMITTANCE = 1e-300  # replaces the transmittance 0 of thick black slabs in divisions
+_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a profile [1/mean free path]
 
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Tables over thickness of weights of k Gaussians in 3 channels, for parts thinner than a half-space.
+    """Transmittance and lost reflectance of thin parts over their thickness, as weights of Gaussians.
 
-    Rows are evenly spaced in the square root of the thickness. Weights are relative to the reflectance of the
-    half-space.
+    The thicknesses are evenly spaced in the square root. The weights are those of k Gaussians in 3 channels,
+    and relative to the reflectance of a half-space of the medium.
 
-    max_thickness_mm : thickness of the last row; that of the first is 0
-    transmitted : (THICKNESS_ROWS, k, 3) light that leaves on the far side [-]
-    lost : (THICKNESS_ROWS, k, 3) light that no longer leaves on the near side, spread like transmitted light
-        [-]
-    directionality : (THICKNESS_ROWS,) weight of `oblique_transmittance`: 1 as in deep slabs, 0 for none [-1,
-        1]
+    max_thickness_mm : thickness at the last index; at index 0 it is 0 [mm]
+    transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
+    lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect, but the thin part does
+        not; it is spread like transmitted light [-]
+    directionality : (THICKNESS_ROWS,) strength of the dependence on incident direction: 1 as
+        `oblique_transmittance` of deep slabs, 0 for none, negative for the opposite, -1 to 1 [-]
     """
 
     max_thickness_mm: float
@@ -62,15 +64,16 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Return the tables of slabs of a medium of one layer.
+    """Compute transmittance and lost reflectance of slabs of a medium of one layer, over thickness.
 
-    variance_mm2 : (k,) of the Gaussians that spread light
-    max_thickness_mm : largest thickness of the tables
-    g : mean cosine of the medium's scattering; its coefficients are reduced [-]
+    variance_mm2 : (k,) variances of the Gaussians that spread light [mm2]
+    max_thickness_mm : largest thickness [mm]
+    g : mean cosine of the scattering angle; the medium's coefficients are reduced [-]
 
-    Transmittance is exact for uniform light; its width is that of layered diffusion at normal incidence.
+    The transmitted power is exact for uniform light. The spread of the light is that of layered diffusion at
+    normal incidence.
 
-    Sources: [Chandrasekhar1960] for the amounts, [Kienle1998] for the widths.
+    Sources: [Chandrasekhar1960] for the power, [Kienle1998] for the spread.
     """
     thickness_mm = max_thickness_mm * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
     transmitted, lost = np.zeros((2, THICKNESS_ROWS, len(variance_mm2), medium.channels))
@@ -87,14 +90,15 @@ def solve_thin_parts(
 
 
 def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
-    """Return the transmittance of deep slabs by incident direction, relative to uniform light.
+    """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
 
-    The result (DIRECTION_ROWS, c) is divided by the reflectance of the half-space by direction. Rows are as
-    in `AngularResponse`.
+    It is the transmittance over that for uniform light, divided by the reflectance of the half-space over
+    that for uniform light. The square roots of the incident cosines in air are evenly spaced from 0 to 1.
 
-    total : (c,) reflectance of the half-space for light that enters perpendicularly [-]
+    total : (c,) reflectance of the half-space for light at normal incidence [-]
+    eta : index of refraction relative to air [-]
     from_photons : whether the profile comes from photon counts, as in `GaussianSum`
-    g : as in `solve_thin_parts`
+    g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total)
 
@@ -107,26 +111,26 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total: float) -> F
 
 
 def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """Return the half-space, and `oblique_transmittance` of deep slabs at its incident cosines."""
+    """Return a half-space as `Slabs`, and `oblique_transmittance` of deep slabs at its incident cosines."""
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, nodes, g)
     deep = solve_slabs(albedo, _DEEP_ENOUGH, eta, nodes, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
-    """Return the transmittance of slabs by direction, (n, m), scaled as in `oblique_transmittance`."""
+    """Return transmittance over reflectance of a half-space, both relative to uniform light, (n, m) [-]."""
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
     return np.asarray(slabs.transmitted / transmitted / reflected)
 
 
 class _SlabTotals(NamedTuple):
-    """Power transmitted by slabs in uniform light, (n,) each.
+    """Transmittance and lost reflectance of n slabs in one channel under uniform light, (n,) each.
 
-    transmittance : of the slab
-    relative_transmittance : transmittance over the reflectance of the half-space
-    lost : reflectance lost by the finite thickness, over the reflectance of the half-space
-    directionality : as in `ThinParts`
+    transmittance : transmitted over incident power [-]
+    relative_transmittance : transmittance over the reflectance of the half-space [-]
+    lost : difference of the reflectances of half-space and slab, over that of the half-space [-]
+    directionality : strength of the dependence on incident direction, as in `ThinParts` [-]
     """
 
     transmittance: Floats
@@ -136,7 +140,7 @@ class _SlabTotals(NamedTuple):
 
 
 def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the totals of each channel, by cubic interpolation between cached depths."""
+    """Yield the slab totals of each channel, by cubic interpolation between cached optical depths."""
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
@@ -149,7 +153,10 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _totals_column(eta: float, g: float, root: float) -> Floats:
-    """Return `_SlabTotals` of all `_DEPTHS`, (n, 4), by the square root of 1 minus the albedo."""
+    """Return the four fields of `_SlabTotals` at the optical depths `_DEPTHS`, (n, 4), for one albedo.
+
+    root : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
+    """
     albedo = min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO)
     slabs = solve_doubled_slabs(albedo, _MIN_DEPTHS, _DOUBLINGS, eta, _UNIFORM_NODES, g)
     half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
@@ -163,7 +170,10 @@ def _totals_column(eta: float, g: float, root: float) -> Floats:
 
 
 def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) -> Floats:
-    """Fit weights of Gaussians to the transmittance profile of each thickness, (n, k); rows sum to 1."""
+    """Fit weights of Gaussians to the normalised transmittance profile of each thickness, (n, k).
+
+    The weights of each thickness sum to 1.
+    """
     from scipy.optimize import nnls
 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0

@@ -1,4 +1,4 @@
-"""Tissue by name: media in three channels, and skins made of pigments by wavelength."""
+"""Tissue by name or file: media in three colour channels, and skins made of pigments by wavelength."""
 
 from __future__ import annotations
 
@@ -13,17 +13,27 @@ from numpy.typing import ArrayLike
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.reading import checked_path, read_toml
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.models import Model, diffusion_profile, diffusion_rings, slab_transmittance
+from dermis.optics.diffusion.models import (
+    DiffusionModel,
+    diffusion_profile,
+    diffusion_rings,
+    slab_transmittance,
+)
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.targets import RingTarget
-from dermis.optics.half_space import ALBEDOS, COUNTED_MODEL, has_photon_table, tabulated_profile
+from dermis.optics.half_space import (
+    COUNTED_MODEL,
+    TABULATED_ALBEDO_RANGE,
+    has_photon_table,
+    tabulated_profile,
+)
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.parameters import DEFAULT_STRUCTURE, SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
 
-ProfileModel = Model | Literal["counted"]
+ProfileModel = DiffusionModel | Literal["counted"]
 """Diffusion model, or "counted": tabulated photon counts for half-spaces of one medium."""
 
 
@@ -53,7 +63,7 @@ class Tissue:
     parameters: SkinParameters | None = None
 
     def __repr__(self) -> str:
-        """Return name, layers and coefficients in three lines."""
+        """Return name, layers and ranges of the coefficients in three lines."""
         layers = self.medium.layers
         a = np.array([layer.sigma_a for layer in layers])
         s = np.array([layer.sigma_s_prime for layer in layers])
@@ -69,7 +79,7 @@ class Tissue:
         heading = f"Tissue {self.medium.name}: {kind}, index of refraction {self.medium.eta:g}"
         return "\n".join([heading, f"  {thicknesses}", f"  {', '.join(ranges)}"])
 
-    def spectrum(self, model: Model = "layered", clamp: Clamp = "layer") -> Floats | None:
+    def spectrum(self, model: DiffusionModel = "layered", clamp: Clamp = "layer") -> Floats | None:
         """Return the total diffuse reflectance at `WAVELENGTHS_NM`, (31,), per incident light [-].
 
         Surface reflection is not included. The result is None for a medium in colour channels.
@@ -80,7 +90,7 @@ class Tissue:
         return np.asarray(entering * diffusion_profile(self.medium, model, clamp).total)
 
     def with_layers(self, layers: Sequence[Layer]) -> Tissue:
-        """Return a tissue with other layers below the same surface.
+        """Return a tissue with other layers, but the name and the index of refraction of this one.
 
         Raises DermisError for a skin made of pigments, and for invalid layers.
         """
@@ -95,9 +105,12 @@ class Tissue:
         return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
-        """Return R(r) in linear Rec. 709, per power that enters, or per incident power for wavelengths.
+        """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        model : by default `default_model`
+        R(r) is per power that enters the tissue; for a skin made of pigments it is per incident power.
+
+        model : model that computes the profile; by default `default_model`
+        clamp : position of the multipole's source in layers thinner than a mean free path
 
         Raises DermisError when the model is not valid for the medium.
         """
@@ -106,22 +119,24 @@ class Tissue:
             return diffusion_profile(self.medium, model, clamp, self.rgb)
         profile = tabulated_profile(self.medium) if self.rgb is None else None
         if profile is None:
-            low, high = ALBEDOS
+            low, high = TABULATED_ALBEDO_RANGE
             expected = f"one semi-infinite layer of index 1 or {SKIN_ETA} and reduced albedo {low} to {high}"
             refuse(f"model {COUNTED_MODEL}", expected, f"got {self.medium.name}", "Use the model layered")
         return profile
 
     def rings(self) -> RingTarget:
-        """Return the ring energies of `profile` without computing the rest of a diffusion profile."""
+        """Return the ring energies of the default profile as a target for fits, faster than `profile`."""
         model = self.default_model
         if model == COUNTED_MODEL:
             return self.profile().rings()
         return diffusion_rings(self.medium, model, rgb=self.rgb)
 
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
-        """Return the transmittance of slabs of the tissue by thickness, (n, 3) [-].
+        """Return the transmittance of slabs of the tissue, (n, 3) [-].
 
-        It is per power that enters, or per incident power for wavelengths.
+        It is per power that enters the slab; for a skin made of pigments it is per incident power.
+
+        thickness_mm : (n,) thicknesses of the slabs [mm]
         """
         slab = slab_transmittance(self.medium, thickness_mm)
         if self.rgb is None:
@@ -130,7 +145,7 @@ class Tissue:
 
 
 def tissue_names() -> tuple[str, ...]:
-    """Return the names that `load_tissue` accepts besides files."""
+    """Return the names of the presets that `load_tissue` accepts."""
     return (*media(), *SKINS)
 
 
@@ -188,7 +203,7 @@ def load_tissue(
 
 
 def _checked_pigments(pigments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return pigments after checking their names."""
+    """Return pigments as a dictionary, after checking that all keys are fields of `SkinParameters`."""
     names = SkinParameters.__dataclass_fields__
     if not isinstance(pigments, Mapping) or not pigments.keys() <= names.keys():
         refuse("pigments", f"some of {', '.join(names)}", f"got {format_value(pigments)}", "Correct them")

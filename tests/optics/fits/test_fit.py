@@ -201,7 +201,7 @@ def test_a_near_fit_leads_to_the_cold_optimum(
     target = stored_rgb(sample_folder, "dj3")
     wider = PointTarget(1.1 * target.radius_mm, target.reflectance * [1.0, 0.8, 0.6], target.total)
     before, cold = (fit_gaussians(t, 6, shared=shared) for t in (wider, target))
-    monkeypatch.setattr(fit_module, "_STARTS", ())  # no other start is needed
+    monkeypatch.setattr(fit_module, "_START_FRACTIONS", ())  # no other start is needed
     warm = fit_gaussians(target, 6, shared=shared, initial=before.profile)
     assert mean_error(warm) <= 1.001 * mean_error(cold)
 
@@ -223,13 +223,13 @@ def test_a_near_fit_of_another_size_is_left_aside(sample_folder: Path) -> None:
 
 def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interactive sliders need fast fits; benchmarks/profiles.py measures the time."""
-    target, steps, project = stored_rgb(sample_folder, "dj3"), [0], variable_projection._project
+    target, steps, project = stored_rgb(sample_folder, "dj3"), [0], variable_projection._optimal_weights
 
-    def counted(*given: Any) -> variable_projection.Fit:
+    def counted(*given: Any) -> variable_projection.WeightedFit:
         steps[0] += 1
         return project(*given)
 
-    monkeypatch.setattr(variable_projection, "_project", counted)
+    monkeypatch.setattr(variable_projection, "_optimal_weights", counted)
     profile = fit_gaussians(target, 6).profile
     assert 0 < steps[0] < 200
     steps[0] = 0

@@ -1,1 +1,1 @@
-"""Diffusion models of tissue: dipole, multipole and layered diffusion, from media to profiles R(r)."""
+"""Diffusion models that predict the profile R(r) of a medium: dipole, multipole and layered diffusion."""

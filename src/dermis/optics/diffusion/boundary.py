@@ -1,4 +1,4 @@
-"""Reflection at a smooth dielectric surface, from outside and from inside."""
+"""Fresnel reflection at the smooth surface of a medium, and the boundary mismatch A of diffusion."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ DiffuseIntegral = Literal["polynomial", "exact"]
 
 
 def normal_reflectance(eta: float) -> float:
-    """Return the Fresnel reflectance at normal incidence [-]."""
+    """Return the Fresnel reflectance at normal incidence for an index of refraction relative to air [-]."""
     return ((eta - 1.0) / (eta + 1.0)) ** 2
 
 
 def fresnel(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the Fresnel reflectance of unpolarised light by incident cosine [-].
+    """Return the Fresnel reflectance for unpolarised light at cosines of incidence [-].
 
-    cosine : of the angle of incidence, 0 to 1
-    eta : index of the far side over that of the near side; less than 1 for light that leaves the medium
+    cosine : cosine of the angle of incidence, 0 to 1
+    eta : index of refraction behind the surface over that in front of it; less than 1 for light that leaves
+        the medium
 
     Source: [Born1999] section 1.5.
     """
@@ -35,7 +36,11 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
 
 @cache
 def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
-    """Return the moment of the internal reflectance: integral of F(mu) mu^order over cosines 0 to 1 [-].
+    """Return the moment int F(mu) mu^order dmu of the internal Fresnel reflectance F [-].
+
+    order : power of the cosine mu, which is integrated from 0 to 1
+    eta : index of refraction relative to air [-]
+    nodes : number of quadrature nodes
 
     Source: [dEonIrving2011] section 3.
     """
@@ -51,9 +56,9 @@ def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
 
 
 def diffuse_reflectance(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
-    """Return the internal reflectance of the surface for diffuse light, F_dr [-].
+    """Return the reflectance F_dr of the surface for diffuse light from inside the medium [-].
 
-    kind : the polynomial used by the published models, or the exact integral
+    kind : "polynomial", the fit used by the published dipole and multipole, or "exact", the integral
 
     Source: [Egan1973]; as printed in [Jensen2001].
     """
@@ -65,7 +70,10 @@ def diffuse_reflectance(eta: float, kind: DiffuseIntegral = "polynomial") -> flo
 
 
 def boundary_mismatch(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
-    """Return A = (1 + F_dr) / (1 - F_dr) of the diffusion boundary condition; 1 if index-matched [-].
+    """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr); 1 at an index-matched surface [-].
+
+    Diffusion extrapolates the fluence to zero at the distance 2 A D above the surface. F_dr is the internal
+    `diffuse_reflectance`, computed as `kind` says.
 
     Source: [Jensen2001] section 2.3.
     """

@@ -1,4 +1,4 @@
-"""Dipole models of a half-space: the classical one, and the better dipole with sources along the beam."""
+"""Dipole models of a half-space: the standard dipole, and the better dipole with sources along the beam."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from dermis.optics.media import Floats, Layer
 
 
 def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
-    """Return depth of the real source and height of its image above the surface, (c,) each, positive [mm].
+    """Return the depth of the real source and the height of its image above the surface, (c,) each [mm].
 
-    A : as returned by `boundary_mismatch` [-]
+    A : boundary mismatch [-]
 
     Source: [Jensen2001] section 2.3.
     """
@@ -21,11 +21,11 @@ def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
 
 
 def flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
-    """Return the flux through the surface from a unit source at a signed depth, (n, c) [1/mm2].
-
-    The medium is infinite.
+    """Return the flux through the surface from a unit point source in an infinite medium, (n, c) [1/mm2].
 
     radius_mm : (n,) distances along the surface [mm]
+    depth_mm : (c,) depth of the source; negative for a source above the surface [mm]
+    sigma_tr : (c,) effective transport coefficient [1/mm]
 
     Source: [Jensen2001] eq. 4 without the misprinted factor: see [JensenBuhler2002] eq. 5.
     """
@@ -35,7 +35,10 @@ def flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
 
 
 def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
-    """Return the diffusion profile R(r) per power that enters the medium, (n, c) [1/mm2].
+    """Return the diffusion profile R(r) of the standard dipole per power that enters, (n, c) [1/mm2].
+
+    radius_mm : (n,) distances r from the beam [mm]
+    A : boundary mismatch [-]
 
     Source: [JensenBuhler2002] eq. 5.
     """
@@ -45,9 +48,9 @@ def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
 
 
 def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
-    """Return the Hankel transform of R(r) at frequencies s [1/mm], (n, c) [-].
+    """Return the Hankel transform of the dipole's R(r) at frequencies s [1/mm], (n, c) [-].
 
-    It is the integral of 2 pi r R(r) J0(s r).
+    It is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
     """
     z_r, z_v = source_depths(layer, A)
     q = np.sqrt(layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
@@ -55,17 +58,17 @@ def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
 
 
 def total_reflectance(layer: Layer, A: float) -> Floats:
-    """Return the total reflectance per power that enters, (c,) [-]."""
+    """Return the total reflectance of the dipole model per power that enters, (c,) [-]."""
     return np.asarray(reflectance_hankel(0.0, layer, A))
 
 
 def better_dipole_reflectance(radius_mm: ArrayLike, layer: Layer, eta: float, sources: int = 100) -> Floats:
-    """Return R(r) of a half-space for light that scattered at least twice, (n, c) [1/mm2].
+    """Return R(r) of the better dipole, for light that scattered at least twice, (n, c) [1/mm2].
 
     R(r) is per power that enters.
 
-    radius_mm : (n,) distances [mm]
-    eta : index of refraction [-]
+    radius_mm : (n,) distances r from the beam [mm]
+    eta : index of refraction relative to air [-]
     sources : number of point sources along the beam
 
     Source: [dEonIrving2011] with the corrections of [Habel2013], as the dipole term of [Pharr2023].

@@ -1,4 +1,4 @@
-"""Inverse Hankel transform of radial profiles on logarithmic grids."""
+"""Numerical inverse Hankel transform, from transforms of radial profiles to R(r), on log-spaced grids."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ _CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
 _STEP = _DECADES * np.log(10.0) / SAMPLE_COUNT
 
 ZERO_FREQUENCY = np.array([1e-8])
-"""Frequency so low that a transform equals its total there [1/mm]."""
+"""Frequency so low that a Hankel transform equals the total reflectance there, (1,) [1/mm]."""
 
 
 @cache
 def frequencies() -> Floats:
-    """Return the frequencies s for `inverse_transform`, (SAMPLE_COUNT,) log-spaced [1/mm]."""
+    """Return the frequencies s of a transform for `inverse_transform`, (SAMPLE_COUNT,) [1/mm].
+
+    They are log-spaced.
+    """
     return np.asarray(
         _CENTRE_FREQUENCY_PER_MM * np.exp(_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
     )
@@ -27,14 +30,17 @@ def frequencies() -> Floats:
 
 @cache
 def radii() -> Floats:
-    """Return the radii of the results of `inverse_transform`, (SAMPLE_COUNT,) log-spaced [mm]."""
+    """Return the radii r at which `inverse_transform` returns R(r), (SAMPLE_COUNT,) log-spaced [mm]."""
     return np.asarray(np.exp(_offset()) / frequencies()[::-1])
 
 
 def inverse_transform(transform: Floats) -> Floats:
-    """Return R(r) at `radii` from its Hankel transform at `frequencies`, both (SAMPLE_COUNT, c) [1/mm2].
+    """Return R(r) at `radii` from its Hankel transform, (SAMPLE_COUNT, c) [1/mm2].
 
-    The relative error is 1e-8 over six decades of R(r), and 1e-9 of its largest value below that.
+    transform : (SAMPLE_COUNT, c) Hankel transform at `frequencies` [-]
+
+    The relative error is 1e-8 where R(r) is within six decades of its maximum; elsewhere the error is 1e-9 of
+    the maximum.
 
     Source: [Hamilton2000], a fast Fourier transform in the logarithm of s.
     """

@@ -1,7 +1,9 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain each layer satisfies D phi'' - D q^2 phi = -S(z). A recursion from bottom to top
-propagates the boundary condition imposed by all layers below: D phi' = W - Z phi at the lower face.
+In the Hankel domain the fluence phi(z) of each layer satisfies D phi'' - D q^2 phi = -S(z), with q^2 =
+sigma_tr^2 + s^2 at the frequency s and the source S of light that scattered for the first time. A recursion
+from bottom to top propagates the boundary condition D phi' = W - Z phi, which all lower layers impose on a
+face.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ Source = Literal["beam", "point"]
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or the part of a layer above or below a point source."""
+    """Whole layer, or the part of a layer above or below the point source that it contains."""
 
     layer: Layer
     thickness_mm: float | Floats
@@ -27,14 +29,16 @@ class _Sublayer(NamedTuple):
 
 
 class _Face(NamedTuple):
+    """Boundary condition D phi' = W - Z phi for the fluence phi at a face."""
+
     Z: Floats
     W: Floats
 
 
 class _DownwardTransfer(NamedTuple):
-    """Coefficients that give the fluence at the lower face of a sublayer from that at its upper face.
+    """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
 
-    All are 0 for the semi-infinite sublayer at the bottom.
+    All are 0 for a semi-infinite sublayer, the last of a half-space.
     """
 
     E: Floats | float = 0.0
@@ -49,13 +53,14 @@ class _DownwardTransfer(NamedTuple):
 
 
 def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) at frequencies s > 0, (n, c) each [-].
+    """Return the Hankel transforms of R(r) and T(r) of a layered medium, (n, c) each [-].
 
-    R(r) and T(r) are per power that enters.
+    R(r) and T(r) are the profiles at the upper and the lower face per power that enters.
 
+    frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
-    source : "beam" distributes first scattering along the beam, with a logarithmic singularity of R(r) at its
-        centre; "point" puts it one mean free path deep, with finite R(r)
+    source : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at r =
+        0; "point" places it one mean free path deep, so that R(r) is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
@@ -63,14 +68,20 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
 
 
 def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
-    """Return the transform of R(r) of `solve`, without computing that of T(r)."""
+    """Return only the transform of R(r) that `solve` computes, in less time, (n, c) [-]."""
     return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
 
 
 def solve_thicknesses(
     frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
 ) -> tuple[Floats, Floats]:
-    """Return `solve` of single layers of n thicknesses, (n, m, c) at m frequencies."""
+    """Return the Hankel transforms of R(r) and T(r) of slabs of one layer, by thickness, (n, m, c) each [-].
+
+    frequency : (m,) frequencies s > 0 [1/mm]
+    layer : absorption and scattering of the slabs; its own thickness is ignored
+    thickness_mm : (n,) thicknesses of the slabs [mm]
+    A : boundary mismatch with air [-]
+    """
     ones = np.ones(len(layer.sigma_a))
     sublayer = _Sublayer(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
     return _solve_sublayers(frequency, [sublayer], len(ones), A)
@@ -79,7 +90,7 @@ def solve_thicknesses(
 def _solve_sublayers(
     frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
 ) -> tuple[Floats, Floats]:
-    """Return `solve` of sublayers, topmost first."""
+    """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
     fluence, transfers = _solve_upwards(frequency, sublayers, channels, A)
     R = fluence / (2.0 * A)
     for transfer in transfers:
@@ -90,7 +101,7 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the transfer down through each sublayer, topmost first."""
+    """Return the fluence at the surface, and the downward transfer through each sublayer, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channels))
     face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
@@ -101,7 +112,13 @@ def _solve_upwards(
 
 
 def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, _DownwardTransfer]:
-    """Return the boundary condition at a sublayer's upper face from that at its lower face."""
+    """Propagate the boundary condition from a sublayer's lower to its upper face.
+
+    s : frequencies [1/mm]
+    below : boundary condition at the lower face
+
+    Returns the condition at the upper face, and the transfer of fluence back down.
+    """
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
     q = np.sqrt(layer.sigma_tr**2 + s**2)
@@ -135,7 +152,10 @@ def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:
 
 
 def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
-    """Yield each layer in two sublayers; the source is where the beam's optical depth is one."""
+    """Yield two sublayers per layer; the layer of the point source is divided at the source.
+
+    The source is at the depth where the optical depth reaches 1.
+    """
     depth = np.zeros(medium.channels)
     zero = np.zeros(medium.channels)
     for i, layer in enumerate(medium.layers):

@@ -1,4 +1,4 @@
-"""Diffusion profiles of media by model, and known errors of the models."""
+"""Diffusion profiles of media by a named diffusion model, and the measured errors of these models."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from dermis.optics.radial import (
     ring_edges,
 )
 
-Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point"]
+DiffusionModel = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point"]
 
-SOURCES: dict[Model, tuple[str, ...]] = {
+MODEL_SOURCES: dict[DiffusionModel, tuple[str, ...]] = {
     "dipole": ("Jensen2001", "JensenBuhler2002"),
     "better-dipole": ("dEonIrving2011", "Habel2013", "Pharr2023"),
     "multipole": ("DonnerJensen2005", "Contini1997"),
@@ -39,23 +39,23 @@ SOURCES: dict[Model, tuple[str, ...]] = {
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
 _MIN_ACCURATE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
-_NOTABLE_NEGATIVE = 0.005  # fraction of the total
+_NOTABLE_NEGATIVE = 0.005  # negative light over the total reflectance, above which a warning is given
 
 
 def diffusion_profile(
-    medium: Medium, model: Model = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
+    medium: Medium, model: DiffusionModel = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
 ) -> RadialProfile:
-    """Return R(r) of a medium by a diffusion model.
+    """Return the diffusion profile R(r) of a medium, computed by a diffusion model.
 
     medium : stack of layers
-    model : "dipole" and "better-dipole" require one half-space; the others accept any stack
-    clamp : position of the multipole's source in thin layers
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels, per incident
-        power
+    model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
+    clamp : position of the multipole's source in layers thinner than a mean free path
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels and is per
+        incident power
 
     Raises DermisError when the model is not valid for the medium.
 
-    Source: see `SOURCES`.
+    Source: see `MODEL_SOURCES`.
     """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges, radius = ring_edges(), radius_grid()
@@ -70,29 +70,29 @@ def diffusion_profile(
         ring_energy=ring_energy,
         incident=rgb is not None,
         warnings=(*_medium_warnings(medium, model, clamp), *_result_warnings(total, ring_energy)),
-        sources=(*medium.sources, *SOURCES[model]),
+        sources=(*medium.sources, *MODEL_SOURCES[model]),
     )
 
 
 def diffusion_rings(
-    medium: Medium, model: Model = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
+    medium: Medium, model: DiffusionModel = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
 ) -> RingTarget:
-    """Return the ring energies of `diffusion_profile` alone, for fits of many media."""
+    """Return only the ring energies that `diffusion_profile` computes, as a target for fits of many media."""
     grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
 
 
 def _sampled_profile(
-    medium: Medium, model: Model, clamp: Clamp, rgb: Floats | None
+    medium: Medium, model: DiffusionModel, clamp: Clamp, rgb: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return radii (n,) [mm], R(r) at these radii (n, c) [1/mm2], and the total reflectance (c,) [-]."""
+    """Return radii r (n,) [mm], R(r) at these radii (n, c) [1/mm2], and the total reflectance (c,) [-]."""
     if model in ("dipole", "better-dipole"):
         _check_half_space(medium, model)
     closed_form = rgb is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
     if closed_form or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
-        values = _closed_form(medium, model, clamp, grid)
+        values = _closed_form_profile(medium, model, clamp, grid)
         values = values if rgb is None else values @ rgb.T
     else:
         grid = hankel.radii()
@@ -109,8 +109,8 @@ def _sampled_profile(
     return grid[inside], values[inside], total
 
 
-def hankel_transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> Floats:
-    """Return the Hankel transform of R(r) at frequencies s > 0 [1/mm], (n, c) [-]."""
+def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, frequency: Floats) -> Floats:
+    """Return the Hankel transform of a model's R(r) at frequencies s > 0 [1/mm], (n, c) [-]."""
     if model in ("layered", "layered-point"):
         A = boundary_mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
@@ -118,14 +118,14 @@ def hankel_transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floa
     return multipole.stack_response(frequency, medium, boundary_mismatch(medium.eta), clamp).R_above
 
 
-def _check_half_space(medium: Medium, model: Model) -> None:
+def _check_half_space(medium: Medium, model: DiffusionModel) -> None:
     if len(medium.layers) > 1 or not medium.semi_infinite:
         last = f"the last {medium.layers[-1].thickness_mm:g} mm thick"
         actual = f"{medium.name} has {len(medium.layers)} layers, {last}"
         refuse(f"model {model}", "one semi-infinite layer", actual, "Use the model multipole or layered")
 
 
-def _closed_form(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
+def _closed_form_profile(medium: Medium, model: DiffusionModel, clamp: Clamp, radius_mm: Floats) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
         return dipole.better_dipole_reflectance(radius_mm, layer, medium.eta)
@@ -135,7 +135,7 @@ def _closed_form(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) 
     return multipole.reflectance(radius_mm, slab)
 
 
-def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
+def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> list[str]:
     """Return warnings about properties of the medium for which the model is inaccurate."""
     warnings = []
     for number, layer in enumerate(medium.layers, 1):
@@ -154,7 +154,7 @@ def _medium_warnings(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction of first events within one mean free path that are scattering, (c,) [-]."""
+    """Return the fraction of a photon's first events in the top mean free path that scatter it, (c,) [-]."""
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
         events = np.minimum(layer.sigma_t_prime * layer.thickness_mm, 1.0 - depth)
@@ -163,7 +163,7 @@ def _first_event_albedo(medium: Medium) -> Floats:
 
 
 def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about unphysical results and light missing from the rings."""
+    """Return warnings about negative reflectances, and about totals that differ from the sum of the rings."""
     warnings = missing_light_warnings(total, ring_energy)
     if (total < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
@@ -181,10 +181,12 @@ def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
 
 
 def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
-    """Return the transmittance of a slab lit uniformly from behind, by its profile alone, (n, 3) [-].
+    """Return the transmittance of slabs lit uniformly from behind, from a sum of Gaussians, (n, 3) [-].
 
-    At a distance of sqrt(r^2 + d^2), a Gaussian G(v, r) of variance v is exp(-d^2 / 2v) G(v, r): each weight
-    is reduced by this factor.
+    thickness_mm : (n,) thicknesses d of the slabs [mm]
+
+    R is evaluated at the distance sqrt(r^2 + d^2), where a Gaussian G(v, r) of variance v becomes exp(-d^2 /
+    2v) G(v, r): each weight is multiplied by this factor.
 
     Source: [dEonLuebke2007] section 14.5.
     """
@@ -195,10 +197,11 @@ def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Flo
 def slab_transmittance(
     medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Return the transmittance of slabs of a medium by thickness, per power that enters, (n, c) [-].
+    """Return the transmittance of the medium cut off at each thickness, per power that enters, (n, c) [-].
 
-    model : layered diffusion includes unscattered light, attenuated by the reduced extinction; the multipole
-        scatters all light at one depth, and is inaccurate for layers thinner than a mean free path
+    thickness_mm : (n,) thicknesses of the slab [mm]
+    model : "layered" includes unscattered light, attenuated by the reduced extinction; "multipole" scatters
+        all light at one depth, which is inaccurate for layers thinner than a mean free path
 
     Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
@@ -218,7 +221,7 @@ def slab_transmittance(
 
 
 def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
-    """Return the upper part of a medium down to a depth [mm], with air below; all of it if it is thinner."""
+    """Return the top of a medium down to a depth [mm], with air below; a thinner medium is returned whole."""
     if not 0.0 < thickness_mm < np.inf:
         refuse("thickness", "a length above 0 mm", f"got {thickness_mm:g}", "Correct it")
     layers, remaining_mm = [], thickness_mm
@@ -232,10 +235,10 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 
 @dataclass(frozen=True)
 class ModelError:
-    """Error of a model in the ring energies, relative to Monte Carlo [-].
+    """Relative error of a diffusion model's ring energies, with Monte Carlo as the reference.
 
-    smallest, largest : (3,) smallest and largest error over the tissues, in red, green and blue
-    tissues : on which the error was measured
+    smallest, largest : (3,) smallest and largest error over the tissues, in red, green and blue [-]
+    tissues : names of the tissues on which the error was measured
     """
 
     smallest: Floats
@@ -244,11 +247,11 @@ class ModelError:
 
 
 def known_error(model: str, tissue: str = "") -> ModelError | None:
-    """Return the error of a model for a tissue, or over all measured tissues; None if it was never measured.
+    """Return the measured error of a diffusion model, or None if the model was never measured.
 
-    tissue : name of a tissue, empty for any
+    tissue : name of a tissue; if it is empty or was not measured, the error ranges over all measured tissues
     """
-    by_tissue = {name: error for (name, key), error in _error_table().items() if key == model}
+    by_tissue = {name: error for (name, key), error in _measured_errors().items() if key == model}
     if tissue in by_tissue:
         by_tissue = {tissue: by_tissue[tissue]}
     if not by_tissue:
@@ -258,14 +261,14 @@ def known_error(model: str, tissue: str = "") -> ModelError | None:
 
 
 def error_against_photons(radial: RadialProfile, photons: RadialProfile) -> ModelError:
-    """Return the error of a profile relative to photon counts of the same tissue."""
+    """Return the error of a profile's ring energies relative to photon counts of the same tissue."""
     squares = ((radial.ring_energy - photons.ring_energy) ** 2).sum(axis=0)
     error = np.sqrt(squares / (photons.ring_energy**2).sum(axis=0))
     return ModelError(error, error, (radial.name,))
 
 
 @cache
-def _error_table() -> dict[tuple[str, str], Floats]:
+def _measured_errors() -> dict[tuple[str, str], Floats]:
     rows = read_rows("dermis.optics.data", "model_errors")
     errors = float_columns(rows, "red green blue")
     return {(row["tissue"], row["model"]): error for row, error in zip(rows, errors, strict=True)}

@@ -1,4 +1,4 @@
-"""Multipole model: a slab by mirror images at both faces, and stacks of slabs in the Hankel domain."""
+"""Multipole model: slabs as series of mirror images at both faces, and stacks of slabs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Clamp = Literal["none", "layer"]
 
 @dataclass(frozen=True)
 class Slab:
-    """Layer between two faces, with the position of its source.
+    """Layer between two faces, for which the multipole model is solved.
 
-    layer : the medium; its thickness may be infinite
-    A_top, A_bottom : boundary mismatch of the faces; 1 where the index does not change [-]
+    layer : absorption, scattering and thickness; the thickness may be infinite
+    A_top, A_bottom : boundary mismatch of the upper and the lower face; 1 at index-matched faces [-]
     clamp : "none" puts the source one mean free path deep as published, even below the slab; "layer" keeps it
         inside
 
@@ -34,27 +34,27 @@ class Slab:
 
     @property
     def source_mm(self) -> Floats:
-        """Return the depth of the source, (c,) [mm]."""
+        """Return the depth of the real point source below the upper face, (c,) [mm]."""
         l, d = self.layer.mean_free_path_mm, self.layer.thickness_mm
         return np.minimum(l, d) if self.clamp == "layer" else l
 
     @property
     def z_b(self) -> tuple[Floats, Floats]:
-        """Return the distances of the extrapolated boundaries from both faces, (c,) each [mm]."""
+        """Return the distances above and below the slab of zero extrapolated fluence, (c,) each [mm]."""
         return 2.0 * self.A_top * self.layer.D, 2.0 * self.A_bottom * self.layer.D
 
     @property
     def period_mm(self) -> Floats:
-        """Return the period of the mirror images, (c,) [mm]."""
+        """Return the distance in depth after which the mirror images repeat, (c,) [mm]."""
         return np.asarray(2.0 * (self.layer.thickness_mm + sum(self.z_b)))
 
     def flipped(self) -> Slab:
-        """Return the slab upside down, for light from below."""
+        """Return the slab upside down, to solve for light that enters from below."""
         return Slab(self.layer, self.A_bottom, self.A_top, self.clamp)
 
 
 def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
-    """Return the Hankel transform of R(r) at frequencies [1/mm], as a closed form, (n, c) [-]."""
+    """Return the Hankel transform of R(r) of a slab at frequencies [1/mm], in closed form, (n, c) [-]."""
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance_hankel(frequency, slab.layer, slab.A_top)
     l, top = slab.source_mm, slab.z_b[0]
@@ -62,7 +62,7 @@ def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
 
 
 def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
-    """Return the Hankel transform of T(r) at frequencies [1/mm], as a closed form, (n, c) [-]."""
+    """Return the Hankel transform of T(r) of a slab at frequencies [1/mm], in closed form, (n, c) [-]."""
     l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(frequency), len(l)))
@@ -70,9 +70,9 @@ def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
 
 
 def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return R(r) per power that enters, (n, c) [1/mm2].
+    """Return the reflected profile R(r) of a slab per power that enters, (n, c) [1/mm2].
 
-    radius_mm : (n,) distances [mm]
+    radius_mm : (n,) distances r from the beam [mm]
     tolerance : bound of the light of omitted images, per power that enters [-]
 
     Source: [DonnerJensen2005] eq. 2-6.
@@ -84,10 +84,13 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
 
 
 def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return T(r) per power that enters, (n, c) [1/mm2].
+    """Return the transmitted profile T(r) of a slab per power that enters, (n, c) [1/mm2].
 
-    A source that is moved onto the lower face emits half its light directly: this peak at r = 0 is only in
-    `transmittance_hankel`.
+    radius_mm : (n,) distances r from the beam [mm]
+    tolerance : bound of the light of omitted images, per power that enters [-]
+
+    A source that the clamp moves onto the lower face emits half of its light directly. This peak at r = 0 is
+    missing here, but included in `transmittance_hankel`.
 
     Source: [DonnerJensen2005] eq. 7, 8.
     """
@@ -98,9 +101,13 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
 
 
 def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) -> Floats:
-    """Return the Hankel transform of the images of a real and a mirrored source at depths z.
+    """Return the Hankel transform of R(r) or T(r) of two periodic series of point sources.
 
-    It is half the albedo times the sum over i of signed exp(-|z + i P| q).
+    With the depth z of a source, the period P and q^2 = sigma_tr^2 + s^2, each series is half the albedo
+    times the sum over i of sign(z + i P) exp(-|z + i P| q). The series of images is subtracted from that of
+    real sources.
+
+    real, image : (c,) distance of one source of each series from the face [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
@@ -124,11 +131,11 @@ def _series(
 
 
 def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> int:
-    """Return the number of images on each side for which the light of all others is below `tolerance` [-].
+    """Return how many image pairs on each side of the slab bound the omitted light by `tolerance`.
 
     An image at depth z contributes exp(-|z| sigma_tr) / 2, so the omitted light is at most a geometric
-    series. Without absorption the series does not end, but opposite images cancel: their flux falls with the
-    inverse cube of the distance, and after `max_pairs` it is 1e-7 of the first.
+    series. Without absorption the series does not converge so fast, but opposite images cancel: their flux
+    falls with the inverse cube of the distance, and after `max_pairs` it is 1e-7 of the first.
     """
     decay = float((slab.period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:
@@ -139,7 +146,11 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
 
 @dataclass(frozen=True)
 class Response:
-    """Hankel transforms of reflectance and transmittance of a stack of layers, (n, c) each [-]."""
+    """Hankel transforms of reflectance and transmittance of a stack of layers, (n, c) each [-].
+
+    R_above, T_down : reflectance and transmittance for light from above
+    R_below, T_up : reflectance and transmittance for light from below
+    """
 
     R_above: Floats
     T_down: Floats
@@ -147,7 +158,7 @@ class Response:
     T_up: Floats
 
     def placed_over(self, lower: Response) -> Response:
-        """Return the response of this stack on top of another.
+        """Return the combined response of this stack on top of another stack.
 
         Source: [DonnerJensen2005] section 3.3, after Kubelka's addition of layers.
         """
@@ -161,7 +172,7 @@ class Response:
 
 
 def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> Response:
-    """Return the response of all layers of a medium at frequencies s [1/mm].
+    """Return the reflectance and transmittance of all layers of a medium at frequencies s [1/mm].
 
     A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
     clamp : position of the source in layers thinner than a mean free path, see `Slab`
@@ -174,7 +185,7 @@ def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp 
 
 
 def layer_slabs(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
-    """Return the layers of a medium as slabs with their boundary mismatches."""
+    """Return one slab per layer of a medium, with the boundary mismatch A at the faces that touch air."""
     last = len(medium.layers) - 1
     layers = enumerate(medium.layers)
     return [Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp) for i, layer in layers]

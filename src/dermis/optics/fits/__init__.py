@@ -1,1 +1,1 @@
-"""Fits of diffusion profiles: sums of Gaussians, Burley's profile and separable kernels."""
+"""Fits of diffusion profiles by sums of Gaussians, Burley's profile and separable kernels."""

@@ -1,4 +1,4 @@
-"""Burley's profile of two exponentials: fits, and parameters for Unity and Unreal Engine."""
+"""Burley's diffusion profile of two exponentials: its fits, and the settings for Unity and Unreal Engine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dermis.base.errors import refuse
 from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.media import Floats
 
-_MEDIAN_RADIUS_FACTOR = 1.58  # s r within which half of the light leaves
+_MEDIAN_RADIUS_FACTOR = 1.58  # s times the radius within which half of the light leaves
 _UNITY_FRACTION = 0.997
 UNREAL_FACTOR = 0.6
 _UNREAL_MIN_DISTANCE_CM = 0.1
@@ -21,8 +21,8 @@ _UNREAL_MIN_DISTANCE_CM = 0.1
 class BurleyProfile:
     """Diffusion profile R(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r).
 
-    albedo : (c,) A, total reflectance [-]
-    shape : (c,) s [1/mm]
+    albedo : (c,) total reflectance A [-]
+    shape : (c,) inverse scattering distance s [1/mm]
 
     Source: [Burley2015], [ChristensenBurley2015].
     """
@@ -31,24 +31,27 @@ class BurleyProfile:
     shape: Floats
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """Return R at distances r > 0 from a narrow beam of unit power, (..., c) [1/mm2]."""
+        """Return the profile R(r) at distances r > 0 from a narrow beam of unit power, (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         sr = self.shape * r
         return np.asarray(self.albedo * self.shape * (np.exp(-sr) + np.exp(-sr / 3.0)) / (8.0 * np.pi * r))
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light that emerges within distances r, (..., c) [-]."""
+        """Return the light that emerges within distances r of the beam, (..., c) [-]."""
         sr = self.shape * np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-self.albedo * (np.expm1(-sr) + 3.0 * np.expm1(-sr / 3.0)) / 4.0)
 
     def hankel(self, frequency: ArrayLike) -> Floats:
-        """Return the integral of 2 pi r R(r) J0(k r) at frequencies k [1/mm], (..., c) [-]."""
+        """Return the Hankel transform of R(r) at frequencies k [1/mm], (..., c) [-].
+
+        It is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
+        """
         k = np.asarray(frequency, dtype=np.float64)[..., None]
         s = self.shape
         return np.asarray(self.albedo * s / 4.0 * (1.0 / np.hypot(s, k) + 1.0 / np.hypot(s / 3.0, k)))
 
     def radius_at_fraction(self, fraction: float) -> Floats:
-        """Return the radius within which a fraction of the emerging light leaves, (c,) [mm]."""
+        """Return the radius within which a given fraction of the emerging light leaves, (c,) [mm]."""
         # With t = exp(-s r / 3), the fraction outside r is (t^3 + 3 t) / 4; a hyperbolic sine solves this
         # cubic.
         t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - fraction)) / 3.0)
@@ -56,9 +59,9 @@ class BurleyProfile:
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """Return s times the mean free path for perpendicular incidence [-].
+    """Return s times the mean free path, for the shape s of Burley's profile at normal incidence [-].
 
-    albedo : total reflectance A
+    albedo : total reflectance A [-]
 
     Source: [ChristensenBurley2015].
     """
@@ -67,9 +70,9 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """Return s times the diffuse mean free path on the surface, 1 / sigma_tr [-].
+    """Return s times the diffuse mean free path 1 / sigma_tr, for the shape s of Burley's profile [-].
 
-    albedo : total reflectance A
+    albedo : total reflectance A [-]
 
     Source: [ChristensenBurley2015].
     """
@@ -79,9 +82,10 @@ def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class BurleyFit:
-    """Fit of Burley's profile with its errors.
+    """Burley's profile fitted to ring energies, with the errors of the fit.
 
-    error : (c,) E_b over rings [-]
+    profile : fitted profile
+    error : (c,) relative root-mean-square error of the ring energies [-]
     energy_error : (c,) total reflectance of the profile over that of the target, minus 1 [-]
     """
 
@@ -91,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Return the profile with the target's energy and the smallest error over rings in each channel."""
+    """Fit Burley's profile to ring energies with the smallest error, keeping each channel's total."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -120,10 +124,10 @@ def _fit_shape(target: RingTarget) -> float:
 class UnityParameters:
     """Diffusion profile settings of Unity's HDRP at world scale 1.
 
-    scattering_colour : scattering distance 1 / s relative to its largest channel, linear Rec. 709 [-]
-    multiplier_mm : the largest scattering distance [mm]
-    max_radius_mm : value that the editor displays: the radius with 99.7 % of the light of the widest channel
-        [mm]
+    scattering_colour : scattering distance 1 / s of each channel over the largest of them, linear Rec. 709
+        [-]
+    multiplier_mm : largest scattering distance 1 / s [mm]
+    max_radius_mm : radius with 99.7 % of the light of the widest channel, which the editor displays [mm]
     """
 
     scattering_colour: tuple[float, ...]
@@ -132,10 +136,10 @@ class UnityParameters:
 
 
 def unity_parameters(profile: BurleyProfile) -> UnityParameters:
-    """Return the settings for Unity; the albedo is left to its base colour.
+    """Return the settings of Unity's diffusion profile; the albedo belongs in Unity's base colour.
 
-    According to its source (DiffusionProfileSettings.cs), s is 1 / (colour times multiplier), in millimetres
-    at scale 1.
+    According to Unity's source (DiffusionProfileSettings.cs), the shape s of Burley's profile is 1 / (colour
+    times multiplier), in millimetres at scale 1.
     """
     _check_rgb(profile)
     distance = 1.0 / profile.shape
@@ -151,9 +155,10 @@ class UnrealParameters:
     """Subsurface profile settings of Unreal Engine 5 with Burley's kernel, for a scene in centimetres.
 
     surface_albedo : diffuse albedo, linear Rec. 709 [-]
-    mean_free_path_colour : mean free path relative to the distance, linear Rec. 709 [-]
-    mean_free_path_distance_cm : its largest channel, or the smallest value that the engine accepts [cm]
-    world_unit_scale : 1 is life-size [-]
+    mean_free_path_colour : mean free path of each channel over the distance below, linear Rec. 709 [-]
+    mean_free_path_distance_cm : largest mean free path of a channel, or the smallest that the engine accepts
+        [cm]
+    world_unit_scale : scale of the scene; 1 is life-size [-]
     """
 
     surface_albedo: tuple[float, ...]
@@ -163,13 +168,13 @@ class UnrealParameters:
 
 
 def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
-    """Return the settings for Unreal Engine.
+    """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
     According to public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp), the engine
-    converts the mean free path l, colour times distance, to a diffuse mean free path by the ratio of both
-    factors of [ChristensenBurley2015] divided by 0.6, and that to s by `shape_factor_diffuse`: together, s =
-    0.6 `shape_factor` / l. Its kernel uses a tenth of the millimetres as scene units, so that scale 1 is
-    life-size for centimetres.
+    multiplies the mean free path l, colour times distance, by `shape_factor_diffuse` / (0.6 `shape_factor`)
+    to obtain the diffuse mean free path, and divides `shape_factor_diffuse` by the latter: s = 0.6
+    `shape_factor` / l. Its kernel takes a tenth of the millimetres as scene units, so scale 1 is life-size
+    for centimetres.
     """
     _check_rgb(profile)
     mean_free_path = 0.1 * UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape

@@ -1,4 +1,4 @@
-"""Fits of sums of Gaussians to one diffusion profile, or to several with shared variances."""
+"""Fits of sums of Gaussians to one diffusion profile, or to several profiles with shared variances."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ import numpy as np
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_keywords
 from dermis.optics.fits.targets import PointTarget, RingTarget
-from dermis.optics.fits.variable_projection import TOLERANCE, Design, Fit, minimise
+from dermis.optics.fits.variable_projection import TOLERANCE, Design, WeightedFit, minimise
 from dermis.optics.gaussians import MAX_VARIANCE_MM2, GaussianSum
 from dermis.optics.media import Floats
 
 Target = PointTarget | RingTarget
 MAX_TERMS = 8
-# Fractions of the light within the standard deviations of the narrowest and the widest Gaussian. For all
-# tested profiles, one of these starts leads to the smallest error that any start leads to.
-_STARTS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
-# For fits that start from a similar fit: ring energies differ from those of the converged fit by at most 0.06
-# % of the brightest ring, and errors by at most 0.0001.
+# Fractions of the light within the standard deviations of the narrowest and the widest Gaussian of a start.
+# For all tested profiles, one of these starts leads to the smallest error found from any start.
+_START_FRACTIONS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
+# Tolerance of fits that start from a similar fit: their ring energies differ from those of the converged fit
+# by at most 0.06 % of the brightest ring, and their errors by at most 0.0001.
 _INITIAL_FIT_TOLERANCE = 3e-6
 _STIFFNESS = 1e4  # weight of the energy equation; its square bounds the error of the energy
 SHARED_TERMS = 6
-"""Number of Gaussians that several profiles share, the same as for one profile."""
+"""Number of Gaussians in a fit of several profiles with shared variances."""
 _EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
 _CACHED_FITS = 8
-_Table = tuple[str, bytes, bytes, int]
+_HashableSum = tuple[str, bytes, bytes, int]
 
 
 @dataclass(frozen=True)
 class GaussianFit:
-    """Fit of a sum of Gaussians with its errors.
+    """Sum of Gaussians fitted to a diffusion profile, with the errors of the fit.
 
-    profile : the sum
-    error : (c,) relative root-mean-square error, pointwise E or E_b over rings [-]
+    profile : fitted sum of Gaussians
+    error : (c,) relative root-mean-square error of R(r) at points, or of the ring energies [-]
     energy_error : (c,) total reflectance of the sum over that of the target, minus 1 [-]
-    kind : kind of the error
-    shared : whether all channels use the same Gaussians
+    kind : "pointwise" or "annulus", whether `error` is over points or rings
+    shared : whether all channels use the same variances
     """
 
     profile: GaussianSum
@@ -60,15 +60,15 @@ def fit_gaussians(
     initial: GaussianSum | None = None,
     name: str = "fit",
 ) -> GaussianFit:
-    """Return the sum of Gaussians with the smallest error.
+    """Fit a sum of Gaussians with the smallest error to a diffusion profile.
 
     target : R(r) at points, or light through rings
-    terms : Gaussians in each channel, 1 to 8
-    shared : use the same variances in all channels, chosen for the root mean square of their errors;
-        otherwise each channel has its own variances, and weights of 0 for those of the others
+    terms : number of Gaussians in each channel, 1 to 8
+    shared : whether all channels use the same variances, chosen for the root mean square of the channels'
+        errors; otherwise each channel has its own variances and a weight of 0 at those of the other channels
     keep_energy : make the weights sum to the target's total
     initial : fit of a similar profile to start from: several times faster, but not always the best fit
-    name : of the resulting profile
+    name : name of the fitted profile
 
     Raises DermisError for an invalid number of terms, and for profiles that Gaussians cannot fit.
 
@@ -81,7 +81,7 @@ def fit_gaussians(
         _fit_group(group, terms, keep_energy, _variances_of_fit(initial, None if shared else i, terms))
         for i, group in enumerate(groups)
     ]
-    profile = _merged(fits, name)
+    profile = _combine_fits(fits, name)
     return GaussianFit(
         profile=profile,
         error=target.error(profile.variance_mm2, profile.weight),
@@ -94,12 +94,15 @@ def fit_gaussians(
 def _fit_group(
     target: Target, terms: int, keep_energy: bool, initial: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Return variances (k,) that all channels of the target share, and weights (k, c)."""
+    """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
+
+    initial : (k,) variances to start from [mm2], or None
+    """
     norm = np.linalg.norm(target.samples, axis=0)
     design, samples = _with_energy_equation(target) if keep_energy else (target.design, target.samples)
-    bounds = _bounds(target)
+    bounds = _log_variance_bounds(target)
 
-    def run(start: Floats, tolerance: float = TOLERANCE) -> Fit:
+    def run(start: Floats, tolerance: float = TOLERANCE) -> WeightedFit:
         return minimise(design, samples / norm, np.clip(start, *bounds), bounds, tolerance)
 
     best = None if initial is None else run(np.log(initial), _INITIAL_FIT_TOLERANCE)
@@ -116,18 +119,21 @@ def _fit_group(
 
 
 def _initial_variances(target: Target, terms: int) -> list[Floats]:
-    ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _STARTS]
+    ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_FRACTIONS]
     return [np.linspace(low, high, terms) for low, high in ends]
 
 
-def _bounds(target: Target) -> tuple[float, float]:
-    """Return the limits of the log variance: from half the first radius to the last radius."""
+def _log_variance_bounds(target: Target) -> tuple[float, float]:
+    """Return bounds of the log variances: standard deviations from half the first to the last radius."""
     radius = target.radius_mm if isinstance(target, PointTarget) else target.edges_mm[1:]
     return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, MAX_VARIANCE_MM2)))
 
 
 def _with_energy_equation(target: Target) -> tuple[Design, Floats]:
-    """Return design and samples with one more, strongly weighted equation: the weights sum to the total."""
+    """Return a target's design and samples with one more equation: the weights sum to the total.
+
+    The weight of the equation is so large that the total is met almost exactly.
+    """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _STIFFNESS * float(np.linalg.norm(target.design(width)[0]))
 
@@ -140,15 +146,22 @@ def _with_energy_equation(target: Target) -> tuple[Design, Floats]:
 
 
 def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
-    """Return the variances of a similar fit to start from, or None if their number differs."""
+    """Return the start variances from a similar fit, or None if it has another number of Gaussians.
+
+    channel : index of the channel whose Gaussians are used; None for those of all channels
+    terms : number of Gaussians of the new fit
+    """
     if initial is None:
         return None
     used = initial.weight.any(axis=1) if channel is None else initial.weight[:, channel] > 0.0
     return initial.variance_mm2[used] if used.sum() == terms else None
 
 
-def _merged(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
-    """Return one sum with the Gaussians of all groups, in which equal variances are merged."""
+def _combine_fits(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
+    """Combine fits of separate channels into one sum, with one Gaussian for equal variances.
+
+    fits : variances (k,) and weights (k, c) of each fit
+    """
     variance, index = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
     channels = sum(w.shape[1] for _, w in fits)
     weight = np.zeros((len(variance), channels))
@@ -161,9 +174,9 @@ def _merged(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """Fit one Gaussian with each channel's total to a profile, by least squares over the plane.
+    """Fit one Gaussian to a profile, keeping each channel's total, by least squares over the plane.
 
-    It represents light maps blurred once [Borshukov2003; Green2004].
+    It reproduces early skin shading, in which light maps were blurred once [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 
@@ -180,36 +193,38 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
 
 
 def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
-    """Fit several profiles with the same Gaussians; profiles that already share them are returned unchanged.
+    """Fit several profiles with one set of variances, so that one series of blurs serves all of them.
 
-    Totals are preserved.
+    The total reflectances are preserved. Profiles that already share their variances are returned unchanged.
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fit_shared(tuple(map(_table, profiles)), terms)
+    fitted = _fit_shared(tuple(map(_hashable_sum, profiles)), terms)
     pairs = zip(fitted, profiles, strict=True)
     return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
 @lru_cache(_CACHED_FITS)
-def _fit_shared(tables: tuple[_Table, ...], terms: int) -> tuple[GaussianSum, ...]:
+def _fit_shared(tables: tuple[_HashableSum, ...], terms: int) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
         for name, variance, weight, channels in tables
     ]
-    fit = fit_gaussians(_rings(profiles), terms, keep_energy=True, name="shared profiles").profile
+    fit = fit_gaussians(
+        _combined_ring_target(profiles), terms, keep_energy=True, name="shared profiles"
+    ).profile
     ends = np.cumsum([one.weight.shape[1] for one in profiles])[:-1]
     parts = np.split(fit.weight, ends, axis=1)
     pairs = zip(profiles, parts, strict=True)
     return tuple(GaussianSum(profile.name, fit.variance_mm2, part) for profile, part in pairs)
 
 
-def _table(profile: GaussianSum) -> _Table:
+def _hashable_sum(profile: GaussianSum) -> _HashableSum:
     return profile.name, profile.variance_mm2.tobytes(), profile.weight.tobytes(), profile.weight.shape[1]
 
 
-def _rings(profiles: Sequence[GaussianSum]) -> RingTarget:
-    """Return ring energies with the channels of all profiles side by side."""
+def _combined_ring_target(profiles: Sequence[GaussianSum]) -> RingTarget:
+    """Return ring energies of several profiles as one target, whose channels are those of all profiles."""
     within = np.hstack([one.energy_within(_EDGES_MM) for one in profiles])
     return RingTarget(_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

@@ -1,4 +1,4 @@
-"""Separable kernels a(x) a(y), applied in two passes; they are not radially symmetric."""
+"""Separable kernels a(x) a(y) for blurs in two passes, fitted to radially symmetric diffusion profiles."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ SECTORS = 16
 """Number of equal sectors of a quarter circle into which each ring is divided."""
 
 _NODES = 8
-_STARTS = ((0.3, 0.9), (0.1, 0.6))  # fractions of the light within the narrow and the wide Gaussian
+_START_FRACTIONS = ((0.3, 0.9), (0.1, 0.6))  # fractions of the light within both Gaussians of a start
 
 
 @dataclass(frozen=True)
 class SeparableKernel:
-    """Kernel A a(x) a(y) with a(x) = sum of weight * exp(-x^2 / 2v) / sqrt(2 pi v).
+    """Kernel A a(x) a(y) with a(x) = sum of w exp(-x^2 / 2v) / sqrt(2 pi v); not radially symmetric.
 
-    albedo : (c,) A, total reflectance [-]
-    variance_mm2 : (k, c) from narrow to wide [mm2]
-    weight : (k, c), sums to 1 in each channel [-]
+    albedo : (c,) total reflectance A [-]
+    variance_mm2 : (k, c) variances v, increasing with k [mm2]
+    weight : (k, c) weights w, which sum to 1 in each channel [-]
 
     Source: [Jimenez2015].
     """
@@ -41,9 +41,11 @@ class SeparableKernel:
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
     def sector_energy(self, edges_mm: Floats) -> Floats:
-        """Return the light through sectors of rings, with all four quarters added, (n, SECTORS, c) [-].
+        """Return the light through SECTORS sectors of each ring, (n, SECTORS, c) [-].
 
-        edges_mm : (n + 1,) of the rings
+        The four quarters of the plane are added.
+
+        edges_mm : (n + 1,) radii of the ring edges [mm]
         """
         channels = zip(self.variance_mm2.T, self.weight.T, strict=True)
         sectors = np.stack([_sector_fractions(edges_mm, v, w) for v, w in channels], axis=2)
@@ -52,10 +54,11 @@ class SeparableKernel:
 
 @dataclass(frozen=True)
 class SeparableFit:
-    """Separable kernel with its errors.
+    """Separable kernel with its errors relative to a diffusion profile.
 
-    error : (c,) E_b over sectors of rings [-]
-    energy_error : (c,) total reflectance of the kernel over that of the target, minus 1 [-]
+    kernel : fitted or evaluated kernel
+    error : (c,) relative root-mean-square error of the light through sectors of rings [-]
+    energy_error : (c,) total reflectance of the kernel over that of the profile, minus 1 [-]
     """
 
     kernel: SeparableKernel
@@ -64,7 +67,7 @@ class SeparableFit:
 
 
 def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
-    """Return the kernel whose one pass is the integral of the profile R over y.
+    """Return the kernel whose a(x) is the profile R integrated over y, normalised to unit integral.
 
     It is exact where light varies along x or y alone.
 
@@ -75,13 +78,13 @@ def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
 
 
 def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit:
-    """Return a kernel with its errors relative to a profile."""
+    """Compute the errors of a separable kernel relative to the ring energies of a profile."""
     error = ring_error(target, kernel.sector_energy(target.edges_mm))
     return SeparableFit(kernel, error, kernel.albedo / target.total - 1.0)
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Return the kernel of two Gaussians with the target's energy and the smallest error in each channel.
+    """Fit a separable kernel of two Gaussians to ring energies, keeping each channel's total.
 
     Source: [Jimenez2015], the artist-friendly model.
     """
@@ -94,7 +97,7 @@ def fit_separable(target: RingTarget) -> SeparableFit:
 
 
 def _fit_channel(target: RingTarget) -> Floats:
-    """Return the weight of the first Gaussian and the log variances of both, (3,)."""
+    """Fit one channel; return the weight of the first Gaussian and both log variances, (3,)."""
     from scipy.optimize import least_squares
 
     scale = np.sqrt(SECTORS) / np.linalg.norm(target.energy)
@@ -105,7 +108,7 @@ def _fit_channel(target: RingTarget) -> Floats:
 
     edges = target.edges_mm
     low, high = 2.0 * np.log(edges[1] / 4.0), 2.0 * np.log(edges[-1])
-    starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _STARTS]
+    starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_FRACTIONS]
     bounds = ([0.0, low, low], [1.0, high, high])
     fits = [
         least_squares(residual, np.append(0.5, np.clip(start, low, high)), bounds=bounds, xtol=1e-10)
@@ -115,7 +118,10 @@ def _fit_channel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fractions of a(x) a(y) in the sectors of rings for one channel, (n, m)."""
+    """Return the fraction of a kernel's light in each ring and sector, for one channel, (n, SECTORS).
+
+    variance, weight : (k,) Gaussians of a(x)
+    """
     cells = np.zeros((len(edges_mm) - 1, SECTORS))
     for i in range(len(variance)):
         cells += weight[i] ** 2 * _elliptic_sectors(edges_mm, variance[i], variance[i])
@@ -126,7 +132,10 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
 
 
 def _elliptic_sectors(edges_mm: Floats, along: float, across: float) -> Floats:
-    """Return the fractions of a Gaussian with variances `along` x and `across` y in sectors, (n, m)."""
+    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTORS).
+
+    along, across : variances along x and y [mm2]
+    """
     x, w = np.polynomial.legendre.leggauss(_NODES)
     theta = np.linspace(0.0, 0.5 * np.pi, SECTORS + 1)
     # Angle on the circle before it is stretched to the ellipse: equal angles contain equal light.

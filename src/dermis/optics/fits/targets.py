@@ -1,4 +1,4 @@
-"""Targets of fits: R(r) at points, or the light through rings."""
+"""Data that fits approximate: R(r) at points, or the light that emerges through rings."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from dermis.optics.media import Floats
 
 @dataclass(frozen=True)
 class PointTarget:
-    """R(r) at radii, for profiles that are finite at their centre.
+    """Diffusion profile R(r) at points as the target of a fit, if R(r) is finite at r = 0.
 
-    radius_mm : (n,) increasing, preferably log-spaced from 1e-4 to 60 [mm]
+    radius_mm : (n,) radii r, increasing, preferably log-spaced from 1e-4 to 60 [mm]
     reflectance : (n, c) R(r) in c channels [1/mm2]
     total : (c,) light that emerges at all radii [-]
     """
@@ -29,13 +29,13 @@ class PointTarget:
     kind: ClassVar[Literal["pointwise"]] = "pointwise"
 
     def __post_init__(self) -> None:
-        """Check the arrays."""
-        _check(self.kind, self.radius_mm, self.reflectance, self.total)
+        """Check shapes and values of the arrays."""
+        _check_target(self.kind, self.radius_mm, self.reflectance, self.total)
         if not self.radius_mm[0] > 0.0:
             refuse("radii of a profile", "numbers above 0", f"got {self.radius_mm[0]:g}", "Leave it out")
 
     @cached_property
-    def _root(self) -> Floats:
+    def _sqrt_quadrature_weights(self) -> Floats:
         # The trapezoidal rule in log r converges fast because r^2 R^2 vanishes at both ends.
         steps = np.diff(np.log(self.radius_mm))
         dlog = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
@@ -43,13 +43,16 @@ class PointTarget:
 
     @cached_property
     def samples(self) -> Floats:
-        """Return values whose squares sum to the integral of r R^2, (n, c)."""
-        return self._root[:, None] * self.reflectance
+        """Return weighted samples of R, whose squares sum to the integral of r R^2, (n, c)."""
+        return self._sqrt_quadrature_weights[:, None] * self.reflectance
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return the samples of unit Gaussians and their derivatives by log variance, (n, k) each."""
+        """Return weighted samples of unit Gaussians and their derivatives by log variance, (n, k) each.
+
+        variance_mm2 : (k,) variances of the Gaussians [mm2]
+        """
         u = self.radius_mm[:, None] ** 2 / (2.0 * variance_mm2)
-        gaussians = self._root[:, None] * np.exp(-u) / (2.0 * np.pi * variance_mm2)
+        gaussians = self._sqrt_quadrature_weights[:, None] * np.exp(-u) / (2.0 * np.pi * variance_mm2)
         return gaussians, gaussians * (u - 1.0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
@@ -61,21 +64,26 @@ class PointTarget:
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return radii within which fractions of the channels' mean light emerge, increasing [mm]."""
-        rate = self._root[:, None] ** 2 * np.abs(self.reflectance)
-        return _quantiles(fractions, self.radius_mm, rate)
+        """Return the radii within which given fractions of the light emerge, as mean of channels [mm].
+
+        fractions : increasing fractions of the light, 0 to 1 [-]
+        """
+        rate = self._sqrt_quadrature_weights[:, None] ** 2 * np.abs(self.reflectance)
+        return _radii_at_fractions(fractions, self.radius_mm, rate)
 
     def channel(self, index: int) -> PointTarget:
-        """Return the target of one channel."""
+        """Return the target with one of the channels."""
         channel = slice(index, index + 1)
         return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
 
 @dataclass(frozen=True)
 class RingTarget:
-    """Light through a disc and the rings around it, also for profiles that are infinite at their centre.
+    """Light that emerges through a disc and the rings around it, as the target of a fit.
 
-    edges_mm : (n + 1,) increasing, preferably 0 and then log-spaced [mm]
+    It is also valid for profiles that are infinite at r = 0.
+
+    edges_mm : (n + 1,) radii of the ring edges, increasing, preferably 0 and then log-spaced [mm]
     energy : (n, c) light through each ring in c channels [-]
     total : (c,) light that emerges at all radii [-]
     """
@@ -87,41 +95,47 @@ class RingTarget:
     kind: ClassVar[Literal["annulus"]] = "annulus"
 
     def __post_init__(self) -> None:
-        """Check the arrays."""
-        _check(self.kind, self.edges_mm[1:], self.energy, self.total)
+        """Check shapes and values of the arrays."""
+        _check_target(self.kind, self.edges_mm[1:], self.energy, self.total)
         if not 0.0 <= self.edges_mm[0] < self.edges_mm[1]:
             refuse("edges of rings", "numbers that increase from 0", f"got {self.edges_mm[:2]}", "Sort them")
 
     @property
     def samples(self) -> Floats:
-        """Return the values whose squared errors are summed, (n, c)."""
+        """Return the ring energies, whose squared errors a fit minimises, (n, c) [-]."""
         return self.energy
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return the samples of unit Gaussians and their derivatives by log variance, (n, k) each."""
+        """Return ring energies of unit Gaussians and their derivatives by log variance, (n, k) each.
+
+        variance_mm2 : (k,) variances of the Gaussians [mm2]
+        """
         u = self.edges_mm[:, None] ** 2 / (2.0 * variance_mm2)
         outside = np.exp(-u)
         return -np.diff(outside, axis=0), -np.diff(u * outside, axis=0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
-        """Return `ring_error` of a sum of Gaussians, (c,) [-]."""
+        """Return the relative error `ring_error` of a sum of Gaussians, (c,) [-]."""
         return ring_error(self, self.design(variance_mm2)[0] @ weight)
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return radii within which fractions of the channels' mean light emerge, increasing [mm]."""
-        return _quantiles(fractions, self.edges_mm[1:], np.abs(self.energy))
+        """Return the radii within which given fractions of the light emerge, as mean of channels [mm].
+
+        fractions : increasing fractions of the light, 0 to 1 [-]
+        """
+        return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
 
     def channel(self, index: int) -> RingTarget:
-        """Return the target of one channel."""
+        """Return the target with one of the channels."""
         channel = slice(index, index + 1)
         return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 
 
 def ring_error(target: RingTarget, energy: Floats) -> Floats:
-    """Return E_b = sqrt(sum of (fit - energy)^2 / sum of energy^2), the error common to all fits, (c,) [-].
+    """Return the relative error E_b = sqrt(sum of (fit - target)^2 / sum of target^2) over rings, (c,) [-].
 
-    energy : (n, c) of a radially symmetric kernel through each ring, or (n, m, c) of any kernel through the m
-        equal sectors of each ring
+    energy : (n, c) light of the fit through each ring; or (n, m, c) light through m equal sectors of each
+        ring, for kernels that are not radially symmetric
     """
     cells = energy if energy.ndim == 3 else energy[:, None]
     m = cells.shape[1]
@@ -129,12 +143,12 @@ def ring_error(target: RingTarget, energy: Floats) -> Floats:
     return np.asarray(np.sqrt(m * (residual**2).sum(axis=(0, 1)) / (target.energy**2).sum(axis=0)))
 
 
-def _quantiles(fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
+def _radii_at_fractions(fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
     cumulative = np.cumsum(rate / rate.sum(axis=0), axis=0).mean(axis=1)
     return np.asarray(np.interp(fractions, cumulative, radius_mm))
 
 
-def _check(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
+def _check_target(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
     culprit = f"{kind} target"
     if values.ndim != 2 or radius_mm.shape != values.shape[:1] or total.shape != values.shape[1:]:
         actual = f"got {radius_mm.shape}, {values.shape} and {total.shape}"

@@ -22,12 +22,13 @@ _MAX_DAMPING = 1e8
 _BLOCK = 512
 
 
-class Fit(NamedTuple):
-    """Fitted Gaussians, and the derivatives for the next step.
+class WeightedFit(NamedTuple):
+    """Gaussians of the current step with optimal weights, and derivatives for the next step.
 
-    log_variance, weight : (k,) and (k, c)
+    log_variance : (k,) logarithms of the variances
+    weight : (k, c) weights in c channels
     cost : sum of squared residuals
-    gradient, curvature : (k,) and (k, k) derivatives of the cost by log variance
+    gradient, curvature : (k,) gradient and (k, k) Gauss-Newton matrix of half the cost by log variance
     """
 
     log_variance: Floats
@@ -43,22 +44,22 @@ def minimise(
     log_variance: Floats,
     bounds: tuple[float, float],
     tolerance: float = TOLERANCE,
-) -> Fit:
-    """Return the local minimum that the descent from a start reaches.
+) -> WeightedFit:
+    """Descend from start variances to a local minimum of the squared residuals.
 
-    design : contribution of unit Gaussians of given variances to the samples, and its derivative by log
+    design : function from variances to the samples of unit Gaussians (n, k), and their derivatives by log
         variance
-    samples : (n, c)
-    log_variance : (k,) start
-    bounds : of the log variances
+    samples : (n, c) data to fit
+    log_variance : (k,) logarithms of the start variances
+    bounds : smallest and largest log variance
     tolerance : relative decrease of the cost below which the descent stops
     """
-    fit = _project(design, samples, log_variance)
+    fit = _optimal_weights(design, samples, log_variance)
     damping, previous = 1e-2, None
     for _ in range(_MAX_STEPS):
-        step = _step(fit, damping)
+        step = _marquardt_step(fit, damping)
         update = step if previous is None else _anderson_step(fit.log_variance, step, *previous)
-        trial = _project(design, samples, np.clip(fit.log_variance + update, *bounds))
+        trial = _optimal_weights(design, samples, np.clip(fit.log_variance + update, *bounds))
         if trial.cost < fit.cost:
             converged = fit.cost - trial.cost < tolerance * fit.cost
             previous = fit.log_variance, step
@@ -74,7 +75,7 @@ def minimise(
     return fit
 
 
-def _step(fit: Fit, damping: float) -> Floats:
+def _marquardt_step(fit: WeightedFit, damping: float) -> Floats:
     scale = fit.curvature.diagonal()
     damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
     step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
@@ -94,8 +95,8 @@ def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_s
     return np.asarray(np.clip(extrapolated, -_MAX_STEP, _MAX_STEP))
 
 
-def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
-    """Return the fit with optimal non-negative weights for given variances."""
+def _optimal_weights(design: Design, samples: Floats, log_variance: Floats) -> WeightedFit:
+    """Compute optimal non-negative weights for given variances, with cost and derivatives."""
     columns, slopes = design(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
@@ -108,13 +109,14 @@ def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
         cost += float(residual @ residual)
         gradient += jacobian.T @ residual
         curvature += jacobian.T @ jacobian
-    return Fit(log_variance, weight / size[:, None], cost, gradient, curvature)
+    return WeightedFit(log_variance, weight / size[:, None], cost, gradient, curvature)
 
 
 def qr_factor(tall: Floats) -> Floats:
-    """Return the factor R of a QR factorisation, computed by blocks of rows.
+    """Return the upper triangular factor R of the QR factorisation of a tall matrix.
 
-    For tall matrices BLAS would start threads that cost more than they save.
+    Blocks of rows are factorised separately, because BLAS would start threads for the whole matrix that cost
+    more than they save.
     """
     blocks = np.array_split(tall, -(-len(tall) // _BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]

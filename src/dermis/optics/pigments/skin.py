@@ -1,4 +1,4 @@
-"""Layered structures of skin, with absorption and scattering spectra of each layer."""
+"""Layered structures of skin, from pigments to the absorption and scattering spectrum of each layer."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from dermis.optics.pigments.spectra import (
 )
 
 LEAKED_MELANIN: Final = 0.175
-"""Absorption of the melanin sheet over that of the melanin in the epidermis, after [Donner2008] [-]."""
+"""Absorption of the melanin sheet over that of all melanin in the epidermis, after [Donner2008] [-]."""
 
-_SHEET_MM = 0.001
-_CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
-_RETICULAR_BLOOD = 0.0091 / 0.012
+_MELANIN_SHEET_MM = 0.001
+_STRATUM_CORNEUM_MM, _PAPILLARY_DERMIS_MM = 0.01, 0.2
+_RETICULAR_BLOOD_RATIO = 0.0091 / 0.012
 _UNIFORM_INDEX_NOTE = f"all layers have the index {SKIN_ETA:g}, without reflection between them"
 _THIN_NOTE = "the multipole is inaccurate for so thin a layer: use layered diffusion"
-_Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
+_LayerBuilder = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
 
 def spectral_medium(
@@ -39,18 +39,18 @@ def spectral_medium(
     wavelength_nm: Floats = WAVELENGTHS_NM,
     scattering: ScatteringLaw = donner_jensen_2006,
 ) -> Medium:
-    """Return the layers of a skin with one channel for each wavelength.
+    """Return the medium of a skin made of pigments, with one channel for each wavelength.
 
     structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has a thin melanin sheet
         between them and blood in both; "biospec" has a stratum corneum, an epidermis and two dermal layers
-    parameters : pigments and thickness
-    wavelength_nm : (n,) from 380 to 780 [nm]
-    scattering : scattering law of the epidermis
+    parameters : pigment fractions and epidermal thickness
+    wavelength_nm : (n,) wavelengths from 380 to 780 [nm]
+    scattering : function from wavelengths to the reduced scattering of the epidermis
 
-    All layers have the same index of refraction. The thin layers of the last two structures require the model
-    "layered": the multipole is inaccurate for them.
+    All layers have the same index of refraction. The thin layers of "donner2008" and "biospec" require the
+    model "layered": the multipole is inaccurate for them.
 
-    Raises DermisError for another structure or wavelength.
+    Raises DermisError for an unknown structure and for wavelengths out of range.
 
     Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
     """
@@ -71,22 +71,24 @@ def _dj2006(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> 
 def _donner2008(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
     """Return epidermis, melanin sheet and dermis after equations 11 and 12 of [Donner2008]."""
     melanin = p.melanin * melanosome(wavelength_nm, p.eumelanin)
-    sheet_sigma_a = LEAKED_MELANIN * melanin * p.epidermis_mm / _SHEET_MM
+    sheet_sigma_a = LEAKED_MELANIN * melanin * p.epidermis_mm / _MELANIN_SHEET_MM
     return (
         _epidermis(p, wavelength_nm, sigma_s_prime, p.epidermal_blood),
         # Diffusion needs scattering everywhere; in so thin a sheet it has no visible effect.
-        Layer(sheet_sigma_a, sigma_s_prime, _SHEET_MM, "melanin sheet"),
+        Layer(sheet_sigma_a, sigma_s_prime, _MELANIN_SHEET_MM, "melanin sheet"),
         _dermis(p, wavelength_nm, sigma_s_prime),
     )
 
 
 def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
-    """Return four layers after [KrishnaswamyBaranoski2004], with values of its first author's code."""
-    reticular = replace(p, blood=_RETICULAR_BLOOD * p.blood)
+    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
+    reticular = replace(p, blood=_RETICULAR_BLOOD_RATIO * p.blood)
     return (
-        Layer(baseline(wavelength_nm), sigma_s_prime, _CORNEUM_MM, "stratum corneum"),
+        Layer(baseline(wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
         _epidermis(p, wavelength_nm, sigma_s_prime),
-        replace(_dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_MM),
+        replace(
+            _dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_DERMIS_MM
+        ),
         _dermis(reticular, wavelength_nm, sigma_s_prime, "reticular dermis"),
     )
 
@@ -94,7 +96,7 @@ def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) ->
 def _epidermis(
     p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
 ) -> Layer:
-    """Return an epidermis with melanosomes, a fraction of blood, and bloodless tissue."""
+    """Return the epidermis, whose volume is melanosomes, a fraction of blood, and bloodless tissue."""
     sigma_a = _epidermal_absorption(p, p.melanin, wavelength_nm, blood_fraction)
     return Layer(sigma_a, sigma_s_prime, p.epidermis_mm, "epidermis")
 
@@ -108,7 +110,7 @@ def _epidermal_absorption(
 
 
 def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
-    """Return a semi-infinite dermis of blood and bloodless tissue."""
+    """Return a semi-infinite dermis, whose volume is blood and bloodless tissue."""
     sigma_a = _dermal_absorption(p, p.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SCATTERING_RATIO * sigma_s_prime, name=name)
 
@@ -118,8 +120,12 @@ def _dermal_absorption(p: SkinParameters, blood_fraction: float | Floats, wavele
     return np.asarray(vessels + (1.0 - blood_fraction) * baseline(wavelength_nm))
 
 
-def mixed_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:
-    """Return both layers of "dj2006" for n fractions of melanin and of blood, with coefficients (n, 31)."""
+def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:
+    """Return epidermis and dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
+
+    parameters : parameters of the skins; their own melanin and blood are ignored
+    fractions : (n,) melanin fractions of the epidermis, which are also the blood fractions of the dermis [-]
+    """
     column, scattering = fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
     dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
@@ -129,7 +135,7 @@ def mixed_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, 
     return epidermis, Layer(dermal, lower, name="dermis")
 
 
-_STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {
+_STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     "dj2006": (
         _dj2006,
         "formulae as quoted by public code; the thickness of the epidermis is not known to be the paper's",

@@ -1,4 +1,4 @@
-"""Spectra of chromophores and scattering, and conversion of spectra to colours under D65."""
+"""Absorption and scattering spectra of skin, and the conversion of spectra to colours under D65."""
 
 from __future__ import annotations
 
@@ -43,54 +43,56 @@ def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
 
 
 def interpolate_spectrum(table: str, column: str, wavelength_nm: ArrayLike) -> Floats:
-    """Interpolate a column of the table data/spectra/`table`.csv linearly, in the unit of the table.
+    """Interpolate a spectrum from the file data/spectra/`table`.csv linearly, in the unit of the file.
 
-    wavelength_nm : (...) from 380 to 780 [nm]
+    table : name of the file, without folder and suffix
+    column : heading of the column with the spectrum
+    wavelength_nm : wavelengths of any shape, from 380 to 780 [nm]
     """
-    columns = _read(table)
+    columns = _spectrum_columns(table)
     wavelength = visible_wavelengths(wavelength_nm)
     return np.asarray(np.interp(wavelength, columns["wavelength_nm"], columns[column]))
 
 
 def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
-    """Return the matrix (3, n) from spectra to linear Rec. 709; a constant spectrum of 1 becomes white [-].
+    """Return the matrix (3, n) from reflectance spectra under D65 to linear Rec. 709 [-].
 
-    Spectra are linear between the wavelengths and constant beyond them. Some weights are negative, because
-    monochromatic colours are outside Rec. 709.
+    A constant spectrum of 1 becomes white. Spectra are linear between the wavelengths and constant beyond
+    them. Some weights are negative, because monochromatic colours are outside Rec. 709.
 
-    wavelength_nm : (n,) increasing, from 380 to 780 [nm]
+    wavelength_nm : (n,) wavelengths of the spectra, increasing, from 380 to 780 [nm]
 
     Source: [CIE2004] for the observer of 1931 and D65, [SRGB1999] for the primaries.
     """
     grid = visible_wavelengths(wavelength_nm)
     if grid.ndim != 1 or len(grid) == 0 or (np.diff(grid) <= 0.0).any():
         refuse("wavelengths", "a list that increases", f"got {grid.tolist()}", "Sort it without repetitions")
-    fine = _read("cie-1931-d65")["wavelength_nm"]
+    fine = _spectrum_columns("cie-1931-d65")["wavelength_nm"]
     hats = np.array([np.interp(fine, grid, unit) for unit in np.eye(len(grid))])
-    weights = np.linalg.solve(_primaries_xyz(), _observer() @ hats.T)
+    weights = np.linalg.solve(_primaries_xyz(), _weighted_colour_matching() @ hats.T)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _observer() -> Floats:
-    """Return the XYZ colour-matching functions times D65, (3, 81)."""
-    columns = _read("cie-1931-d65")
+def _weighted_colour_matching() -> Floats:
+    """Return the CIE 1931 colour-matching functions x, y and z times the spectrum of D65, (3, 81)."""
+    columns = _spectrum_columns("cie-1931-d65")
     return np.array([columns[name] for name in ("x_bar", "y_bar", "z_bar")]) * columns["d65"]
 
 
 def _primaries_xyz() -> Floats:
-    """Return XYZ of the primaries in columns, each with luminance 1."""
+    """Return the matrix (3, 3) whose columns are XYZ of the Rec. 709 primaries, each with luminance 1."""
     x, y = _PRIMARIES.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])
 
 
 @cache
-def _read(table: str) -> dict[str, Floats]:
+def _spectrum_columns(table: str) -> dict[str, Floats]:
     rows = read_rows("dermis.optics", f"data/spectra/{table}")
     return {name: float_columns(rows, name)[:, 0] for name in rows[0]}
 
 
 def eumelanin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption of melanosomes with eumelanin, the brown to black melanin [1/mm].
+    """Return the absorption coefficient of melanosomes with eumelanin, the brown to black melanin [1/mm].
 
     Source: [Jacques1998], as in [DonnerJensen2006].
     """
@@ -98,7 +100,7 @@ def eumelanin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption of melanosomes with pheomelanin, the yellow to red melanin [1/mm].
+    """Return the absorption coefficient of melanosomes with pheomelanin, the yellow to red melanin [1/mm].
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
@@ -106,9 +108,9 @@ def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
-    """Return the absorption of a mixture of eumelanin and pheomelanin melanosomes [1/mm].
+    """Return the absorption coefficient of a mixture of eumelanin and pheomelanin melanosomes [1/mm].
 
-    eumelanin_fraction : 0 to 1 [-]
+    eumelanin_fraction : fraction of melanosomes with eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
     """
@@ -117,9 +119,10 @@ def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
 
 
 def baseline(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption of skin without melanin and blood, measured on bloodless rat skin [1/mm].
+    """Return the absorption coefficient of bloodless skin without melanin, measured on rats [1/mm].
 
-    Some public code has -lambda - 154 instead of -(lambda - 154), which leaves little more than the constant.
+    Some public code has -lambda - 154 instead of -(lambda - 154), which leaves little more than the constant
+    0.0244.
 
     Source: [Jacques1998] section 1.1.
     """
@@ -127,7 +130,7 @@ def baseline(wavelength_nm: ArrayLike) -> Floats:
 
 
 def oxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the decadic molar extinction of haemoglobin with oxygen [1/(cm M)].
+    """Return the decadic molar extinction coefficient of oxygenated haemoglobin [1/(cm M)].
 
     Source: [Prahl1999].
     """
@@ -135,7 +138,7 @@ def oxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def deoxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the decadic molar extinction of haemoglobin without oxygen [1/(cm M)].
+    """Return the decadic molar extinction coefficient of haemoglobin without oxygen [1/(cm M)].
 
     Source: [Prahl1999].
     """
@@ -143,7 +146,7 @@ def deoxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def blood(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
-    """Return the absorption of whole blood [1/mm].
+    """Return the absorption coefficient of whole blood [1/mm].
 
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
 
@@ -154,10 +157,10 @@ def blood(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
 
 
 def water(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption of water, 4 pi k / lambda [1/mm].
+    """Return the absorption coefficient of water, 4 pi k / lambda [1/mm].
 
-    No skin structure uses it: up to 700 nm it is less than 3 % of `baseline`, which was measured on moist
-    tissue.
+    k is the imaginary part of the index of refraction. No skin structure uses this spectrum: up to 700 nm it
+    is less than 3 % of `baseline`, which was measured on moist tissue.
 
     Source: [HaleQuerry1973].
     """
@@ -166,12 +169,12 @@ def water(wavelength_nm: ArrayLike) -> Floats:
 
 
 def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
-    """Return the reduced scattering of the epidermis by the law of [DonnerJensen2006], read in 1/mm [1/mm].
+    """Return the reduced scattering coefficient of the epidermis after [DonnerJensen2006] [1/mm].
 
-    The unit could not be checked against the paper. Some implementations read 1/cm and then replace the law,
-    because it gives a tenth of the scattering of skin. In 1/mm, half of it, which applies to the dermis,
-    equals 73.7 lambda^-0.22 + 1.1e12 lambda^-4 in 1/cm, the law given for skin after [Bashkatov2005]: 3 per
-    mm at 550 nm.
+    The unit could not be checked against the paper and is taken to be 1/mm. Some implementations take 1/cm
+    and then replace the law, because it gives a tenth of the scattering of skin. With 1/mm, half of the law,
+    which applies to the dermis, equals the law 73.7 lambda^-0.22 + 1.1e12 lambda^-4 [1/cm] for skin after
+    [Bashkatov2005]: 3 per mm at 550 nm.
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
@@ -180,11 +183,10 @@ def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
 
 
 def jacques_1998(wavelength_nm: ArrayLike) -> Floats:
-    """Return the reduced scattering of skin by large and small fibres (Mie and Rayleigh) [1/mm].
+    """Return the reduced scattering coefficient of skin after [Jacques1998] [1/mm].
 
-    It is the same for epidermis and dermis.
-
-    Source: [Jacques1998].
+    It is the sum of Mie scattering by large and Rayleigh scattering by small fibres, equal in epidermis and
+    dermis.
     """
     wavelength = visible_wavelengths(wavelength_nm)
     return np.asarray(2e4 * wavelength**-1.5 + 2e11 * wavelength**-4.0)

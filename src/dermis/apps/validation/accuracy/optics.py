@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.slab_mc import monte_carlo_profile, trace_medium
 from dermis.apps.validation.pages import print_tables
-from dermis.optics.diffusion.models import Model, gaussian_transmittance, slab_transmittance, truncated_medium
+from dermis.optics.diffusion.models import (
+    DiffusionModel,
+    gaussian_transmittance,
+    slab_transmittance,
+    truncated_medium,
+)
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
@@ -23,7 +28,7 @@ from dermis.optics.tissue import Tissue, load_tissue
 Floats = NDArray[np.float64]
 PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
 TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
-MODELS: tuple[tuple[Model, Clamp], ...] = (
+MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
     ("dipole", "layer"),
     ("better-dipole", "layer"),
     ("multipole", "none"),
@@ -151,7 +156,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 def published_errors() -> str:
     """Return the errors of models of the published layers against the published sum of Gaussians."""
-    variants: tuple[tuple[str, Model, Clamp], ...] = (
+    variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
         ("layered diffusion of a point source", "layered-point", "layer"),
