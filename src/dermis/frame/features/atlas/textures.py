@@ -51,7 +51,7 @@ class AtlasTextures:
     gutter, gutter_light : buffers of the gutter texels and of their light, None without gutters
     gutter_texels : (a, 2) gutter texels, x and y
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
-    median_texels_per_mm : median over texels of the smaller of the densities along u and v, at rest [texels/mm]
+    median_texels_per_mm : median over texels of the smaller density, along u or v, at rest [texels/mm]
     """
 
     resources: dict[str, Texture]

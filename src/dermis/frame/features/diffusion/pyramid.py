@@ -26,8 +26,8 @@ MIN_WEIGHT = 1e-12
 class PyramidLevels:
     """Textures of the blur pyramid: unblurred light as level 0, its blurred levels, and scratch space.
 
-    stacks : one texture array for each resolution, finest first, with a layer for each of its levels; at coarser
-        resolutions, layer 0 is a reduced copy of the last level of the next finer resolution
+    stacks : one texture array for each resolution, finest first, with a layer for each of its levels; at
+        coarser resolutions, layer 0 is a reduced copy of the last level of the next finer resolution
     first : index of the level in layer 0 of each stack
     scratch : texture for light that is blurred along u but not yet along v
     size : side of the atlas at full resolution [texels]

@@ -34,14 +34,14 @@ _RAY_STRIDE = 4  # of the rays to an area light one in four is traced: pictures 
 def draw_shadows(
     graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
 ) -> None:
-    """Declare the passes that pose the strands and compute the shadows that they cast."""
+    """Declare the passes that pose the strands, and fill the deep opacity maps of their shadows."""
     graph.repeat(pose_strands, strands.tables, shape)
     if len(shadow_views.clips):
         _draw_deep_opacity(graph, strands, lighting)
 
 
 def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
-    """Move the knots with the quads of the skin in which their strands are rooted."""
+    """Declare the pass that moves each strand with the quad of the skin mesh in which it is rooted."""
     bindings: MutableBindings = {
         "points": shape.surface["points"],
         "strands": tables.strands,
@@ -54,7 +54,7 @@ def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
 
 
 def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting: Bindings) -> None:
-    """Fill the deep opacity maps of all lights that cast shadows."""
+    """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
     tables = strands.tables
     casters = tables.shadow_casters
     segments = tables.fine.all_segments() + tables.coarse.all_segments(casters)
@@ -78,11 +78,11 @@ def draw(
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
-    """Draw the strands over the picture, and return its texture.
+    """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
     visibility : texture of the triangle at each sample
     radiance : texture of the picture without hair
-    labels : resources for labels of hair, None without labels
+    labels : resources with which the pass labels pixels of hair, None without label outputs
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
     width, height = picture.result.size[:2]
@@ -114,9 +114,9 @@ def draw(
 def _view_record(
     shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse: int
 ) -> UniformRecord:
-    """Return a record of the shader's struct StrandView.
+    """Return a record of the shader's struct StrandView: camera, samples and width of the coarse strands.
 
-    view : record of the shading
+    view : uniform record of the shading pass
     coarse : number of coarse strands to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
@@ -128,15 +128,22 @@ def _view_record(
 
 
 def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
-    """Return the side of a pixel at the depth of the coarse strands [mm]."""
+    """Return the side of a pixel at the depth of the coarse strands [mm].
+
+    view : uniform record of the shading pass
+    height : height of the picture [pixels]
+    """
     depth = float(np.dot(tables.centre_mm - view["eye"], view["forward"]))
     return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / height
 
 
 def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
-    """Estimate the number of segments in a crowded tile: all fine ones, and several times the mean of others.
+    """Estimate the number of strand segments in a crowded tile of the picture.
 
-    segments : drawn segments of all strands
+    The estimate is all fine segments, and several times the mean number of coarse ones per tile.
+
+    segments : number of segments of all strands that are drawn
+    pixel_mm : side of a pixel at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HEAD_MM / (TILE * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()
@@ -144,12 +151,13 @@ def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) 
 
 
 def rows_per_invocation(device: Device, segments: int) -> int:
-    """Return how many pixels of a column an invocation draws, a power of two to limit the shader variants.
+    """Return how many pixels of a column one shader invocation draws, a power of two.
 
-    segments : largest number of segments in a tile
+    segments : estimate of the largest number of segments in a tile
 
-    Software adapters run the whole shader for pixels without hair too, unless a loop skips these. They also
-    end all loops of a shader after 65,535 iterations in total.
+    On software adapters, an invocation without hair costs as much as one with hair, unless a loop skips its
+    pixels. They also end all loops of a shader after 65,535 iterations in total, which limits the rows.
+    Powers of two limit the number of shader variants.
     """
     if device.adapter.kind != "CPU":
         return 1
@@ -158,5 +166,5 @@ def rows_per_invocation(device: Device, segments: int) -> int:
 
 
 def _dispatch(graph: Recorder, name: str, bindings: Bindings, count: int, constants: Constants = ()) -> None:
-    """Add a pass with one invocation for each of `count` elements."""
+    """Declare a hair pass with one shader invocation for each of `count` elements."""
     graph.dispatch("strands", program(graph.device, name, constants), bindings, workgroup_grid(count))

@@ -45,25 +45,25 @@ _HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("width_scale", "f4")])
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands, and of the knots of each."""
+    """Number of strands of one group, fine or coarse, and of the knots of each strand."""
 
     hairs: int
     knots: int
 
     def all_knots(self, hairs: int | None = None) -> int:
-        """Return the number of knots of all strands, or of some."""
+        """Return the total number of knots of the first `hairs` strands, or of all strands."""
         return (self.hairs if hairs is None else hairs) * self.knots
 
     def all_segments(self, hairs: int | None = None) -> int:
-        """Return the number of segments between knots of all strands, or of some."""
+        """Return the total number of segments between knots of the first `hairs` strands, or of all."""
         return (self.hairs if hairs is None else hairs) * (self.knots - 1)
 
 
 class StrandCapacity(NamedTuple):
-    """Number of strands and knots for which buffers have space.
+    """Number of strands and knots that the buffers of hair can hold.
 
     fine : strands of brows and lashes
-    knots : knots of all strands
+    knots : total number of knots of fine and coarse strands
     """
 
     fine: int
@@ -72,7 +72,7 @@ class StrandCapacity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StrandBuffers:
-    """Buffers that are computed in each frame: posed strands, and their knots projected to the picture."""
+    """Buffers that each frame fills: posed strands, and their knots projected to the picture."""
 
     posed: Buffer
     projected: Buffer
@@ -80,11 +80,12 @@ class StrandBuffers:
 
 @dataclass(frozen=True, eq=False)
 class StrandPicture:
-    """Lists of the segments in each tile, and the picture with hair.
+    """Lists of the strand segments in each tile of the picture, and the picture with hair.
 
-    chains, links : linked lists of the segments of each tile, see strands_bin.wgsl
+    chains : buffer of the first link of each linked list of segments, see strands_bin.wgsl
+    links : buffer of the links of these lists: a segment and the next link
     result : texture of the picture with hair
-    chains_per_tile : number of linked lists of a tile
+    chains_per_tile : number of linked lists of a tile, which are filled and drawn in parallel
     """
 
     chains: Buffer
@@ -94,12 +95,12 @@ class StrandPicture:
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
-    """Return the numbers of strands and knots."""
+    """Return the number of strands and of the knots of each strand; no strands for None."""
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
 def strand_capacity(head: Head) -> StrandCapacity:
-    """Return the capacity for the strands of a head, rounded up to suffice for most other heads too."""
+    """Return the capacity for the strands of a head, rounded up so that most heads can share buffers."""
     fine, coarse = map(strand_counts, (head.strands, head.hair))
     knots, step = fine.all_knots() + coarse.all_knots(), _KNOT_STEP if coarse.hairs else _FINE_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_STEP), _round_up(knots, step))
@@ -110,14 +111,14 @@ def _round_up(count: int, step: int) -> int:
 
 
 def make_strand_buffers(device: Device, capacity: StrandCapacity) -> StrandBuffers:
-    """Allocate the buffers of posed and of projected strands."""
+    """Allocate the buffers of posed strands and of projected knots."""
     max_hairs = capacity.knots // 2
     posed = _make_buffer(device, 4 * (capacity.knots + 2 * max_hairs))
     return StrandBuffers(posed, _make_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
-    """Allocate the lists and the texture of a picture of size (width, height)."""
+    """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
     across, down = (-(-side // TILE) for side in size)
     links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_LINKS, device.max_storage_bytes // 8)
@@ -128,13 +129,18 @@ def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[in
 
 
 def chains_per_tile(device: Device, tiles: int) -> int:
-    """Return the number of linked lists per tile: 1 on software adapters and if a buffer cannot hold more."""
+    """Return the number of linked lists of segments per tile of the picture.
+
+    It is 1 on software adapters, and where a buffer cannot hold more.
+
+    tiles : number of tiles of the picture
+    """
     fits = 4 * (1 + _GPU_CHAINS * tiles) <= device.max_storage_bytes
     return _GPU_CHAINS if fits and device.adapter.kind != "CPU" else 1
 
 
 def make_deep_opacity(device: Device, lights: int) -> Buffer:
-    """Allocate the deep opacity maps of a number of lights."""
+    """Allocate a buffer for the deep opacity maps of strands, one map for each of `lights` lights."""
     texels = (1 + OPACITY_LAYERS) * OPACITY_WIDTH**2 // 2
     return _make_buffer(device, (HEADER_WORDS + texels) * max(1, lights))
 
@@ -150,16 +156,17 @@ def _make_buffer(device: Device, words: int) -> Buffer:
 
 @dataclass(frozen=True, eq=False)
 class StrandTables:
-    """Strands of a head in buffers.
+    """Strands of a head in buffers, with the counts and mean values from which strands are drawn.
 
-    strands, knots : rows of strands and of knots, see strands_pose.wgsl
-    posed, projected : see `StrandBuffers`
-    record : the struct Hairs of strand_knots.wgsl
-    fine, coarse : counts of brows and lashes, and of the hair of head and beard
-    shadow_casters : number of coarse strands that cast shadows
-    centre_mm : (3,) centre of the coarse strands at rest [mm]
+    strands, knots : tables of strands at rest and of their knots, see strands_pose.wgsl
+    posed, projected : strands in the current pose, and knots projected to the picture
+    record : uniform record of the struct Hairs in strand_knots.wgsl
+    fine : number of strands and knots of brows and lashes
+    coarse : number of strands and knots of the hair on head and chin
+    shadow_casters : number of coarse strands that cast the shadows of all coarse strands
+    centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : mean cover of their roots by hair [-]
+    mean_cover : mean optical coverage of the coarse roots by the hair around them [-]
     """
 
     strands: Buffer
@@ -179,8 +186,10 @@ class StrandTables:
 class Resources:
     """Resources of the passes of hair.
 
+    tables : strands of the head in buffers
+    picture : segment lists and the texture with hair
     shadows : buffer of the deep opacity maps of all lights
-    skin_albedo : (3,) albedo of the skin below the strands
+    skin_albedo : (3,) mean albedo of the skin below the strands, which reflects light onto them [-]
     """
 
     tables: StrandTables
@@ -190,26 +199,28 @@ class Resources:
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the constants of the shaders of hair by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in the hair shaders, by name."""
     opacity = {"strand_window": OPACITY_WIDTH, "strand_layers": OPACITY_LAYERS}
     words = {"strand_window_words": HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
     return {"strand_tile": TILE, **opacity, **words, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
-    """Return whether strands are drawn."""
+    """Return whether a head has strands, and the settings show them."""
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
 def strand_constants(head: Head, settings: Settings) -> Constants:
-    """Return the pipeline constants of the lighting for shadows of strands."""
+    """Return the pipeline constant by which the lighting reads shadows of strands, if strands are drawn."""
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
 def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
-    """Return how many coarse strands are drawn in place of all, wide enough to cover the same area.
+    """Return the number of coarse strands to draw.
 
-    pixel_mm : side of a pixel at the depth of the strands
+    Fewer and wider strands cover the same area as all strands where these are thinner than a pixel.
+
+    pixel_mm : side of a pixel at the depth of the strands [mm]
     """
     total_mm = tables.coarse.hairs * tables.mean_width_mm
     drawn_mm = (_DRAWN_WIDTH + _COVERED_WIDTH * tables.mean_cover) * pixel_mm
@@ -219,7 +230,9 @@ def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
 def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> StrandTables:
     """Upload the strands of a head.
 
-    Raises DermisError for strands of another mesh.
+    buffers : buffers that each frame fills with posed strands and projected knots
+
+    Raises DermisError for strands that are rooted in another mesh.
     """
     both = head.strands, head.hair
     parts = [part for part in both if part is not None]
@@ -259,22 +272,22 @@ def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
-    """Return (n k, 4) positions and radii of all knots [mm]."""
+    """Return the positions and radii of all knots, (n k, 4) for n strands of k knots [mm]."""
     rows = np.empty((*strands.radius_mm.shape, 4), np.float32)
     rows[..., :3], rows[..., 3] = strands.knots_mm, strands.radius_mm
     return rows.reshape(-1, 4)
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the (3,) mean albedo of the skin below the strands."""
+    """Return the mean (3,) albedo of the colour map, or a default without one [-]."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
-    """Return the resources of the requested head's hair, None without hair.
+    """Return the resources for the hair of the requested head, None if no strands are drawn.
 
-    Raises DermisError for strands of another mesh.
+    Raises DermisError for strands that are rooted in another mesh.
     """
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):

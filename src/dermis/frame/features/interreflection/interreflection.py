@@ -1,4 +1,4 @@
-"""Interreflection: form factors between patches of the skin, and the passes that let light bounce."""
+"""Interreflection: form factors between patches of the skin, and passes that compute the bounces of light."""
 
 from __future__ import annotations
 
@@ -23,22 +23,25 @@ _TEAM = 16  # invocations of a patch or a cell
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the constants of the shaders of interreflection by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in the interreflection shaders, by name."""
     return {"linked_side": SIDE, "linked_samples": SAMPLES}
 
 
 @dataclass(frozen=True, eq=False)
 class InterreflectionBuffers:
-    """Buffers of interreflection that do not depend on the skin.
+    """Buffers of interreflection, which do not depend on the appearance of the skin.
 
-    sample_points : buffer of the points at which patches are lit, and their number
-    patch_links, cell_links : buffers of the form factors of patches and of cells, by their names in shaders
-    averaged : whether cells store the mean radiance of visible patches instead of its sum by form factors
-    sample_exitance : exitance of the sample points
-    direct_exitance : exitance of the patches without bounces
-    uniform_exitance : exitance of the patches in uniform irradiance 1
-    bounced_exitance : exitance of the patches after a bounce, two buffers that are used in turn
-    from_skin, no_light : light that reaches the cells, and a buffer of zeros in its place
+    sample_points : buffer of the surface points at which patches are lit, and the number of points
+    patch_links : buffers of the form factors between patches, by their names in shaders
+    cell_links : buffers of the form factors from atlas cells to patches, by their names in shaders
+    averaged : whether cells store the mean exitance of the patches they see, instead of its sum by form
+        factors
+    sample_exitance : buffer of the exitance of the sample points
+    direct_exitance : buffer of the exitance of the patches by direct light
+    uniform_exitance : buffer of the exitance of the patches in uniform irradiance 1
+    bounced_exitance : two buffers of the exitance of the patches after a bounce, used in turn
+    from_skin : buffer of the light that reaches each cell from other skin
+    no_light : buffer of zeros in place of `from_skin` while the sample points are lit
     """
 
     sample_points: tuple[Buffer, int]
@@ -54,13 +57,13 @@ class InterreflectionBuffers:
 
     @property
     def nbytes(self) -> int:
-        """Return the size of all buffers but those between passes [byte]."""
+        """Return the size of the buffers that keep their data between frames [byte]."""
         links = *self.patch_links.values(), *self.cell_links.values()
         return sum(int(buffer.size) for buffer in (self.sample_points[0], *links, self.from_skin))
 
 
 class Interreflection(NamedTuple):
-    """Interreflection of a head: its buffers, and the (3,) albedo of the profile."""
+    """Interreflection of a head: its buffers, and the (3,) albedo of the profile, the sum of its weights."""
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
@@ -76,7 +79,7 @@ def make_interreflection(
     light_key: str,
     owner: str,
 ) -> Interreflection | None:
-    """Return the interreflection of a head, None for a convex one.
+    """Return the interreflection of a head, None for a head where no skin sees other skin.
 
     albedo : (3,) albedo of the profile
     has_occlusion : whether there is a map of the visible fraction of the sky
@@ -93,7 +96,7 @@ def make_interreflection(
 
 
 def no_interreflection(device: Device) -> Buffer:
-    """Return a buffer of zeros for heads without interreflection."""
+    """Return a buffer of zeros in place of the light from other skin, for heads without interreflection."""
     return device.cached("no interreflection", lambda: device.storage_buffer(_TEXEL * SIDE * SIDE))
 
 
@@ -143,7 +146,7 @@ def _make_buffers(device: Device, uploaded: LinkBuffers, averaged: bool, _: str)
 
 
 def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
-    """Compute the light that reaches the skin from other skin.
+    """Declare the passes that compute the light that reaches skin from other skin.
 
     bindings : resources of the lighting
     constants : pipeline constants of the lights
@@ -164,7 +167,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
 
 
 def _bounce(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Let light bounce between the patches, and gather it in the cells."""
+    """Declare the passes that let light bounce between the patches, and gather it in the atlas cells."""
     device = graph.device
     team = 1 if device.adapter.kind == "CPU" else _TEAM  # barriers are slow on software adapters
     constants: Constants = (("TEAM", team), ("MEAN", int(buffers.averaged)))

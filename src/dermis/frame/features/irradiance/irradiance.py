@@ -1,4 +1,4 @@
-"""Irradiance on the atlas, and the constants for light that is finer than texels."""
+"""Irradiance on the atlas, and the parameters of light that varies within a texel."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ TEXEL_AREA = 0.5
 
 
 def fine_light_constants() -> dict[str, float]:
-    """Return the constants of fine_light.wgsl, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in fine_light.wgsl, by name."""
     return {"fine_levels": FINE_LEVELS}
 
 
 def fine_light_members(
     variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], relit_mm2: float
 ) -> dict[str, float | NDArray[np.floating]]:
-    """Return the members of the shader record `Fine`.
+    """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
     variance_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
-    relit_mm2 : variance of the Gaussian that is relit [mm2]
+    relit_mm2 : variance of the Gaussian that is relit in the picture instead of blurred [mm2]
     """
     count = min(len(variance_mm2), FINE_LEVELS)
     level = np.zeros((FINE_LEVELS, 4), np.float32)
@@ -45,12 +45,14 @@ def draw(
     scale: float = 1.0,
     area: float = 0.0,
 ) -> None:
-    """Declare the pass that stores the irradiance that enters the skin, times its colour before scattering.
+    """Declare the pass that stores the irradiance at each texel, times the skin colour before scattering.
 
+    layout : atlas with the resources that light its texels
     constants : pipeline constants of the lights
     into : texture of `side` x `side` texels
+    side : side of the atlas [texels]
     texel : format of the texture
-    scale : factor of the stored values
+    scale : factor from irradiance to the texels of `into`
     area : standard deviation of the filter of light finer than texels [texels]; 0 samples texel centres, for
         texels whose neighbours in the texture are no neighbours on the surface
     """

@@ -1,4 +1,4 @@
-"""Ambient occlusion: the visible fraction of the sky, baked for a head at rest and updated as it moves."""
+"""Ambient occlusion: visible fraction of the sky, baked for a head at rest and updated when it moves."""
 
 from dermis.frame.features.occlusion.moving import VertexSky, draw
 

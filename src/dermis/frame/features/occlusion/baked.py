@@ -1,4 +1,4 @@
-"""Ambient occlusion at rest: the visible fraction of the sky at texels and vertices, from depth maps."""
+"""Ambient occlusion at rest: visible fraction of the sky at texels and vertices, computed with depth maps."""
 
 from __future__ import annotations
 
@@ -37,14 +37,16 @@ def bake_occlusion(
     directions: int = DIRECTIONS,
     map_size: int = MAP_SIZE,
 ) -> NDArray[np.float32]:
-    """Return the cosine-weighted visible fraction of the sky (rows, side), NaN where there is no surface.
+    """Return the cosine-weighted visible fraction of the sky (rows, side), NaN where there is no surface [-].
 
-    Depth maps are drawn from directions all around; each point counts those in which it is visible. The first
-    `side` rows are texels of the atlas, the other rows hold the vertices.
+    Depth maps are drawn from directions all around. A point sums the directions in which it is visible. The
+    first `side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
 
     bindings : resources of the lighting without those of the surface
-    texels : texture of the texels of the atlas
-    side : texels of the result along each side of the atlas
+    texels : texture of the surface point of each atlas texel
+    side : side of the atlas in the result [texels]
+    directions : number of depth maps
+    map_size : side of a depth map [texels]
     """
     mesh, commands = head.mesh, CommandList(device)
     shape = evaluate_rest_shape(device, shape_tables(device, head), head.control.positions_mm)
@@ -77,9 +79,12 @@ def _lights(shader: ComputeProgram, views: list[ShadowView]) -> UniformRecord:
 
 
 def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Return a baked map with the nearest value in empty texels, and the last row of the atlas repeated.
+    """Return a baked occlusion map in which each empty texel has the value of the nearest other one.
 
-    baked : (rows, side) as `bake_occlusion` returns it, NaN where there is no surface
+    The last row of the atlas is repeated, as a border for filters between texels and vertices.
+
+    baked : (rows, side) result of `bake_occlusion`, NaN where there is no surface
+    side : side of the atlas in the result [texels]
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -92,10 +97,10 @@ def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 
 def occlusion_map(device: Device, head: Head, atlas: Atlas, bindings: Bindings, texels: Texture) -> Texture:
-    """Return the texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
+    """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
     bindings : resources of the lighting without those of lights
-    texels : texture of the texels of the atlas
+    texels : texture of the surface point of each atlas texel
     """
     side = min(atlas.size, _MAX_SIDE)
 
@@ -110,5 +115,5 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, bindings: Bindings, 
 
 
 def no_occlusion(device: Device) -> Texture:
-    """Return a placeholder of 1 x 1 texels for scenes without occlusion."""
+    """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
     return device.cached("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))

@@ -1,4 +1,4 @@
-"""Ambient occlusion of a moving head: the baked map, corrected by the change at the vertices."""
+"""Ambient occlusion of a moving head: the baked map, corrected by the difference at the vertices."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ _OCCLUDERS = (5_000, 0.4)
 
 
 class SkyViews(NamedTuple):
-    """Parallel views of a head from directions all around.
+    """Orthographic views of a head from directions all around, for depth maps of the sky's visibility.
 
-    views : views of the depth maps
+    views : matrices from world to clip space
     to_map : (k, 3, 4) matrices from points to column [texel], row [texel] and depth
-    to_sky : (k, 3) unit vectors against the view directions
+    to_sky : (k, 3) unit vectors from the head to the viewpoint
     steps_mm : (k, 2, 3) vectors from a texel to the next one on its right and to the one above [mm]
     """
 
@@ -53,11 +53,11 @@ class SkyViews(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RotationAnchors:
-    """Points from whose positions the rotation of a head is estimated.
+    """Control points from whose motion the rotation of a head is estimated.
 
     points : (s,) indices of control points
-    offsets : (s, 3) vectors from their weighted mean at rest, times their weight [mm]
-    outline : these points with the bones that move them
+    offsets : (s, 3) vectors from the weighted mean position at rest, times the weight of the point [mm]
+    outline : positions of these points, with the bones that move them
     """
 
     points: NDArray[np.intp]
@@ -66,9 +66,9 @@ class RotationAnchors:
 
 
 def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
-    """Return the tightest views of a shape from all around.
+    """Return orthographic views from directions all around, each as narrow as the shape allows.
 
-    rotation : (3, 3) rotation of the head, which the view directions follow
+    rotation : (3, 3) rotation of the head, by which the view directions turn too
     """
     axes = _view_axes() @ rotation.T
     local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
@@ -90,13 +90,13 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 
 @lru_cache(maxsize=1)
 def _view_axes() -> Floats:
-    """Return (k, 3, 3) right, up and forward of all views."""
+    """Return the axes right, up and forward of all views of a head at rest, (k, 3, 3) unit vectors."""
     up = np.array([0.0, 1.0, 0.0])
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(VIEWS)])
 
 
 def make_anchors(head: Head) -> RotationAnchors:
-    """Return anchors near the middle of the head, so that a turn of the neck counts, and shoulders do not."""
+    """Return anchors of a head, weighted by a Gaussian about its centre so that shoulders count little."""
     rig = head.control
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHORS).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
@@ -107,7 +107,7 @@ def make_anchors(head: Head) -> RotationAnchors:
 
 
 def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
-    """Return the (3, 3) rotation of a head: the best fit to the motion of its anchors [Kabsch1976].
+    """Return the (3, 3) rotation that best fits the motion of the anchors of a head [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
@@ -123,8 +123,8 @@ def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
 class MovingOcclusion:
     """Resources from which the occlusion map of a moving head is updated.
 
-    rest_map : texture of the baked map
-    corners : texture of the vertices and weights of each texel, see moving_occlusion_corners.wgsl
+    rest_map : texture of the occlusion map that was baked at rest
+    corners : texture of the vertices around each texel and their weights, see moving_occlusion_corners.wgsl
     """
 
     rest_map: Texture
@@ -133,11 +133,11 @@ class MovingOcclusion:
 
 @dataclass(frozen=True, eq=False)
 class VertexSky:
-    """Visible fraction of the sky at the vertices of a head, and the depth maps that it is computed from.
+    """Visible fraction of the sky at the vertices of a head, and the depth maps from which it is computed.
 
-    layers : depth maps from all around
-    occluders : triangles that are drawn there, fewer than those of the head
-    visibility : buffer of two values for each vertex: at rest and in the current shape
+    layers : depth maps from directions all around
+    occluders : simplified triangles of the head that are drawn in the depth maps
+    visibility : buffer of two fractions for each vertex: at rest and in the current shape
     vertices : number of vertices
     """
 
@@ -148,7 +148,7 @@ class VertexSky:
 
 
 def make_vertex_sky(device: Device, head: Head, rest_geometry: HeadGeometry) -> VertexSky:
-    """Return the sky visibility at the vertices, computed for the head at rest.
+    """Return buffers with the visible fraction of the sky at the vertices, computed for the head at rest.
 
     rest_geometry : the triangles of the head at rest
     """
@@ -163,9 +163,9 @@ def make_vertex_sky(device: Device, head: Head, rest_geometry: HeadGeometry) -> 
 
 
 def make_moving_map(device: Device, rest_map: Texture) -> tuple[Texture, MovingOcclusion]:
-    """Return an empty occlusion map for a moving head, and the resources to update it.
+    """Return an empty occlusion map for a moving head, and the resources that update it.
 
-    rest_map : texture of the baked map
+    rest_map : texture of the occlusion map that was baked at rest
     """
     side, rows = rest_map.size[:2]
     corners = make_texture(device, (side, side), "rgba32uint")
@@ -179,9 +179,10 @@ def draw(
     record: UniformRecord,
     maps: Sequence[tuple[LitAtlas, MovingOcclusion | None]],
 ) -> None:
-    """Update the occlusion maps of all layouts for the current shape.
+    """Declare the passes that update the occlusion maps of all atlas layouts for the current shape.
 
-    record : record of the views, see `sky_record`
+    record : uniform record of the views, from `sky_record`
+    maps : atlas layouts, each with the resources that update its map, or None
     """
     _draw_vertices(graph, sky, views, record, maps[0][0].head)
     for layout, occlusion in maps:
@@ -190,7 +191,10 @@ def draw(
 
 
 def _draw_map(graph: Recorder, sky: VertexSky, layout: LitAtlas, occlusion: MovingOcclusion) -> None:
-    """Update the map of a layout; the vertices of its texels are found once."""
+    """Declare the passes that update the occlusion map of a layout from its vertices.
+
+    The pass that finds the vertices around each texel runs only once, as its inputs are constant.
+    """
     moving_map = cast(Texture, layout.bindings["occlusion_map"])
     bindings: Bindings = {
         **layout.head.resources,
@@ -205,7 +209,10 @@ def _draw_map(graph: Recorder, sky: VertexSky, layout: LitAtlas, occlusion: Movi
 
 
 def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
-    """Return the record of the views that moving_occlusion_vertices.wgsl reads."""
+    """Return the uniform record of the sky views for moving_occlusion_vertices.wgsl.
+
+    vertices : number of vertices of the mesh
+    """
     record = program(device, _VERTICES).record("Sky", vertices=vertices)
     members = record["views"]
     members["column"], members["row"], members["depth"] = views.to_map.swapaxes(0, 1)
@@ -222,7 +229,11 @@ def _draw_vertices(
     head: HeadGeometry,
     resting: bool = False,
 ) -> None:
-    """Compute the sky visibility at the vertices for the current shape, or for the rest shape."""
+    """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
+
+    record : uniform record of the views, from `sky_record`
+    resting : whether the result is stored as that of the rest shape, not of the current shape
+    """
     draw_layers(graph, "occlusion", sky.layers, views.views, sky.occluders.with_vertices_of(head))
     bindings: Bindings = {
         **head.resources,

@@ -1,4 +1,4 @@
-"""Label outputs: the class of the mesh part or of the hair in each pixel."""
+"""Label outputs: the class of the mesh or of the hair in each pixel, such as skin, lips or brow."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ STAGE = "label"
 class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
-    tables : labels of the mesh by their names in label.wgsl
-    fields : number of distance fields
+    tables : label tables of the mesh by their names in label.wgsl
+    fields : number of distance fields, which bound classes within triangles
     hair_classes : class of each strand, None without hair
-    hair_labels : label of the hair in each pixel
+    hair_labels : class of the hair in each pixel, written by the hair pass
     """
 
     tables: MutableBindings
@@ -34,9 +34,9 @@ class LabelBuffers:
     hair_labels: Buffer
 
     def hair_bindings(self, centres: Texture) -> Bindings | None:
-        """Return the resources for labels in the pass that draws hair, None without hair.
+        """Return the resources with which the hair pass labels pixels, None without hair.
 
-        centres : texture of the triangles at the centres of the pixels
+        centres : texture of the triangle at the centre of each pixel
         """
         if self.hair_classes is None:
             return None
@@ -60,13 +60,13 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the constants of the shaders of labels by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in the label shaders, by name."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
 def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
-    """Declare the pass that labels the pixels."""
+    """Declare the pass that writes the class of each pixel."""
     constants = ("FIELDS", buffers.fields), ("HAIRS", buffers.hair_classes is not None)
     shader = stage_program(graph.device, planes, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
@@ -74,7 +74,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the labels of a mesh, and the FaceSynthetics class of each class."""
+    """Upload the label tables of a mesh, and the FaceSynthetics number of each class of dermis."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

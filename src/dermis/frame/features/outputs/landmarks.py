@@ -25,10 +25,11 @@ _RESULT_FLOATS = 4  # position, and visibility
 
 @dataclass(frozen=True, eq=False)
 class LandmarkBuffers:
-    """Landmarks of all requested sets in buffers.
+    """Buffers of the landmarks of all requested sets.
 
-    sets : landmarks by the names of the sets
-    table, results : buffers that landmarks.wgsl reads and writes
+    sets : surface points of the landmarks by the names of the sets
+    table : buffer of the surface points, read by landmarks.wgsl
+    results : buffer of positions and visibility, written by landmarks.wgsl
     count : number of landmarks of all sets
     """
 
@@ -38,7 +39,7 @@ class LandmarkBuffers:
     count: int
 
     def positions(self, raw: NDArray[np.uint8]) -> LandmarkPositions:
-        """Return the landmarks of each set from the bytes of `results`."""
+        """Return the positions and visibility of the landmarks of each set, from the bytes of `results`."""
         rows, first, positions = raw.view(np.float32).reshape(-1, _RESULT_FLOATS), 0, {}
         for name, points in self.sets.items():
             positions[name] = points.names, rows[first : first + len(points.names)]
@@ -47,9 +48,9 @@ class LandmarkBuffers:
 
 
 def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of landmark sets and tables without duplicates.
+    """Return the names of landmark sets and paths of landmark files without duplicates.
 
-    Raises DermisError for what is neither a set nor a table.
+    Raises DermisError for a name that is neither a set nor a file.
     """
     if isinstance(names, str) or not isinstance(names, Iterable):
         actual = f"got {format_value(names)}"
@@ -58,9 +59,11 @@ def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkBuffers:
-    """Upload the landmarks of a head.
+    """Upload the surface points of the landmarks of a head.
 
-    Raises DermisError as `landmark_points` does.
+    names : names of landmark sets, or paths of landmark files
+
+    Raises DermisError for landmarks that the head does not have.
     """
     sets = {name: landmark_points(head, name) for name in names}
     rows = np.zeros(sum(len(points.names) for points in sets.values()), _ROW)

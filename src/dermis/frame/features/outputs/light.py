@@ -1,4 +1,4 @@
-"""Outputs of light and of the skin: albedo, radiance, visibility of lights, pigments and thickness."""
+"""Outputs of light and skin: albedo, radiance, visibility of lights, pigments and thickness."""
 
 from __future__ import annotations
 
@@ -39,12 +39,13 @@ _MAX_LIGHTS = 64  # as in visibility.wgsl
 
 @dataclass(frozen=True, eq=False)
 class LightOutputs:
-    """Resources of the requested outputs of light and skin besides their planes.
+    """Resources for outputs of light and skin that are computed from data besides their `Planes`.
 
-    light_part_counts : number of parts that each light is shaded as
+    light_part_counts : number of parts into which the shader divides each light
     transmitted : textures of the light through thin parts: one per layout, and the blend of several layouts
     thickness : texture of the thickness of the tissue, None if it is not requested
-    pigments : melanin and blood of uniform skin [-], None for painted maps or if they are not requested
+    pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if they are not
+        requested
     """
 
     light_part_counts: tuple[int, ...]
@@ -79,7 +80,10 @@ def make_light_outputs(
 
 
 def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that shade the centres of pixels, and diffuse light over the picture if needed."""
+    """Declare the passes that shade pixel centres for outputs of light.
+
+    Techniques in screen space also diffuse the light below the skin over the picture.
+    """
     device, diffusion = graph.device, inputs.picture_diffusion
     shader = stage_program(device, planes, inputs.constants)
     layers = diffusion.layers if diffusion else no_subsurface_layers(device)
@@ -96,7 +100,7 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
 
 
 def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the pass that computes the visible fraction of each light."""
+    """Declare the pass that computes how much of each light a pixel sees, as a fraction."""
     shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
@@ -105,14 +109,14 @@ def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, in
 
 
 def draw_pigments(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the pass that reads melanin and blood."""
+    """Declare the pass that writes the melanin and blood fractions of the skin in each pixel."""
     shader, uniform = stage_program(graph.device, planes), resources.pigments
     record = shader.record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
     draw_planes(graph, planes, shader, inputs.bindings(shader) | {"pigments": record})
 
 
 def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that measure the thickness of the tissue below the skin."""
+    """Declare the passes that measure the thickness of the tissue at thin parts, and write it to pixels."""
     assert inputs.translucency is not None and resources.thickness is not None
     measure_thickness(graph, inputs.translucency, resources.thickness)
     shader = stage_program(graph.device, planes)
@@ -121,7 +125,7 @@ def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inp
 
 
 def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
-    """Return a texture of the coarse atlas, filled with the largest distance of pairs [mm]."""
+    """Return a texture of the coarse atlas, filled with the largest thickness that pairs can measure [mm]."""
     surface = pairs.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
     texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
@@ -131,7 +135,7 @@ def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
 
 
 def measure_thickness(graph: Recorder, translucency: Translucency, target: Texture) -> None:
-    """Declare the pass that writes the current thickness to a texture of `make_thickness_map`."""
+    """Declare the pass that writes the thickness of the posed head to the texture of `make_thickness_map`."""
     pairs, shader = translucency.pairs, program(graph.device, "outputs/thickness_map.wgsl")
     count, cells = pairs.receivers[1], pairs.cells
     reach = {"count": count, "radius_mm": cells.radius_mm, "cell_mm2": cells.cell_mm**2}
@@ -147,14 +151,14 @@ def measure_thickness(graph: Recorder, translucency: Translucency, target: Textu
 
 
 def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
-    """Return the resources of shading with factor 1 for all components of the light."""
+    """Return the resources of the shading, with factor 1 for light below the skin and for reflected light."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}
 
 
 def _pairs(request: FrameRequest, translucency: Sequence[Translucency | None]) -> PairBuffers | None:
-    """Return the translucent pairs, None if no requested output depends on them."""
+    """Return the translucent pairs of the first layout, None if no requested output depends on them."""
     culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
     if culprit is None:
         return None
@@ -168,7 +172,7 @@ def _pairs(request: FrameRequest, translucency: Sequence[Translucency | None]) -
 
 
 def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
-    """Return melanin and blood of uniform skin [-], None for painted skin.
+    """Return the melanin and blood fractions of uniform skin [-], None for painted skin.
 
     Raises DermisError for skin that is not made of pigments.
     """

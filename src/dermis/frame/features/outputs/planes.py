@@ -1,4 +1,4 @@
-"""Planes: the outputs of a stage one after the other in a buffer, and the pass that fills it."""
+"""Planes: buffer of the outputs of a stage, one channel after the other, and the pass that fills it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer of the outputs of a stage.
+    """Buffer of the outputs of a stage, a plane of pixels for each channel.
 
-    stage : name of the shader
-    channels : number of channels of each output, in order
+    stage : name of the shader that fills the planes
+    channels : number of channels of each output, in the order of the planes
     size : (width, height) [pixel]
-    buffer : words, see planes.wgsl
+    buffer : one word per pixel and channel, see planes.wgsl
     """
 
     stage: str
@@ -36,11 +36,11 @@ class Planes:
 
     @property
     def constants(self) -> Constants:
-        """Return the pipeline constants that give the first channel of each output."""
+        """Return the pipeline constants that tell the shader the index of the first plane of each output."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
     def first_channel(self, name: str) -> Constants:
-        """Return the pipeline constant that gives the first channel of one output."""
+        """Return the pipeline constant that tells the shader the index of the first plane of an output."""
         return ((f"{name.upper()}_FIRST", self._first_channels()[name]),)
 
     def byte_range(self, name: str) -> tuple[int, int]:
@@ -49,12 +49,18 @@ class Planes:
         return plane * self._first_channels()[name], plane * self.channels[name]
 
     def arrays(self, raw: NDArray[np.uint8]) -> dict[str, PlaneArray]:
-        """Return each output as (h, w) or (h, w, channels), from the bytes of the whole buffer."""
+        """Return each output as an (h, w) or (h, w, channels) array.
+
+        raw : bytes of the whole buffer
+        """
         ranges = {name: self.byte_range(name) for name in self.channels}
         return {name: self.array(name, raw[start : start + size]) for name, (start, size) in ranges.items()}
 
     def array(self, name: str, raw: NDArray[np.uint8]) -> PlaneArray:
-        """Return one output as (h, w) or (h, w, channels), from its own bytes."""
+        """Return one output as an (h, w) or (h, w, channels) array.
+
+        raw : bytes of this output, in the range `byte_range`
+        """
         output, (width, height) = OUTPUTS[name], self.size
         kind = np.dtype(output.kind).kind
         words: PlaneArray = raw.view({"f": np.float32, "i": np.int32, "u": np.uint32}[kind])
@@ -72,8 +78,9 @@ class Planes:
 def make_planes(
     device: Device, stage: str, channels: tuple[tuple[str, int], ...], size: tuple[int, int]
 ) -> Planes:
-    """Allocate the outputs of a stage for a picture of size (width, height).
+    """Allocate the planes of a stage for a picture of size (width, height).
 
+    stage : name of the shader that fills the planes
     channels : (name, number of channels) of each output
 
     Raises DermisError if they do not fit in one buffer of the device.
@@ -90,7 +97,7 @@ def make_planes(
 
 
 def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> ComputeProgram:
-    """Return the program of a stage for the requested outputs.
+    """Return the program that computes the requested outputs of a stage.
 
     constants : pipeline constants of the surface and the lights, for stages that need them
     """
@@ -98,8 +105,8 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 
 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
-    """Declare the pass that fills the planes.
+    """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader but the planes
+    bindings : resources of the shader, apart from the planes themselves
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

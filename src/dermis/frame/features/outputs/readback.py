@@ -1,4 +1,4 @@
-"""Readback of the picture, packed to three or four bytes or floats per pixel, and of the outputs."""
+"""Readback of the picture, packed to three or four bytes or floats per pixel, and of the other outputs."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _PIXELS, _WORDS = 4, 3  # that an invocation of pack.wgsl reads and writes
 
 @dataclass(frozen=True)
 class Readback:
-    """Readback of a picture and its outputs in progress.
+    """Readback in progress, of a picture and its outputs.
 
     fetched : readback of the buffers
     size : (width, height) [pixel]
     kind : dtype of the picture
-    channels : 3, or 4 with alpha
-    words : size of the picture, which precedes the outputs [4 bytes]
-    outputs : outputs that are read back too, None for none
+    channels : number of channels of the picture: 3, or 4 with alpha
+    words : words of four bytes that the picture takes; the outputs follow in the same bytes
+    outputs : resources of the outputs that are read back too, None for the picture alone
     """
 
     fetched: BufferReadback
@@ -45,11 +45,14 @@ class Readback:
     outputs: Resources | None = None
 
     def image(self) -> PictureArray:
-        """Wait for the picture and return it, (h, w, channels); can be called once."""
+        """Wait for the picture and return it as an (h, w, channels) array; can be called once."""
         return self._image(self.fetched.array())
 
     def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
-        """Wait for the picture, its outputs by name and landmarks, and return them; replaces `image`."""
+        """Wait for the readback; return the picture, outputs by name, and landmarks by the name of their set.
+
+        Call either this method or `image`, and only once.
+        """
         raw, start, arrays = self.fetched.array(), _WORD * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
             return self._image(raw), {}, {}
@@ -116,7 +119,10 @@ def _check_size(device: Device, size: int, limit: int, pixels: int, what: str = 
 
 
 def _packed_buffer(device: Device, picture: Picture, words: int) -> Buffer:
-    """Return the buffer for the packed picture, stored with the picture for the next readback."""
+    """Return the buffer for the packed picture; it is kept with the picture for later readbacks.
+
+    words : size of the packed picture [4 bytes]
+    """
     if words not in picture.packed:
         picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")
     return picture.packed[words]

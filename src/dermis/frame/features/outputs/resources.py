@@ -21,10 +21,10 @@ from dermis.scene.outputs import OUTPUTS
 class Resources:
     """Resources of the outputs of a frame.
 
-    names : outputs in the order of the request
+    names : names of the outputs in the order of the request
     planes : buffers of the outputs, one for each stage
-    centres : triangles at the centres of the pixels; None if the only sample of the picture is there
-    previous : shape in the previous scene, None if it is not needed
+    centres : triangle at the centre of each pixel; None where the only sample of a pixel is at its centre
+    previous : shape of the head in the previous scene, None without motion vectors
     light : resources for outputs of light and skin
     labels, landmarks : buffers of labels and landmarks, None if they are not requested
     """
@@ -39,12 +39,12 @@ class Resources:
 
     @property
     def buffers(self) -> list[Buffer]:
-        """Return the buffers to read back, in order."""
+        """Return the buffers to read back after the picture, in the order that `Readback` expects."""
         landmarks = [self.landmarks.results] if self.landmarks else []
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
     def planes_with(self, name: str) -> Planes:
-        """Return the planes that contain an output."""
+        """Return the planes of the stage that computes an output."""
         return next(planes for planes in self.planes if name in planes.channels)
 
 

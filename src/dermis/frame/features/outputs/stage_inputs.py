@@ -25,10 +25,10 @@ from dermis.gpu import (
 
 @dataclass(frozen=True, eq=False)
 class PreviousScene:
-    """Previous scene, from which motion vectors are measured.
+    """Pose and camera of the previous scene, from which motion vectors are computed.
 
-    motion : motion of the head, None if its shape has not changed
-    view : record of the shading with the rays of the previous camera
+    motion : pose of the head in the previous scene, None if its shape has not changed
+    view : uniform record of the shading pass with the rays of the previous camera
     """
 
     motion: MotionBytes | None
@@ -39,8 +39,9 @@ class PreviousScene:
 class PictureDiffusion:
     """Diffusion of the light below the skin over the picture, by a technique in screen space.
 
-    layers : texture in which the shading stores the light
-    diffuse : diffuses it, and returns textures of the light and of the fraction of it that leaves
+    layers : texture in which the shading stores the light below the skin
+    diffuse : function that declares the passes; it returns textures of the diffused light and of the fraction
+        of it that leaves towards the camera
     """
 
     layers: Texture
@@ -52,20 +53,22 @@ class StageInputs:
     """Inputs of the stages that compute outputs.
 
     lighting : resources of the lighting for the first layout
-    view : record of the struct Shade
+    view : uniform record of the struct Shade
     centre_mm : centre of the head, the origin of positions of the scene [mm]
     constants : pipeline constants of the lights, the surface and the technique
     scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
-    camera, head, visibility : views of the samples of a pixel, the triangles, and the triangle at each sample
+    camera : projection of the camera, with the positions of samples in a pixel
+    head : triangles of the head
+    visibility : triangle at each sample of the picture
     centres : triangle at the centre of each pixel; `visibility` if the only sample is there
     shape : current shape of the head
     picture : textures of the finished picture
     has_hair : whether hair is drawn
-    previous : previous scene, None if it is not needed
-    translucency : light through thin parts of the first layout, None without any
+    previous : pose and camera of the previous scene, None without motion vectors
+    translucency : resources of light through thin parts for the first layout, None without such light
     picture_diffusion : diffusion over the picture, None for techniques without it
-    sum_transmitted : sums the light through thin parts in textures of the atlas, and returns the one that
-        combines all layouts
+    sum_transmitted : function that sums the light through thin parts in textures of the atlas, and returns
+        the one that combines all layouts
     """
 
     lighting: Bindings
@@ -86,6 +89,6 @@ class StageInputs:
     sum_transmitted: Callable[[tuple[Texture, ...]], Texture]
 
     def bindings(self, shader: ComputeProgram) -> MutableBindings:
-        """Return the resources of the lighting with those of surface_hit.wgsl."""
+        """Return the resources of the lighting, with the camera and triangles that surface_hit.wgsl reads."""
         camera = shader.record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
         return {**self.lighting, "camera": camera, "centres": self.centres.texture}

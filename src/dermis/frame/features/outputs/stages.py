@@ -25,7 +25,7 @@ _SURFACE_CONSTANTS = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
 def hair_labels(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
-    """Return the resources for labels in the pass that draws hair, None if no labels are requested."""
+    """Return the resources with which the hair pass labels pixels, None if no labels are requested."""
     if not _labels_hair(resources, inputs):
         return None
     assert resources is not None and resources.labels is not None
@@ -51,7 +51,7 @@ def _labels_hair(resources: Resources | None, inputs: StageInputs) -> bool:
 
 
 def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
-    """Find the triangle at the centre of each pixel, unless the only sample of the picture is there."""
+    """Declare the passes that find the triangle at the centre of each pixel, unless a sample is there."""
     if inputs.centres is not inputs.visibility:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
@@ -114,7 +114,7 @@ STAGES: Registry[Stage] = Registry(
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Return the list STAGE_outputs of each stage, from which features/outputs/STAGE.wgsl is generated."""
+    """Return the outputs of each stage, which `//#each` lines of features/outputs/STAGE.wgsl expand."""
     stages = {one.stage for one in OUTPUTS.values()}
     return {f"{stage}_outputs": partial(_members, stage) for stage in sorted(stages)}
 
@@ -124,7 +124,7 @@ def _members(stage: str) -> list[Member]:
 
 
 def _wgsl_type(output: Output) -> tuple[tuple[str, str], ...]:
-    """Return the WGSL type of an output, and its value in pixels without a surface."""
+    """Return the WGSL type of an output, and the literal that the shader writes where there is no surface."""
     kind = output.wgsl_type if output.channels == 1 else f"vec{output.channels}f"
     nothing = output.background if kind == "f32" else int(output.background)
     return ("type", kind), ("nothing", f"{kind}({nothing})")

@@ -1,4 +1,4 @@
-"""The pass that adds the background behind the head."""
+"""Pass that adds the background behind the head."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ class Backdrop:
     """Textures of the background.
 
     result : texture of the picture with its background
-    panorama : panorama that is shown, None to show the one of the reflections
+    panorama : unfiltered panorama for a sharp background, None to show the prefiltered one that lights the
+        skin
     """
 
     result: Texture
@@ -33,9 +34,9 @@ def draw(
     meter: Meter | None,
     settings: Settings,
 ) -> Texture:
-    """Add the background to a picture, and return `backdrop.result`.
+    """Declare the pass that adds the background to a picture; return `backdrop.result`.
 
-    shading : resources of the lighting, and the record of the shading
+    shading : resources of the lighting, and the uniform record of the shading pass
     image : texture of the picture without background
     meter : exposure meter, None for a fixed exposure
     """

@@ -1,4 +1,4 @@
-"""Bloom, light that a lens scatters: wider and wider Gaussians of the whole picture, without a threshold."""
+"""Bloom, the light that a lens scatters: a sum of Gaussians of the whole picture, without a threshold."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _LAST_HALVINGS = 4  # that are left out: the widest Gaussian spans a sixteenth o
 
 @dataclass(frozen=True, eq=False)
 class BloomTextures:
-    """Textures of the bloom: halved pictures, sums at increasing resolution, and the result."""
+    """Textures of the bloom: the picture at ever lower resolution, sums on the way back, and the result."""
 
     halved: list[Texture]
     sums: list[Texture]
@@ -29,7 +29,12 @@ def make_bloom(device: Device, size: tuple[int, int]) -> BloomTextures:
 
 
 def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: float) -> Texture:
-    """Scatter a fraction of the light of a picture, and return `textures.result`; no light is lost."""
+    """Declare the passes that scatter a fraction of the picture's light; return `textures.result`.
+
+    The total light is unchanged.
+
+    scattered : fraction of the light that the lens scatters [-]
+    """
     source = picture
     for halved in textures.halved:
         _step(graph, 0, source, source, halved, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Incident exposure meter: it measures the irradiance of the skin, so that dark skin stays dark."""
+"""Incident exposure meter: it measures the irradiance of the skin, so that dark skin is rendered dark."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the constants of the meter's shaders by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in the shaders of the exposure meter, by name."""
     highlights = {"meter_clipping": CLIPPING, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
     return {"meter_side": SIDE, "meter_key": KEY, **highlights}
 
 
 @dataclass(frozen=True, eq=False)
 class Meter:
-    """Buffers of the meter: measurements at all points, and the exposure."""
+    """Buffers of the exposure meter: measurements on a grid of points in the picture, and the exposure."""
 
     points: Buffer
     exposure: Buffer
 
 
 def make_meter(device: Device) -> Meter:
-    """Allocate the buffers of the meter."""
+    """Allocate the buffers of the exposure meter."""
     return Meter(device.storage_buffer(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
 
 
@@ -47,9 +47,10 @@ def draw(
     visibility: Texture,
     image: Texture,
 ) -> None:
-    """Meter the exposure for the visible skin.
+    """Declare the passes that measure the irradiance of the visible skin, and set the exposure by it.
 
-    shading : resources of the lighting, record of the shading, and pipeline constants of the lights
+    shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
+        lights
     visibility : texture of the triangle at each sample
     image : texture of the radiance of the picture
     """
@@ -64,7 +65,10 @@ def draw(
 
 
 def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
-    """Return the fixed exposure, 0 if it is metered, and the buffer of the metered one, for exposure.wgsl."""
+    """Return the fixed exposure and the buffer of the metered exposure, the inputs of exposure.wgsl.
+
+    The fixed exposure is 0 where the metered one is used.
+    """
     if settings.exposure == "auto":
         assert meter is not None
         return 0.0, meter.exposure
@@ -73,5 +77,5 @@ def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> t
 
 
 def read_meter(device: Device, meter: Meter) -> float:
-    """Wait for the metered exposure of the last frame, and return it."""
+    """Wait for the exposure that was metered in the last frame, and return it [-]."""
     return float(np.frombuffer(device.handle.queue.read_buffer(meter.exposure), np.float32)[0])

@@ -1,4 +1,4 @@
-"""The pass from radiance to the picture: exposure, tone curve and encoding."""
+"""Pass from radiance to the displayed picture: exposure, tone curve and sRGB encoding."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 class Picture:
     """Textures of a picture.
 
-    radiance : radiance and coverage
+    radiance : radiance of each pixel, with its coverage by the head as alpha
     exposed : linear light after exposure
     bytes : sRGB bytes
     size : (width, height) [pixel]
-    packed : buffers for the readback, by their number of words
+    packed : buffers into which the picture is packed for readback, by their size [4 bytes]
     """
 
     radiance: Texture
@@ -39,7 +39,7 @@ def make_picture(device: Device, size: tuple[int, int]) -> Picture:
 def draw(
     graph: Recorder, radiance: Texture, picture: Picture, settings: Settings, meter: Meter | None = None
 ) -> None:
-    """Apply exposure, tone curve and encoding: fill `picture.exposed` and `picture.bytes`.
+    """Declare the pass of exposure, tone curve and encoding, which fills `exposed` and `bytes`.
 
     meter : exposure meter, None for a fixed exposure
     """
@@ -52,5 +52,5 @@ def draw(
 
 
 def encoding_members(settings: Settings) -> dict[str, int]:
-    """Return members of shader records: the tone curve, and whether colours are sRGB-encoded."""
+    """Return the members of shader records that choose the tone curve and the sRGB encoding."""
     return {"tone": _TONES.index(settings.tone), "encoded": int(settings.gamma == "right")}

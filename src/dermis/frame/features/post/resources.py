@@ -1,4 +1,4 @@
-"""Resources of post-processing, and its passes in order."""
+"""Resources of post-processing, and its passes from radiance to the picture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Resources:
     """Resources of post-processing.
 
     meter : exposure meter, None for a fixed exposure
-    backdrop : textures of the background, None without background
+    backdrop : textures of the background, None for a black or transparent one
     bloom : textures of the bloom, None without bloom
     """
 
@@ -55,10 +55,10 @@ def draw(
     light_constants: Constants,
     visibility: Texture,
 ) -> None:
-    """Declare the passes from radiance to the picture.
+    """Declare the passes from radiance to the picture: meter, background, bloom, tone curve and encoding.
 
     lighting : resources of the lighting
-    view : record of the shading
+    view : uniform record of the shading pass
     light_constants : pipeline constants of the lights
     visibility : texture of the triangle at each sample
     """
@@ -74,7 +74,10 @@ def draw(
 
 
 def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
-    """Return the textures of the background, with the unfiltered panorama if that is shown."""
+    """Return the textures of the background, None without one.
+
+    A sharp environment needs its unfiltered panorama.
+    """
     settings, environment = request.settings, request.environment
     if settings.background == "none":
         return None

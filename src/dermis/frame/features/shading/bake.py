@@ -1,4 +1,4 @@
-"""Properties and light of the skin at points of its maps, computed by the shading of the picture."""
+"""Properties and light of the skin at texels of baked maps, by the code that shades the picture."""
 
 from __future__ import annotations
 
@@ -32,13 +32,14 @@ COUNT = sum(CHANNELS.values())
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the constants of bake.wgsl by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in bake.wgsl, by name."""
     return {"baked_numbers": COUNT}
 
 
 def point_words(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
-    """Return points on triangles as (n, 4) words that bake.wgsl reads.
+    """Pack surface points into (n, 4) words for bake.wgsl.
 
+    triangle : (n,) indices of the triangles on which the points lie
     weights : (n, 2) barycentric weights of the second and third corner
     """
     words = np.zeros((len(triangle), 4), np.uint32)
@@ -55,13 +56,13 @@ def bake(
     footprint: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """Return (n, COUNT) numbers at points, in the order of `CHANNELS`.
+    """Return the (n, COUNT) channels that bake.wgsl computes at surface points, in the order of `CHANNELS`.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
-    points : (n, 4) see `point_words`
-    footprint : side of a texel over the side of the maps
-    pigments : melanin and blood of uniform skin [-]; None to read them from painted maps
+    points : (n, 4) packed surface points, from `point_words`
+    footprint : side of a texel in uv, the inverse of the number of texels along the map [-]
+    pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """
     shader = program(device, "shading/bake.wgsl", constants)
     count, size = len(points), 4 * COUNT * len(points)
@@ -79,5 +80,5 @@ def bake(
 
 
 def no_thickness(device: Device) -> Texture:
-    """Return a placeholder of 1 x 1 texels for the map of thickness."""
+    """Return a 1 x 1 placeholder for the map of tissue thickness."""
     return device.cached("no thickness", lambda: make_texture(device, (1, 1), "rgba32float"))

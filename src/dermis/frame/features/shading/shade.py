@@ -1,4 +1,4 @@
-"""The pass that shades every sample of the visibility buffer."""
+"""Pass that shades every sample of the visibility buffer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.gpu import (
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
-    """Return the program of the shading, whose structs include those of lights, skin and camera.
+    """Return the program of the shading pass; its structs also define the records of lights and skin.
 
     constants : pipeline constants of the lights, the surface and the technique
     """
@@ -35,14 +35,14 @@ def draw(
     size: tuple[int, int],
     subsurface: Texture | None = None,
 ) -> Texture:
-    """Shade every sample of every pixel, and return the image of radiance and coverage.
+    """Declare the pass that shades all samples of all pixels; return the image of radiance and coverage.
 
     lighting : resources of the lighting
-    view : record of the struct Shade
+    view : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
     scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
-    subsurface : layers that get the light below the skin and the fraction of it that leaves, which the image
-        then lacks
+    subsurface : texture layers for the light below the skin and the fraction of it that leaves towards the
+        camera; the image then lacks this light
     """
     device, (width, height) = graph.device, size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
@@ -53,5 +53,5 @@ def draw(
 
 
 def no_subsurface_layers(device: Device) -> Texture:
-    """Return a placeholder for the layers of light below the skin."""
+    """Return a placeholder for the layers of light below the skin, for techniques outside screen space."""
     return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))

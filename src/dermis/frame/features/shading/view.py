@@ -1,4 +1,4 @@
-"""The camera in the form that the shading reads: rays, samples, poses of the eyes and light factors."""
+"""Uniform record of the shading pass: camera rays, samples, poses of the eyes and light factors."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ _RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
 
 
 class Pinhole(NamedTuple):
-    """Pinhole camera.
+    """Pinhole camera in world space.
 
-    eye : position [mm]
+    eye : position of the pinhole [mm]
     axes : unit vectors to the right, up and forward
-    window : rectangle of the picture on a plane in front of the eye
+    window : rectangle of the picture on the image plane at distance 1
     """
 
     eye: Triple
@@ -54,7 +54,7 @@ class EyePoses(NamedTuple):
 
     frames : (2, 4, 4) matrices from the space of the head to that of each eye
     edges_mm : (2, r, 3) points along the edges of the lids around each eye [mm]; None where they are unknown,
-        as in files
+        as for heads from files
     """
 
     frames: NDArray[np.float64]
@@ -62,7 +62,7 @@ class EyePoses(NamedTuple):
 
 
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
-    """Return the pinhole camera for a picture of the size of the settings."""
+    """Return the pinhole camera of a scene in world space, for the aspect ratio of the settings."""
     eye = world_position(camera.position, head.centre_mm)
     forward = vector_between(camera.position, camera.target)
     width, height = settings.size
@@ -70,14 +70,17 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
-    """Return the view of a camera, with all samples of a pixel."""
+    """Return the projection of a camera, with the positions of all samples in a pixel.
+
+    samples : number of samples per pixel
+    """
     rows = view_rows(pinhole.eye, pinhole.axes)
     clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 
 def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
-    """Return the record of the struct Shade without the camera: samples, weights and materials.
+    """Return the uniform record of the struct Shade without its camera: samples, weights and materials.
 
     Raises DermisError for a head with too many materials.
     """
@@ -111,7 +114,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
 
 
 def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
-    """Return a copy of a record of the struct Shade with the rays of a camera.
+    """Return a copy of a record of the struct Shade, with camera rays and poses of the eyes.
 
     eyes : poses of modelled eyes, None for a head without such eyes
     """
@@ -134,5 +137,5 @@ def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) ->
 
 
 def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
-    """Return a record of the struct Rays from a record of the struct Shade."""
+    """Copy the camera rays of a Shade record to a record of the struct Rays, for other shaders."""
     return shader.record("Rays", **{name: view[name] for name in _RAY_MEMBERS})

@@ -19,8 +19,9 @@ SHADOW_BYTES = 4
 class ShadowMaps:
     """Shadow maps of all lights.
 
-    layers : depth layer of each light
-    bounds : texture of the nearest depths in squares of increasing size of each layer, for area lights
+    layers : depth map of each light
+    bounds : texture of the nearest depth in squares of increasing size of each map, by which area lights skip
+        empty space
     """
 
     layers: ViewLayers
@@ -33,7 +34,7 @@ class ShadowMaps:
 
 
 def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
-    """Create empty shadow maps with `size` texels a side.
+    """Allocate `layers` empty shadow maps of size x size texels.
 
     Raises DermisError when they do not fit into memory.
     """
@@ -66,5 +67,5 @@ def draw(
 
 
 def _squares(size: int) -> int:
-    """Return the number of squares of 4 texels along a side of the map, rounded up to a multiple of 16."""
+    """Return the number of squares of 4 x 4 texels along a shadow map, rounded up to a multiple of 16."""
     return 16 * -(-size // 64)

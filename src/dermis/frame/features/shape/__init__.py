@@ -1,4 +1,4 @@
-"""Shape of a head on the device: control points, the surface through them, and its curvature."""
+"""Shape of a head on the device: control points, the subdivided surface, and its curvature."""
 
 from dermis.frame.features.shape.resources import Resources, make
 from dermis.frame.features.shape.shape import draw

@@ -1,4 +1,4 @@
-"""Curvature of the surface of a head, smoothed over the distance that light travels in skin."""
+"""Curvature of the head's surface, smoothed over the distance that light travels in skin."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _STAGE = "curvature"
 class Curvature:
     """Smoothed root mean square of the two principal curvatures at the vertices; 1/r on a sphere [1/mm].
 
-    smoothed : buffer of the result, one float per vertex
+    smoothed : buffer of the smoothed curvature, one float per vertex
     scratch : buffer for intermediate steps of the smoothing
-    tables : triangles and neighbours of each vertex, by their names in the shaders
-    steps : number of smoothing steps that reach `SMOOTH_MM` on the head at rest
+    tables : buffers of the triangles and neighbours of each vertex, by their names in the shaders
+    steps : number of smoothing steps after which the standard deviation is `SMOOTH_MM` on the head at rest
     vertices : number of vertices
     """
 
@@ -41,7 +41,7 @@ class Curvature:
 
 
 def make_curvature(device: Device, mesh: Mesh) -> Curvature:
-    """Create the buffers for the curvature of a mesh."""
+    """Create the buffers with which the curvature of a mesh is computed."""
     corners, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.positions)
     pairs, _, _ = edges(corners)
     both = np.concatenate([pairs, pairs[:, ::-1]])
@@ -61,12 +61,16 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
 
 
 def placeholder_curvature(device: Device) -> Buffer:
-    """Return a placeholder for the curvature buffer, for shaders that do not read it."""
+    """Return a placeholder for the curvature buffer, for frames whose technique does not read it."""
     return device.cached("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
 
 def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:
-    """Return the number of smoothing steps whose total standard deviation is `SMOOTH_MM`."""
+    """Return the number of smoothing steps that have a standard deviation of `SMOOTH_MM` together.
+
+    pairs : (e, 2) points of the edges of the mesh
+    both : (2 e, 2) the edges in both directions, sorted by their first point
+    """
     points = mesh.points_mm
     square = ((points[pairs[:, 0]] - points[pairs[:, 1]]) ** 2).sum(axis=1)
     degree = 1.0 + np.bincount(both[:, 0], minlength=len(points))

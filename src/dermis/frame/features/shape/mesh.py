@@ -1,4 +1,4 @@
-"""Mesh on the device, as textures and as buffers, with the atlas coordinates of its triangles."""
+"""Mesh on the device: vertices, triangles and the atlas coordinates of their corners."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class HeadGeometry:
     triangles: int
 
     def with_shape(self, shape: Shape) -> HeadGeometry:
-        """Return the same triangles with the vertices of a shape."""
+        """Return these triangles with the posed vertices of a shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
     def with_vertices_of(self, other: HeadGeometry) -> HeadGeometry:
-        """Return the same triangles with the vertices of another geometry."""
+        """Return these triangles with the vertex buffers of another geometry of the same head."""
         return replace(
             self, resources={**self.resources, **{name: other.resources[name] for name in VERTEX_RESOURCES}}
         )
@@ -47,7 +47,7 @@ def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> H
 
 
 def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:
-    """Upload only the indices (t, 3) of triangles, for depth passes."""
+    """Upload only the (t, 3) vertex indices of triangles, for depth passes of a simplified mesh."""
     table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
     table[0, :, :3] = triangles
     return _uploaded(device, table, {})
@@ -92,10 +92,11 @@ def rest_geometry(
     rest_positions_mm: NDArray[np.float32] | None,
     index: int,
 ) -> HeadGeometry:
-    """Return the geometry of an atlas layout with the head at rest.
+    """Return the triangles of an atlas layout with the vertices of the head at rest.
 
+    geometry : triangles of the layout, with the vertices of the posed head
     rest_positions_mm : (p, 3) control points of another person at rest [mm], None for those of the head
-    index : number of the atlas layout
+    index : index of the atlas layout
     """
     positions, owner = rest_positions_mm, "person"
     if positions is None:

@@ -14,9 +14,10 @@ from dermis.gpu import Device, Memo
 class Resources:
     """Shape of a head, which each frame poses.
 
-    tables : constant inputs of the shape
-    rest_shape : shape of the person at rest, None where it equals that of the topology
-    curvature : curvature of the surface, None unless the technique reads it
+    shape : buffers of the posed shape
+    tables : buffers that are constant for a mesh
+    rest_shape : buffers of the person at rest, None where its control points equal those of the topology
+    curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 
     shape: Shape

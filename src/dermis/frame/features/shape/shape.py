@@ -30,14 +30,16 @@ MIN_TANGENT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ShapeTables:
-    """Constant inputs of a shape: buffers by their names in the shaders, and counts.
+    """Buffers of a head's mesh and rig that are constant over frames, and the sizes of their contents.
 
-    morphs : morph targets and bone weights for shape_pose.wgsl, empty for heads that do not move
-    stencils : subdivision weights of control points for shape_refine.wgsl, empty without subdivision
-    surface : mesh for shape_vertices.wgsl
-    control, points, vertices : numbers of control points, points and vertices
-    targets, bones : numbers of morph targets and bones
-    has_contacts : whether some points, such as the lids', are kept outside the eyeballs
+    morphs : morph targets and bone weights by their names in shape_pose.wgsl, empty for heads that do not
+        move
+    stencils : subdivision weights of control points by their names in shape_refine.wgsl, empty without
+        subdivision
+    surface : vertices and triangles by their names in shape_vertices.wgsl
+    control, points, vertices : number of control points, of points after subdivision, and of vertices
+    targets, bones : number of morph targets and of bones
+    has_contacts : whether some points, such as those of the lids, are kept outside the eyeballs
     """
 
     morphs: dict[str, Buffer]
@@ -55,10 +57,11 @@ class ShapeTables:
 class Shape:
     """Buffers that the passes of a shape read and write.
 
-    rest, weights, matrices : buffers of the pose, which are written in each frame
+    rest : buffer of the control points at rest, written in each frame
+    weights, matrices : buffers of morph weights and bone matrices, written in each frame
     morphs, stencils, surface : resources of shape_pose.wgsl, shape_refine.wgsl and shape_vertices.wgsl, by
         their names there; empty for a pass that is not needed
-    tables : constant inputs
+    tables : buffers that are constant over frames
     """
 
     rest: Buffer
@@ -71,12 +74,12 @@ class Shape:
 
     @property
     def vertices(self) -> dict[str, Texture | Buffer]:
-        """Return the vertices by their names in the shaders that read them."""
+        """Return the textures and buffers of the vertices, by their names in the shaders that read them."""
         return {name: self.surface[name] for name in VERTEX_RESOURCES}
 
 
 def shape_tables(device: Device, head: Head) -> ShapeTables:
-    """Upload the constant inputs of the shapes of a head."""
+    """Upload the mesh and the rig of a head as buffers for the passes of its shapes."""
     rig, mesh = head.control, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
@@ -95,7 +98,8 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
 def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Shape:
     """Create the buffers of a shape.
 
-    moves : False for a shape without morph targets and bones
+    tables : constant buffers of the head, from `shape_tables`
+    moves : False for a shape at rest, without the pass of morph targets and bones
     """
     rest, morphs, stencils = _points(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
     weights, matrices = _floats(device, max(1, tables.targets)), _floats(device, 12 * max(1, tables.bones))
@@ -124,7 +128,7 @@ def _buffers(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str
 
 
 def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
-    """Create a vertex buffer for GPUs or a vertex texture for software, and a placeholder of the other."""
+    """Create the vertex resources: a buffer for GPUs or a texture for software, and a placeholder."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
@@ -138,7 +142,7 @@ def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
 
 
 def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
-    """Return displacements, bone weights and contacts point by point, by their names in shape_pose.wgsl."""
+    """Return the tables of shape_pose.wgsl: displacements, bone weights and contacts of each point."""
     count = len(rig.positions_mm)
     return {
         "first": _starts(rig.targets.point, count),
@@ -149,9 +153,9 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 
 
 def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.float32]:
-    """Return the (n, 4) displacements [mm] and target numbers, point by point, for shape_pose.wgsl.
+    """Return the (n, 4) displacements [mm] and target indices, ordered by point, for shape_pose.wgsl.
 
-    template : targets that move the same points, whose order is used
+    template : targets that displace the same points; their order is used for all people of a template
     """
     number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template.point_order
@@ -162,7 +166,10 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
 
 
 def _influences(skeleton: Skeleton | None, count: int) -> Words:
-    """Return the (p, 8) indices of four bones per point and the bits of their weights."""
+    """Return (p, 8) words: the indices of four bones per point, and their weights as float bits.
+
+    count : number of points
+    """
     if skeleton is None:
         return np.zeros((1, 8), np.uint32)
     weight = np.ascontiguousarray(skeleton.weight, np.float32).view(np.uint32)
@@ -170,7 +177,11 @@ def _influences(skeleton: Skeleton | None, count: int) -> Words:
 
 
 def _contacts(contact: LidContact | None, count: int) -> Words:
-    """Return (p, 3) words: two points of the eyeball near each point, and the least distance from it."""
+    """Return (p, 3) words that keep points outside the eyeballs, zeros for points without contact.
+
+    The words are the indices of the front and back point of the eyeball, and the least distance from it as
+    float bits [mm].
+    """
     if contact is None:
         return np.zeros((1, 3), np.uint32)
     found = np.zeros((count, 3), np.uint32)
@@ -186,7 +197,10 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 
 
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
-    """Return the vertices, the triangle corners at their points, and the ranges of corners of each vertex."""
+    """Return the tables of shape_vertices.wgsl by name: vertices, triangle corners and ranges of corners.
+
+    Corners are ordered by point and then by vertex, so that those of a vertex are a range.
+    """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX)
     table["uv"], table["point"] = mesh.uv, mesh.point
@@ -205,16 +219,15 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
 
 
 def run_bounds(ordered: NDArray[np.integer], values: NDArray[np.integer]) -> Words:
-    """Return the (n, 2) start and end of the run of each value in a sorted array."""
+    """Return the (n, 2) start and end of the run of each of n values in a sorted array."""
     ends = [np.searchsorted(ordered, values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
 def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
-    """Return the (v, 3) normals of the mesh in the frames of its smooth normals and u axes.
+    """Return the (v, 3) normals of a mesh, in coordinates that are constant while the surface deforms.
 
-    The axes are the smooth normal, the u direction across it, and their cross product. Normals from a file
-    keep these coordinates while the surface moves.
+    The axes at a vertex are its smooth normal, the u direction orthogonal to it, and their cross product.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
@@ -228,17 +241,17 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _starts(index: NDArray[np.integer], count: int) -> Words:
-    """Return the (count + 1,) starts of the runs of 0, 1, 2, ... in a sorted array."""
+    """Return (count + 1,) offsets: where the runs of 0, 1, 2, ... start in a sorted array, and its length."""
     return np.concatenate([[0], np.cumsum(np.bincount(index, minlength=count))]).astype(np.uint32)
 
 
 class MotionBytes(NamedTuple):
     """Pose of a shape as bytes for the shaders.
 
-    positions : three floats per control point, at rest [mm]
+    positions : three floats per control point: its position at rest [mm]
     weights : one float per morph target
-    matrices : twelve floats per bone, row by row, from rest to pose [mm]
-    displacements : result of `displacements` for a person whose tables are those of a template, else empty
+    matrices : twelve floats per bone: the matrix from rest to pose, row by row [mm]
+    displacements : result of `displacements` for a person who uses the buffers of a template, else empty
     """
 
     positions: bytes
@@ -248,12 +261,12 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the same head at rest."""
+        """Return the rest pose of the head: its control points without morph weights and bone matrices."""
         return MotionBytes(self.positions)
 
 
 def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
-    """Write the pose to the shape's buffers, and declare the passes that evaluate its surface."""
+    """Write the pose to buffers, and declare the passes that compute the vertices of the posed surface."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:
         graph.write("shape", shape.weights, motion.weights)
@@ -265,12 +278,12 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
 
 
 def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
-    """Create the buffers of a person's shape at rest."""
+    """Create the buffers of a person's shape at rest, without morph targets and bones."""
     return make_shape(device, tables, moves=False)
 
 
 def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
-    """Return the evaluated shape of a person at rest.
+    """Create the shape of a person at rest, and compute its vertices at once.
 
     positions_mm : (p, 3) control points [mm]
     """
@@ -301,5 +314,8 @@ def _evaluate(graph: Recorder, shape: Shape) -> None:
 
 
 def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
-    """Declare a pass with `count` invocations."""
+    """Declare a pass of the shape with one shader invocation for each of `count` elements.
+
+    bound : resources of the shader
+    """
     graph.dispatch("shape", program(graph.device, name, constants), bound, workgroup_grid(count))
