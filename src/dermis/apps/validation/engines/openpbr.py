@@ -85,7 +85,8 @@ def float_list(values: ArrayLike) -> list[float]:
 def error_table(results: JsonObject) -> list[str]:
     """Return a table of the largest edge error of each skin and each reading of its parameters."""
     lines = [
-        "| skin | radius [mm] | OpenPBR's walk | dmfp typed in | read as a profile | pbrt | dmfp typed in |",
+        "| skin | radius [mm] | OpenPBR's random walk | diffuse mean free path typed in"
+        " | radius interpreted as a profile | pbrt | diffuse mean free path typed in |",
         "|---|---|---|---|---|---|---|",
     ]
     for skin, one in results.items():
