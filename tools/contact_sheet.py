@@ -14,7 +14,7 @@ from dermis.human.person import Human
 from dermis.images.io import write_png
 from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, Settings, load_lights
-from dermis.scene.camera import preset
+from dermis.scene.camera import camera_preset
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.lights import NO_LIGHTS, light_presets
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
@@ -57,7 +57,7 @@ def main(output: Path, *, side: int = 160, camera: str = "portrait", adapter: st
     settings = Settings(size=(side, side), atlas=512, shadow_size=1024, **PHOTOGRAPHIC_SETTINGS)
     renderer, columns = Renderer(adapter), []
     for head in heads().values():
-        scenes = [Scene(head, camera=preset(camera, head), **light) for light in lighting_options()]  # type: ignore[arg-type]
+        scenes = [Scene(head, camera=camera_preset(camera, head), **light) for light in lighting_options()]  # type: ignore[arg-type]
         columns.append(np.concatenate([renderer.draw(scene, settings).srgb8() for scene in scenes]))
     write_png(output, np.concatenate(columns, axis=1))
 

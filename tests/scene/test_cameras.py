@@ -9,7 +9,7 @@ from small_head import SIZE, write_head
 from dermis.frame.features.shading.view import camera_views, pinhole
 from dermis.mesh.head import Head
 from dermis.scene import Camera, Settings
-from dermis.scene.camera import PRESETS
+from dermis.scene.camera import CAMERA_PRESETS
 from dermis.scene.heads import load_head
 
 
@@ -33,15 +33,15 @@ def test_centre_of_a_small_head_is_its_middle(head: Head) -> None:
 
 @pytest.mark.parametrize("name", ["portrait", "three-quarter", "profile"])
 def test_the_whole_head_is_in_the_image(head: Head, name: str) -> None:
-    seen = _seen(PRESETS[name](head), head, head.mesh.positions - np.float32(head.centre_mm))
+    seen = _seen(CAMERA_PRESETS[name](head), head, head.mesh.positions - np.float32(head.centre_mm))
     assert np.abs(seen).max() < 0.95
     assert np.ptp(seen[:, 1]) > 1.2  # and fills most of it
-    assert np.abs(_seen(PRESETS[name](head), head, np.zeros((1, 3)))).max() < 0.25
+    assert np.abs(_seen(CAMERA_PRESETS[name](head), head, np.zeros((1, 3)))).max() < 0.25
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", CAMERA_PRESETS)
 def test_up_is_up_and_the_camera_is_level(head: Head, name: str) -> None:
-    camera = PRESETS[name](head)
+    camera = CAMERA_PRESETS[name](head)
     below, above = _seen(camera, head, np.array([[0.0, -20.0, 0.0], [0.0, 20.0, 0.0]]))
     assert above[1] > below[1]
     assert above[0] == pytest.approx(below[0], abs=1e-3)
@@ -49,7 +49,7 @@ def test_up_is_up_and_the_camera_is_level(head: Head, name: str) -> None:
 
 @pytest.mark.parametrize(("name", "degrees"), [("portrait", 0), ("three-quarter", 40), ("profile", 90)])
 def test_presets_go_round_to_the_heads_left(head: Head, name: str, degrees: float) -> None:
-    camera = PRESETS[name](head)
+    camera = CAMERA_PRESETS[name](head)
     x, y, z = np.subtract(camera.position, camera.target)
     assert y == pytest.approx(0, abs=1e-6)
     assert np.degrees(np.arctan2(x, z)) == pytest.approx(degrees, abs=1e-3)
@@ -57,13 +57,13 @@ def test_presets_go_round_to_the_heads_left(head: Head, name: str, degrees: floa
 
 def test_nose_points_to_the_left_of_a_profile_from_the_heads_left(head: Head) -> None:
     nose, back = _seen(
-        PRESETS["profile"](head), head, np.array([[0.0, 0.0, SIZE[2] / 2], [0.0, 0.0, -SIZE[2] / 2]])
+        CAMERA_PRESETS["profile"](head), head, np.array([[0.0, 0.0, SIZE[2] / 2], [0.0, 0.0, -SIZE[2] / 2]])
     )
     assert nose[0] < 0 < back[0]
 
 
 def test_cheek_looks_at_the_surface_of_the_left_front(head: Head) -> None:
-    camera = PRESETS["cheek"](head)
+    camera = CAMERA_PRESETS["cheek"](head)
     assert camera.target[0] > 0 and camera.target[2] > 0
     assert camera.position[0] > camera.target[0] and camera.position[2] > camera.target[2]
     x, y, z = np.array(camera.target) / (np.array(SIZE) / 2)

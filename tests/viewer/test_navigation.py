@@ -24,7 +24,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix
 from dermis.scene import Camera, Environment, Scene
-from dermis.scene.camera import PRESETS, preset
+from dermis.scene.camera import CAMERA_PRESETS, camera_preset
 from dermis.scene.lights import DirectionalLight, SpotLight
 
 CAMERA = Camera(position=(0.0, 0.0, 1000.0), target=(0.0, 0.0, 0.0), frame_mm=300.0)
@@ -77,9 +77,9 @@ def test_focus_keeps_direction_and_distance() -> None:
     assert np.allclose(np.subtract(there.position, there.target), (0.0, 0.0, 1000.0))
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", CAMERA_PRESETS)
 def test_presets_look_at_the_head(name: str, head: Head) -> None:
-    assert pick(Scene(head), preset(name, head), 0.0, 0.0, 1.0) is not None
+    assert pick(Scene(head), camera_preset(name, head), 0.0, 0.0, 1.0) is not None
 
 
 def test_the_middle_of_the_picture_is_the_front_of_the_head(head: Head) -> None:

@@ -17,7 +17,7 @@ import dermis
 from dermis.apps.viewer.state import ViewerState, make_state
 from dermis.apps.viewer.windows import view
 from dermis.mesh.head import Head
-from dermis.scene.camera import preset
+from dermis.scene.camera import camera_preset
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 
@@ -83,7 +83,7 @@ def test_a_closed_widget_is_closed_once(head_file: Path) -> None:
 
 
 def test_heads_people_and_scenes_are_shown(head: Head) -> None:
-    scene = Scene(head, lights=(), camera=preset("profile", head))
+    scene = Scene(head, lights=(), camera=camera_preset("profile", head))
     assert dermis.view(scene, ADAPTER, SIZE).viewer.session.state.scene is scene
     assert dermis.view(head, ADAPTER, SIZE).viewer.session.state.scene.head is head
     person = dermis.Human(age=60)

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
-from dermis.scene.camera import preset
+from dermis.scene.camera import camera_preset
 
 ON_HEAD, TO_THE_LEFT = (300.0, 240.0), (230.0, 240.0)
 
@@ -83,7 +83,7 @@ def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
     start, plain = session.state, driver.settled()
     driver.event("key_down", key="3")
     driver.frame()
-    assert session.state.scene.camera == preset("profile", session.state.scene.head)
+    assert session.state.scene.camera == camera_preset("profile", session.state.scene.head)
     driver.event("key_down", key="z", modifiers=("Control",))
     driver.frame()
     assert session.state is start

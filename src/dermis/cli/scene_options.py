@@ -30,7 +30,7 @@ from dermis.cli.options import Options, check_fields, model_options, option_name
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, has_region_table
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
-from dermis.scene.skin import PRESETS, Skin
+from dermis.scene.skin import SKIN_PRESETS, Skin
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ ENVIRONMENT_OPTION_NAMES = {field: f"env_{field}" for field in Environment.model
 ENVIRONMENT_OPTION_NAMES |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
-    SkinPreset = Literal[tuple(PRESETS)] | None
+    SkinPreset = Literal[tuple(SKIN_PRESETS)] | None
     SkinOptions = model_options(Skin)
     SettingsOptions = model_options(Settings, defaults=PHOTOGRAPHIC_SETTINGS)
     EnvironmentOptions = model_options(Environment, names=ENVIRONMENT_OPTION_NAMES)
@@ -116,7 +116,7 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
         scene.head,
         lights=_select_lights(scene, options.lights, environment, replaced="name" in options.environment),
         camera=scene.camera if options.camera is None else load_camera(options.camera, scene.head),
-        skin=Skin(**(scene.skin.model_dump() | PRESETS[options.surface or "default"] | options.skin)),
+        skin=Skin(**(scene.skin.model_dump() | SKIN_PRESETS[options.surface or "default"] | options.skin)),
         environment=environment,
         pose=scene.pose,
     )

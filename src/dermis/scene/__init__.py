@@ -1,4 +1,4 @@
-"""Scene description without a GPU: head, skin, lights, camera, environment and settings."""
+"""Scene description that needs no GPU: head, skin, lights, camera, environment and settings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ __all__ = [  # in addition to those of dermis.scene.lights
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name on first use, so that the help of a command does not load heads."""
+    """Return a public object, whose module is imported on first use to keep the command line's help fast."""
     if new := successor(__name__, name):
         return __getattr__(new)
     home = next((home for home, names in _HOMES.items() if name in names), "lights")

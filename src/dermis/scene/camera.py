@@ -23,10 +23,13 @@ _Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift f
 
 
 class Window(NamedTuple):
-    """Image rectangle in the plane at distance 1 in front of the camera.
+    """Image rectangle of a camera, in the plane at distance 1 in front of it.
 
-    With picture coordinates x from -1 (left) to 1 and y from -1 (bottom) to 1, a point of the plane is (x +
-    shift) * half.
+    The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
+    the point ((x + shift[0]) half[0], (y + shift[1]) half[1]) of this plane.
+
+    half : half width and half height of the rectangle
+    shift : offset of the rectangle from the optical axis, in units of `half`
     """
 
     half: tuple[float, float]
@@ -75,9 +78,9 @@ class Camera(FrozenModel):
 
     @classmethod
     def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
-        """Return the camera of an OpenCV calibration.
+        """Return the camera of an OpenCV calibration without lens distortion.
 
-        Lens distortion is not part of it: undistort pictures first.
+        A calibration with distortion is valid for undistorted pictures.
 
         Parameters
         ----------
@@ -93,7 +96,7 @@ class Camera(FrozenModel):
         Returns
         -------
         Camera
-            Camera for pictures of this size; see `to_opencv`.
+            Camera for pictures of this size; `to_opencv` is the inverse.
 
         Raises
         ------
@@ -123,13 +126,13 @@ class Camera(FrozenModel):
 
     @property
     def half_tangent(self) -> float:
-        """Return the tangent of half the vertical angle of view, for a principal point in the middle."""
+        """Return the tangent of half the vertical angle of view of a camera without lens shift."""
         return 0.5 * self.frame_mm / math.dist(self.position, self.target)
 
     def window(self, aspect: float) -> Window:
-        """Return the image rectangle of a picture.
+        """Return the image rectangle at distance 1, from which projection and view rays are computed.
 
-        aspect : width of the picture over its height
+        aspect : width of the picture divided by its height
         """
         u, v = self.principal_point
         half = self.half_tangent
@@ -142,7 +145,7 @@ def portrait(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        Not used; all presets are functions of the head.
+        Not used; all camera presets are functions of the head.
 
     Returns
     -------
@@ -166,7 +169,7 @@ def three_quarter(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        Not used; all presets are functions of the head.
+        Not used; all camera presets are functions of the head.
 
     Returns
     -------
@@ -191,7 +194,7 @@ def side(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        Not used; all presets are functions of the head.
+        Not used; all camera presets are functions of the head.
 
     Returns
     -------
@@ -210,14 +213,14 @@ def side(head: Head) -> Camera:
 
 
 def cheek(head: Head) -> Camera:
-    """Return a close-up of the left cheek at a grazing angle to the studio's key light, which shows pores."""
+    """Return a camera for a close-up of the left cheek, where the studio's key light grazes pores."""
     focus = head.frontmost(40.0, -35.0)
     view_direction = _azimuth_direction(58.0)
     return Camera(position=_offset_point(focus, view_direction, 300.0), target=focus, frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
-    """Return a close-up of the left ear."""
+    """Return a camera for a close-up of the left ear."""
     p = head.mesh.positions - np.array(head.centre_mm, dtype=np.float32)
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
@@ -226,18 +229,24 @@ def ear(head: Head) -> Camera:
     return Camera(position=position, target=focus, frame_mm=120.0)
 
 
-PRESETS = {"portrait": portrait, "three-quarter": three_quarter, "profile": side, "ear": ear, "cheek": cheek}
+CAMERA_PRESETS = {
+    "portrait": portrait,
+    "three-quarter": three_quarter,
+    "profile": side,
+    "ear": ear,
+    "cheek": cheek,
+}
 
 
-def preset(name: str, head: Head) -> Camera:
-    """Return a camera preset for a head.
+def camera_preset(name: str, head: Head) -> Camera:
+    """Return the camera of a preset, placed for a head.
 
-    Raises DermisError for a name that is not in `PRESETS`.
+    Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
-    if name not in PRESETS:
-        expected = f"one of {', '.join(PRESETS)} or a TOML file"
+    if name not in CAMERA_PRESETS:
+        expected = f"one of {', '.join(CAMERA_PRESETS)} or a TOML file"
         refuse(f"camera {name}", expected, "it is neither", "Check the name")
-    return PRESETS[name](head)
+    return CAMERA_PRESETS[name](head)
 
 
 def _camera_at_azimuth(degrees: float) -> Camera:

@@ -1,4 +1,4 @@
-"""Conversion of the arguments of `Scene` to heads, lights, cameras and other settings."""
+"""Conversion of the arguments of `Scene`, such as names and mappings, to heads, lights and cameras."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.errors import format_value, notify, refuse
 from dermis.mesh.head import Head
-from dermis.scene.camera import Camera, preset
+from dermis.scene.camera import Camera, camera_preset
 from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import FrozenModel, Vector
 from dermis.scene.lights import Light, PointLight, light_presets, preset_lights
@@ -20,7 +20,7 @@ _NEAR_CENTRE_MM = 5.0  # a position this close to the head's centre is a mistake
 
 
 def as_head(head: object) -> Head:
-    """Return a head, loaded by `load_head` from a name or file, or built from a `Human`.
+    """Return a head from a `Head`, a `Human`, or a name or file for `load_head`.
 
     Raises DermisError for any other object.
     """
@@ -38,7 +38,7 @@ def as_head(head: object) -> Head:
 
 
 def as_lights(lights: object) -> Sequence[Light]:
-    """Return lights as a sequence, from several lights, one light or the name of a preset.
+    """Return a sequence of lights from several lights, a single light, or the name of a light preset.
 
     Raises DermisError for any other object.
     """
@@ -60,12 +60,12 @@ def as_lights(lights: object) -> Sequence[Light]:
 
 
 def as_camera(camera: object, head: Head) -> Camera:
-    """Return a camera, from a camera, the name of a preset or a function of the head such as `portrait`.
+    """Return a camera from a `Camera`, the name of a preset, or a function of the head such as `portrait`.
 
     Raises DermisError for any other object.
     """
     if isinstance(camera, str):
-        return preset(camera, head)
+        return camera_preset(camera, head)
     if callable(camera) and not isinstance(camera, type):
         camera = camera(head)
     advice = "Write camera=dermis.portrait(head), or dermis.Camera(position=(0, 0, 1100))"
@@ -76,7 +76,7 @@ def as_camera(camera: object, head: Head) -> Camera:
 
 
 def as_environment(environment: object) -> Environment | None:
-    """Return an environment, from an environment or the name of a panorama; None stays None.
+    """Return an environment from an `Environment` or the name of a panorama; None stays None.
 
     Raises DermisError for any other object.
     """
@@ -89,7 +89,10 @@ def as_environment(environment: object) -> Environment | None:
 
 
 def as_model(kind: type[P], values: object, part: str, example: str) -> P:
-    """Return settings of a class, from an instance or from a mapping of values by name.
+    """Return settings of a class from an instance or from a mapping of field values by name.
+
+    kind : class of the settings, such as `Skin`
+    part, example : name of the argument, and example of its fields, for the error message
 
     Raises DermisError for any other object.
     """

@@ -1,4 +1,4 @@
-"""Settings of the light that surrounds a scene."""
+"""Settings of the environment: the panorama of distant light around a scene."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from dermis.scene.frozen_model import FrozenModel, slider
 class Environment(FrozenModel):
     """Panorama of distant light around the head.
 
-    The centre of the panorama lies behind the head, in the viewing direction of a camera in front of the
-    face.
+    The centre of the panorama lies behind the head: it is the background of a camera in front of the face.
 
     Examples
     --------

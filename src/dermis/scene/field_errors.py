@@ -1,4 +1,4 @@
-"""Error messages for field values that a model rejects."""
+"""Validation of the numeric fields of settings, and error messages for rejected values."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _MAX_TABLE_LENGTH = 160
 
 
 class Keywords:
-    """Words that a numeric field accepts besides numbers, as in `Annotated[float, Keywords("auto")]`."""
+    """Annotation of a numeric field that also accepts words, as in `Annotated[float, Keywords("auto")]`."""
 
     def __init__(self, *words: str) -> None:
         self.words = words
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return a schema that accepts the words and whatever the annotated type accepts."""
+        """Return a pydantic schema that accepts the words and all values of the annotated type."""
         from pydantic_core import core_schema
 
         def check(value: Any, numbers: Any) -> Any:
@@ -41,15 +41,15 @@ class Keywords:
 
 
 class Reason(str):
-    """Reason for the bounds of a numeric field, shown in error messages."""
+    """Annotation of a numeric field that gives the reason for its bounds, for error messages."""
 
     __slots__ = ()
 
 
 class InvalidFieldsError(DermisError):
-    """Error for values that a model does not accept.
+    """Error for field values that a settings class rejects.
 
-    messages : by field, what was expected and what was received
+    messages : expected and actual value of each rejected field, by field name
     """
 
     def __init__(self, owner: str, messages: dict[str, str]) -> None:
@@ -59,7 +59,7 @@ class InvalidFieldsError(DermisError):
 
 
 class _NotANumber:
-    """Value in place of a number, wrapped so that every numeric field rejects it."""
+    """Wrapper of a non-numeric value, such as a boolean, which pydantic would accept as a number."""
 
     def __init__(self, value: object) -> None:
         self.value = value
@@ -70,7 +70,7 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Return the fields that hold only numbers, each with whether it also accepts text."""
+    """Return the names of the numeric fields of a model, and whether each also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))
@@ -80,9 +80,9 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
 
 
 def python_numbers(value: Any, text: bool = False) -> Any:
-    """Convert NumPy numbers and arrays to Python numbers, and mark other values so that they are rejected.
+    """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
-    text : whether text is a valid value
+    text : whether text is a valid value of the field
     """
     import numpy as np  # importing it takes longer than printing help
 
@@ -98,25 +98,25 @@ def python_numbers(value: Any, text: bool = False) -> Any:
 
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """Return the words that a numeric field accepts besides numbers."""
+    """Return the words that a numeric field accepts besides numbers, such as "auto"."""
     found = [one.words for one in model.model_fields[field].metadata if isinstance(one, Keywords)]
     return found[0] if found else ()
 
 
 def field_bounds(info: FieldInfo) -> tuple[float | None, float | None]:
-    """Return the lower and the upper bound of a numeric field; None for a bound that it does not have."""
+    """Return the lower and the upper bound of a numeric field, each None if the field has no such bound."""
     low = [getattr(one, name) for one in info.metadata for name in ("ge", "gt") if hasattr(one, name)]
     high = [getattr(one, name) for one in info.metadata for name in ("le", "lt") if hasattr(one, name)]
     return next(iter(low), None), next(iter(high), None)
 
 
 def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dict[str, str]:
-    """Convert the errors of pydantic to the messages of an `InvalidFieldsError`."""
-    return {".".join(str(part) for part in one["loc"]): _message(one, model) for one in errors}
+    """Convert validation errors of pydantic to messages for users, by dotted field name."""
+    return {".".join(str(part) for part in one["loc"]): _format_error(one, model) for one in errors}
 
 
-def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
-    """Return one error of pydantic as "expected ..., but got ..."."""
+def _format_error(one: ErrorDetails, model: type[BaseModel]) -> str:
+    """Return the message "expected ..., but got ..." for one validation error of pydantic."""
     if one["type"] == "extra_forbidden":
         return _unknown_field(str(one["loc"][-1]), model)
     if one["type"] == "missing":
@@ -135,9 +135,9 @@ def _message(one: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """Return the range of a number in a field, with the reason; empty without bounds.
+    """Return the range of a number and its reason as text, such as "a number from 0 to 1"; "" without bounds.
 
-    location : path of the number, from the name of the field
+    location : path of the number in the model: the field name, then indices
     """
     info = model.model_fields.get(str(location[0])) if location else None
     if info is None:
@@ -152,7 +152,7 @@ def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> st
 
 
 def _leaf_types(kind: Any) -> Iterator[Any]:
-    """Yield the element types of an annotation."""
+    """Yield the scalar types inside an annotation, such as float for tuple[float, ...] | None."""
     parts = get_args(kind)
     if get_origin(kind) is dict:
         yield from _leaf_types(parts[1])
@@ -166,14 +166,14 @@ def _leaf_types(kind: Any) -> Iterator[Any]:
 
 
 def _list_length(one: ErrorDetails, model: type[BaseModel]) -> str:
-    """Return " of N numbers" for a field that is a tuple of fixed length, else an empty text."""
+    """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
     info = model.model_fields.get(str(one["loc"][0])) if len(one["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 
 
 def _unknown_field(name: str, model: type[Any]) -> str:
-    """Return the message for an unknown field: the most similar name, or the model that has such a field."""
+    """Return the message for an unknown field, with a similar name or the class that has the field."""
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)

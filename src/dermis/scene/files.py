@@ -15,7 +15,7 @@ from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
-from dermis.scene.camera import PRESETS, Camera, preset
+from dermis.scene.camera import CAMERA_PRESETS, Camera, camera_preset
 from dermis.scene.environment import Environment
 from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
@@ -24,12 +24,11 @@ from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.scene.skin import PRESETS as SKINS
-from dermis.scene.skin import Skin
+from dermis.scene.skin import SKIN_PRESETS, Skin
 from dermis.scene.smoothness import SmoothIn
 
 P = TypeVar("P", bound=FrozenModel)
-_TABLES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
+_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
 
@@ -61,15 +60,17 @@ def load_lights(name: str | Path) -> tuple[Light, ...]:
     known = light_presets()
     if str(name) in known:
         return preset_lights(str(name))
-    return _lights(name, _read(name, f"a preset ({', '.join(known)}) or a TOML file").get("lights"))
+    return _parse_lights(
+        name, _read_scene_file(name, f"a preset ({', '.join(known)}) or a TOML file").get("lights")
+    )
 
 
 def load_camera(name: str | Path, head: Head) -> Camera:
-    """Return a camera preset for the head, or the camera in the [camera] table of a TOML file."""
-    if str(name) in PRESETS:
-        return preset(str(name), head)
-    table = _read(name, f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
-    return _build(Camera, name, "camera", table)
+    """Return the camera of a preset, placed for the head, or that of the [camera] table in a TOML file."""
+    if str(name) in CAMERA_PRESETS:
+        return camera_preset(str(name), head)
+    table = _read_scene_file(name, f"a preset ({', '.join(CAMERA_PRESETS)}) or a TOML file").get("camera")
+    return _build_settings(Camera, name, "camera", table)
 
 
 def load_scene(
@@ -92,16 +93,18 @@ def load_scene(
     path : str or path
         The TOML file.
     known : Head, optional
-        Head of the file's [head] table, if it is loaded already.
+        Head of the file's [head] table, if it is already loaded.
     camera : str, optional
-        Camera that decides the levels of subdivision, instead of the file's.
+        Name of the camera that determines the subdivision levels of the head, instead of the file's camera.
     size : (int, int), optional
-        Picture size that decides the levels of subdivision, instead of the file's [pixel].
+        Picture size that determines these levels, instead of the file's size [pixel].
 
     Returns
     -------
     scene : Scene
+        The scene with its head loaded.
     settings : Settings
+        Settings of the file's [render] table.
 
     Raises
     ------
@@ -121,42 +124,47 @@ def load_scene(
     (2, (64, 64))
     """
     path = checked_path(path, "a scene in TOML")
-    table = _read(path, "a scene in TOML")
-    for part in table.keys() - _TABLES:
-        refuse(path, f"only the tables {', '.join(sorted(_TABLES))}", f"got {part!r}", "Correct its name")
-    skin = _skin(path, table.get("skin", {}))
-    settings = _build(Settings, path, "render", table.get("render", {}))
-    head_entry = _build(HeadTable, path, "head", table.get("head"))
+    table = _read_scene_file(path, "a scene in TOML")
+    for part in table.keys() - _TABLE_NAMES:
+        refuse(
+            path, f"only the tables {', '.join(sorted(_TABLE_NAMES))}", f"got {part!r}", "Correct its name"
+        )
+    skin = _parse_skin(path, table.get("skin", {}))
+    settings = _build_settings(Settings, path, "render", table.get("render", {}))
+    head_entry = _build_settings(HeadTable, path, "head", table.get("head"))
     _check_single_strength(path, head_entry, skin)
     entry = table.get("camera", "portrait")
-    resolve_camera = partial(_camera, path, entry) if camera is None else partial(load_camera, camera)
+    resolve_camera = partial(_parse_camera, path, entry) if camera is None else partial(load_camera, camera)
     picture = SmoothIn(resolve_camera, size or settings.size)
     with error_context(path):
         head, skin = (known, skin) if known else head_and_skin(head_entry, skin, path.parent, picture)
-    environment = _environment(path, table["environment"]) if "environment" in table else None
-    pose = _pose(path, table["pose"], head) if "pose" in table else None
+    environment = _parse_environment(path, table["environment"]) if "environment" in table else None
+    pose = _parse_pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")
     if lights is None:
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
-        lights=load_lights(_resolve(path.parent, lights))
+        lights=load_lights(_resolve_file(path.parent, lights))
         if isinstance(lights, str)
-        else _lights(path, lights),
+        else _parse_lights(path, lights),
         environment=environment,
-        camera=_camera(path, entry, head),
+        camera=_parse_camera(path, entry, head),
         skin=_resolve_skin_files(path.parent, skin),
         pose=pose,
     ), settings
 
 
 def head_table(path: Path) -> dict[str, Any]:
-    """Return the [head] table of a scene file with absolute file names."""
-    return with_absolute_paths(_read(path, "a scene in TOML").get("head", {}), path.parent)
+    """Return the [head] table of a scene file, with its file names made absolute."""
+    return with_absolute_paths(_read_scene_file(path, "a scene in TOML").get("head", {}), path.parent)
 
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a [head] table whose files in a folder have absolute names."""
+    """Return a [head] table with absolute names of its files.
+
+    folder : folder that relative file names refer to
+    """
     named = {role: folder / table[role] for role in ("name", "regions", *_MAP_ROLES) if role in table}
     return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
@@ -164,41 +172,49 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any
 def head_and_skin(
     table: HeadTable, skin: Skin, folder: Path, picture: SmoothIn | None = None
 ) -> tuple[Head, Skin]:
-    """Return the head of a [head] table, and the skin with the mean strength of its region table.
+    """Return the head of a [head] table, and the skin, whose rho_s is set if the table has face regions.
 
-    folder : folder of the files that the table names
-    picture : picture that decides the levels of subdivision if the table does not
+    folder : folder that relative file names refer to
+    picture : camera and size that determine the subdivision levels if the table leaves them out
 
     Raises DermisError for files that cannot be used.
     """
-    regions = load_region_table(_resolve(folder, table.regions)) if has_region_table(vars(table)) else None
+    regions = (
+        load_region_table(_resolve_file(folder, table.regions)) if has_region_table(vars(table)) else None
+    )
     options = table.model_dump(exclude={"name"}, exclude_none=True)
     if regions is not None:
         options["regions"] = NO_REGIONS
     options |= {role: folder / options[role] for role in _MAP_ROLES if role in options}
     if picture is not None and table.subdivide == AUTO:
         options["subdivide"] = picture
-    head = load_head(_resolve(folder, table.name), **options)
+    head = load_head(_resolve_file(folder, table.name), **options)
     if regions is None:
         return head, skin
     head, rho_s = with_regions(head, regions)
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _skin(path: Path, entry: Any) -> Skin:
-    """Return the skin of a [skin] table or of a preset's name."""
+def _parse_skin(path: Path, entry: Any) -> Skin:
+    """Return the skin of a scene file, from its [skin] table or from the name of a skin preset."""
     if not isinstance(entry, str):
-        return _build(Skin, path, "skin", entry)
-    if entry not in SKINS:
-        refuse(f"{path}: skin", f"a table or one of {', '.join(SKINS)}", f"got {entry!r}", "Correct it")
+        return _build_settings(Skin, path, "skin", entry)
+    if entry not in SKIN_PRESETS:
+        refuse(
+            f"{path}: skin", f"a table or one of {', '.join(SKIN_PRESETS)}", f"got {entry!r}", "Correct it"
+        )
     return Skin.preset(entry)
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
-    """Return the skin with file names relative to a folder resolved."""
-    others = tuple(_resolve(folder, name) for name in skin.other_profiles)
-    mixture_map = skin.profile_map and _resolve(folder, skin.profile_map)
-    names = {"profile": _resolve(folder, skin.profile), "other_profiles": others, "profile_map": mixture_map}
+    """Return the skin with its profile files as paths in a folder."""
+    others = tuple(_resolve_file(folder, name) for name in skin.other_profiles)
+    mixture_map = skin.profile_map and _resolve_file(folder, skin.profile_map)
+    names = {
+        "profile": _resolve_file(folder, skin.profile),
+        "other_profiles": others,
+        "profile_map": mixture_map,
+    }
     return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
@@ -208,49 +224,55 @@ def _check_single_strength(path: Path, table: HeadTable, skin: Skin) -> None:
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")
 
 
-def _camera(path: Path, entry: Any, head: Head) -> Camera:
+def _parse_camera(path: Path, entry: Any, head: Head) -> Camera:
     if isinstance(entry, str):
-        return load_camera(_resolve(path.parent, entry), head)
-    return _build(Camera, path, "camera", entry)
+        return load_camera(_resolve_file(path.parent, entry), head)
+    return _build_settings(Camera, path, "camera", entry)
 
 
-def _pose(path: Path, table: Any, head: Head) -> Pose:
-    entry = _build(PoseTable, path, "pose", table)
+def _parse_pose(path: Path, table: Any, head: Head) -> Pose:
+    entry = _build_settings(PoseTable, path, "pose", table)
     pose = Pose(entry.weights, entry.bones)
     pose.motion(head.control, f"{path}: pose")  # for an error that names the file
     return pose
 
 
-def _environment(path: Path, table: Any) -> Environment:
+def _parse_environment(path: Path, table: Any) -> Environment:
     if isinstance(table, dict) and "visible" in table:
         advice = 'Write background = "environment" into [render]'
         refuse(f"{path}: environment: visible", "no such key any more", "it is given", advice)
-    environment = _build(Environment, path, "environment", table)
-    return environment.model_copy(update={"name": _resolve(path.parent, environment.name)})
+    environment = _build_settings(Environment, path, "environment", table)
+    return environment.model_copy(update={"name": _resolve_file(path.parent, environment.name)})
 
 
-def _resolve(folder: Path, name: str) -> str:
-    """Return the path of a file in a folder if it exists, else the name, such as that of a preset."""
+def _resolve_file(folder: Path, name: str) -> str:
+    """Return the path of a file in a folder, or the name itself if there is no such file.
+
+    Names of presets and samples are thus unchanged.
+    """
     file = folder / name
     return str(file) if is_file(file) else name
 
 
-def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
+def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
     if not isinstance(tables, list) or not tables:
         actual = "got none" if not tables else f"got {tables!r}"
         refuse(culprit, "at least one [[lights]] table", actual, "Add one with kind, position and irradiance")
-    return tuple(_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
+    return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
 
 
-def _light(culprit: object, label: str, table: Any) -> Light:
+def _parse_light(culprit: object, label: str, table: Any) -> Light:
     kind = table.get("kind", "point") if isinstance(table, dict) else "point"
     if not isinstance(kind, str) or kind not in LIGHTS:
         refuse(f"{culprit}: {label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
-    return _build(LIGHTS[kind], culprit, label, table)
+    return _build_settings(LIGHTS[kind], culprit, label, table)
 
 
-def _build(kind: type[P], culprit: object, part: str, table: Any) -> P:
-    """Return a model built from a table; errors name the file and the table."""
+def _build_settings(kind: type[P], culprit: object, part: str, table: Any) -> P:
+    """Return settings of a class from a TOML table; errors name the file and the table.
+
+    culprit, part : file and table, for error messages
+    """
     if not isinstance(table, dict):
         actual = "there is none" if table is None else f"got {table!r}"
         refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
@@ -260,12 +282,12 @@ def _build(kind: type[P], culprit: object, part: str, table: Any) -> P:
         raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
 
 
-def _read(name: str | Path, expected: str) -> dict[str, Any]:
+def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:
     return read_toml(checked_path(name, expected), expected)
 
 
 class PoseTable(FrozenModel):
-    """The [pose] table of a scene file: weights and bones of a `Pose`, without positions of points."""
+    """The [pose] table of a scene file: morph target weights and bone rotations."""
 
     weights: dict[str, _Weight] = Field(default_factory=dict)
     """Weights of morph targets by name, normally 0 to 1."""

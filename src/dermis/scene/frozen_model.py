@@ -1,4 +1,4 @@
-"""Base class of scene data: immutable pydantic models with validated fields."""
+"""Base class of scene settings: immutable pydantic models with validated, documented fields."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
 
-def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
+def _checked_direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
     if sum(abs(c) for c in v) < 1e-6:
         raise ValueError("a direction other than (0, 0, 0)")
     return v
@@ -65,7 +65,7 @@ Vector = tuple[Coordinate, Coordinate, Coordinate]
 _Component = Annotated[
     float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), Reason("only their ratios count")
 ]
-Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
+Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_checked_direction)]
 Intensity = Annotated[
     float, Field(ge=0, le=1e6), Reason("light is not negative, and the sun on skin is about 3")
 ]
@@ -84,7 +84,7 @@ class _Documented(ModelMetaclass):
 
         @__signature__.setter
         def __signature__(self, signature: Any) -> None:
-            """Ignore the signature of pydantic, which shows the parameters of `__init__`."""
+            """Ignore the signature that pydantic sets; `constructor_signature` replaces it."""
 
         @property
         def __doc__(self) -> str:
@@ -98,9 +98,9 @@ class _Documented(ModelMetaclass):
 
 
 class FrozenModel(BaseModel, metaclass=_Documented):
-    """Base class of immutable settings with validated fields.
+    """Base class of immutable settings with validated fields, such as `Camera` and `Skin`.
 
-    The docstring below a field is its help text in Python, on the command line, in the viewer and in the
+    The string below a field is its help text in Python, on the command line, in the viewer and in the
     documentation.
     """
 
@@ -109,7 +109,7 @@ class FrozenModel(BaseModel, metaclass=_Documented):
     """Names that other programs use, and the fields that they correspond to."""
 
     def __init__(self, *value: Any, **data: Any) -> None:
-        """Set fields by name; if exactly one field is required, it may be positional."""
+        """Set fields by keyword; a single required field may be given as a positional argument."""
         model = type(self)
         if value:
             data[_positional_field(model, value)] = value[0]
@@ -122,16 +122,16 @@ class FrozenModel(BaseModel, metaclass=_Documented):
             raise InvalidFieldsError(model.__name__, messages_by_field(error.errors(), model)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse assignments, with advice to use `replace`."""
+        """Raise DermisError with advice to use `replace`, as settings are immutable."""
         owner, advice = type(self).__name__, f"Write replace({name}={format_value(value)}) for a changed copy"
         refuse(owner, "no assignment, as settings are immutable", f"got one to {name}", advice)
 
     def replace(self, **values: Any) -> Self:
-        """Return a validated copy with other values of some fields."""
+        """Return a validated copy in which the given fields have new values."""
         return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | values)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the other object has the same class and equal fields.
+        """Return whether another object has the same class and equal fields.
 
         This is ten times as fast as the comparison of pydantic.
         """
@@ -139,7 +139,11 @@ class FrozenModel(BaseModel, metaclass=_Documented):
 
 
 class SliderRange(NamedTuple):
-    """Ends of the slider of a numeric field."""
+    """Range of the slider with which the viewer sets a numeric field.
+
+    low, high : values at the ends of the slider
+    logarithmic : whether equal steps of the slider are equal ratios of the value
+    """
 
     low: float
     high: float
@@ -147,12 +151,12 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
-    """Return `json_schema_extra` of a field whose slider covers less than the bounds of the field."""
+    """Return the `json_schema_extra` that gives a field a narrower slider range than its bounds."""
     return {"slider": SliderRange(low, high, log)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field on one line, with a summary of each registered name that it accepts."""
+    """Return the help text of a field on one line, with a summary of each registered name it accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -160,7 +164,7 @@ def field_help(model: type[BaseModel], field: str) -> str:
 
 
 def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """Return the words that a field accepts; empty for fields of other types."""
+    """Return the words that a text field accepts; empty for a field that accepts any text or none."""
     info = model.model_fields[field]
     for named in _registry_names(info):
         return named.names
@@ -169,29 +173,32 @@ def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
 
 
 def field_slider_range(model: type[BaseModel], field: str) -> SliderRange | None:
-    """Return the slider range of a number or of the numbers in a tuple; None without two bounds."""
+    """Return the slider range of a numeric or tuple field; None if the field lacks a lower or upper bound."""
     return _slider_range(model.model_fields[field])
 
 
 class Heading(str):
-    """Annotation of a field: heading under which help texts and panels list it."""
+    """Annotation of a field that groups it under a heading in help texts and in the viewer's panels."""
 
     __slots__ = ()
 
 
 def field_heading(model: type[BaseModel], field: str) -> str:
-    """Return the heading under which a field is listed; empty for a main field."""
+    """Return the heading under which help texts list a field; "" for fields without a `Heading`."""
     return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
 
 
 def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
-    """Return the fields listed under a heading; an empty heading selects the main fields."""
+    """Return the names of the fields under a heading; "" selects the fields without a `Heading`."""
     return [name for name in model.model_fields if field_heading(model, name) == heading]
 
 
 def constructor_signature(model: type[BaseModel]) -> Signature:
-    """Return the signature of a model's constructor; a single required field may be positional."""
-    return Signature(sorted(_parameters(model, _required(model)), key=lambda one: one.kind))
+    """Return the signature of a model's constructor, for `help()` and the generated docstring.
+
+    Fields are keyword-only, except that a single required field may be positional.
+    """
+    return Signature(sorted(_parameters(model, _required_fields(model)), key=lambda one: one.kind))
 
 
 def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Parameter]:
@@ -205,7 +212,7 @@ def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Paramet
 
 
 def _without_checks(kind: Any) -> Any:
-    """Return a type without the metadata that checks its values."""
+    """Return an annotation without `Annotated` metadata, such as float for a bounded float."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _without_checks(parts[0])
@@ -216,7 +223,7 @@ def _without_checks(kind: Any) -> Any:
 
 
 def model_docstring(model: type[BaseModel]) -> str:
-    """Return the docstring of a model in numpydoc form, with a section of its fields for each heading."""
+    """Return the docstring of a model in numpydoc format, with its fields grouped by heading."""
     sections: dict[str, list[str]] = {"Parameters": []}
     for parameter in constructor_signature(model).parameters.values():
         lines = sections.setdefault(field_heading(model, parameter.name) or "Parameters", [])
@@ -232,7 +239,7 @@ def model_docstring(model: type[BaseModel]) -> str:
 
 
 def accepted_values(model: type[BaseModel], field: str) -> str:
-    """Return the accepted words and the bounds of a field as text; empty for fields without either."""
+    """Return the accepted words and bounds of a field as text, such as "auto, 0 to 1"; "" for neither."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
     if low is not None and high is not None and high < _DISPLAYED_BOUND:
@@ -241,7 +248,7 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
 
 
 def format_default(value: Any) -> str:
-    """Return a default value as a user would type it; empty for None, booleans and required fields."""
+    """Return a default value as users type it on the command line; "" for None, booleans and no default."""
     if isinstance(value, tuple):
         return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
     if value is None or isinstance(value, bool) or value is PydanticUndefined:
@@ -254,7 +261,7 @@ def _registry_names(info: FieldInfo) -> list[RegisteredName]:
 
 
 def _union_members(info: FieldInfo) -> tuple[Any, ...]:
-    """Return the member types of a field's annotation."""
+    """Return the types of a union annotation, or the single type of another annotation."""
     kind = info.annotation
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
@@ -270,14 +277,17 @@ def _slider_range(info: FieldInfo) -> SliderRange | None:
     return None if low is None or high is None else SliderRange(low, high)
 
 
-def _required(model: type[BaseModel]) -> list[str]:
-    """Return the fields without a default."""
+def _required_fields(model: type[BaseModel]) -> list[str]:
+    """Return the names of the fields without a default."""
     return [name for name, info in model.model_fields.items() if info.is_required()]
 
 
 def _positional_field(model: type[BaseModel], value: tuple[Any, ...]) -> str:
-    """Return the name of the field that a positional argument sets."""
-    required = _required(model)
+    """Return the name of the single required field, which a positional argument sets.
+
+    Raises DermisError if the model has several required fields or none, or gets several arguments.
+    """
+    required = _required_fields(model)
     if len(required) != 1 or len(value) != 1:
         names = ", ".join(f"{name}=..." for name in list(model.model_fields)[:3])
         actual = f"got {format_value(value[0])} without one"

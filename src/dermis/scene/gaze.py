@@ -29,12 +29,13 @@ _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeb
 
 
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
-    """Return a pose in which both eyes look at a point.
+    """Return a pose in which both eyes look at a point and the lids follow.
 
-    The eyes are turned by the morph targets for gaze if the head has them, else by their bones.
+    The eyes are rotated by the gaze targets of the head (eyeLook... of ARKit) if it has them, otherwise by
+    their bones.
 
-    target_mm : (3,) point relative to the head's centre [mm]
-    pose : pose of everything else; its own gaze is replaced
+    target_mm : (3,) point to look at, relative to the head's centre [mm]
+    pose : pose of the rest of the head, whose gaze is replaced
 
     Raises DermisError for heads without anatomical eyes and for invalid points.
     """
@@ -53,24 +54,29 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
         to_target = (frame @ np.append(point_mm + np.array(head.centre_mm), 1.0))[:3]
         to_target = to_target - [0.0, 0.0, eyes.centre_offset_mm[k]]
-        angles = _rotation_angles(_unit(rest[:3, :3].T @ to_target), _unit(rest[:3, :3].T @ eyes.gaze[k]))
+        angles = _rotation_angles(
+            _unit_vector(rest[:3, :3].T @ to_target), _unit_vector(rest[:3, :3].T @ eyes.gaze[k])
+        )
         rotations = [rotation for rotation in rig.bone_rotations if rotation.bone == bone]
         if not rotations:
             bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
             rotations = _eyelid_rotations(rig, _SIDES[k])
-        weights |= _weights(rotations, angles)
+        weights |= _gaze_weights(rotations, angles)
     return Pose(weights, bones, base.positions_mm)
 
 
 def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
-    """Return the gaze targets of an eye that the head has; in files they move only the lids."""
+    """Return the gaze targets of one eye in a head from a file, where they move only the lids.
+
+    The angles of each target are those of the parametric human.
+    """
     arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side)]
     known = match_targets([rotation.target for rotation in arkit], rig.targets.names)
     return [one._replace(target=known[one.target]) for one in arkit if one.target in known]
 
 
 def _rotation_angles(direction: Doubles, axis: Doubles) -> tuple[float, float]:
-    """Return the angles about x and y that rotate an axis onto a direction, both unit vectors (3,) [rad]."""
+    """Return the angles about x and y of a rotation from the unit vector `axis` to `direction` [rad]."""
     x, y = 0.0, 0.0
     for _ in range(_ITERATIONS):
         current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
@@ -87,12 +93,15 @@ def _yaw(direction: Doubles) -> float:
     return math.atan2(direction[0], direction[2])
 
 
-def _unit(vector: Doubles) -> Doubles:
+def _unit_vector(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _weights(rotations: list[BoneRotation], angles: tuple[float, float]) -> dict[str, Any]:
-    """Return the weights of targets for rotation angles about x and y [rad]."""
+def _gaze_weights(rotations: list[BoneRotation], angles: tuple[float, float]) -> dict[str, Any]:
+    """Return the weights of the gaze targets, by name, that give an eye rotation.
+
+    angles : rotation about x and y [rad]
+    """
     target_weights = {}
     for rotation in rotations:
         for angle, limit in zip(np.degrees(angles), rotation.degrees[:2], strict=True):

@@ -1,4 +1,4 @@
-"""Head pose and gaze directions in the axes of an OpenCV camera."""
+"""Head pose and gaze directions as labels of data sets, in the axes of an OpenCV camera."""
 
 from __future__ import annotations
 
@@ -10,48 +10,50 @@ from dermis.scene.model import Scene
 from dermis.scene.opencv import extrinsics
 
 Doubles = NDArray[np.float64]
-_BONE = "head"
+_HEAD_BONE = "head"
 
 
 def head_pose(scene: Scene) -> Doubles:
-    """Return the transform (3, 4) from the head in rest pose to the camera: X_cam = R X + t [mm].
+    """Return the transform (R | t), (3, 4), from the head in rest pose to the camera: X_cam = R X + t [mm].
 
     X is a point of the rigid head relative to its centre in rest pose: x to the head's left, y up, z to the
-    front. The rotation is that of the bone "head"; without such a bone, R and t are those of the camera.
+    front. The rigid motion is that of the bone "head"; without such a bone the head does not move.
     """
-    rotation, shift = _camera(scene)
+    rotation, shift = _camera_extrinsics(scene)
     head_rotation, head_shift = _rigid_motion(scene)
     return np.column_stack([rotation @ head_rotation, rotation @ head_shift + shift])
 
 
 def gaze_directions(scene: Scene) -> Doubles | None:
-    """Return the directions (2, 3) in which the left and the right eye look, as unit vectors in camera space.
+    """Return the gaze directions (2, 3) of the left and the right eye, as unit vectors in camera space.
 
     None for heads without anatomical eyes.
     """
-    head, motion = scene.head, _motion(scene)
+    head, motion = scene.head, _pose_motion(scene)
     if head.eyes is None:
         return None
     directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.gaze)
-    in_camera = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera(scene)[0].T
+    in_camera = (
+        directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera_extrinsics(scene)[0].T
+    )
     return np.asarray(in_camera)
 
 
-def _camera(scene: Scene) -> tuple[Doubles, Doubles]:
+def _camera_extrinsics(scene: Scene) -> tuple[Doubles, Doubles]:
     camera = scene.camera
     return extrinsics(camera.position, camera.target, camera.up)
 
 
-def _motion(scene: Scene) -> Motion:
+def _pose_motion(scene: Scene) -> Motion:
     return scene.head.control.rest if scene.motion is None else scene.motion
 
 
 def _rigid_motion(scene: Scene) -> tuple[Doubles, Doubles]:
-    """Return the rotation and the shift [mm] of the head bone, relative to the head's centre in rest pose."""
+    """Return the rotation (3, 3) and translation (3,) [mm] of the head bone, about the centre of the head."""
     names = [name.replace(":", " ").split()[-1:] for name in scene.head.bones]
-    bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_BONE]), None)
+    bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_HEAD_BONE]), None)
     if bone is None:
         return np.eye(3), np.zeros(3)
-    matrix, centre = _motion(scene).matrices[bone].astype(np.float64), np.array(scene.head.centre_mm)
+    matrix, centre = _pose_motion(scene).matrices[bone].astype(np.float64), np.array(scene.head.centre_mm)
     head_rotation = matrix[:, :3] / np.cbrt(np.linalg.det(matrix[:, :3]))
     return head_rotation, matrix[:, :3] @ centre + matrix[:, 3] - centre

@@ -1,4 +1,4 @@
-"""The [head] table of a scene file: its fields, and checks of their combinations."""
+"""The [head] table of a scene file: its fields, and checks of combinations of fields."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _eye_limits(name: str) -> Any:
 
 
 class EyeTable(FrozenModel):
-    """Overrides of the look of a head's eyes; None keeps the head's own value."""
+    """Eye settings in a [head] table; fields that are None keep the head's eye look."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""
@@ -103,12 +103,12 @@ class HeadTable(FrozenModel):
 
 
 def has_region_table(table: Mapping[str, Any]) -> bool:
-    """Return whether a [head] table names a table of face regions, which sets roughness and strength."""
+    """Return whether a [head] table names a table of face regions, which overrides roughness and rho_s."""
     return table.get("regions", AUTO) not in (AUTO, NO_REGIONS)
 
 
 def head_name(head: object) -> str:
-    """Return the name of the head or the file to load."""
+    """Return the `head` argument of `load_head` as a string; raise DermisError for other objects."""
     if not isinstance(head, str | os.PathLike):
         actual = "got None" if head is None else f"got a {type(head).__name__}"
         advice = "Pass a Head to Scene directly; write human.head() for a Human"
@@ -117,7 +117,7 @@ def head_name(head: object) -> str:
 
 
 def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> None:
-    """Refuse lengths given as words, and maps that are not file names."""
+    """Raise DermisError for lengths that are text, such as "cm", and for maps that are not file names."""
     for name, value in lengths.items():
         if isinstance(value, str):
             known = value in _UNIT_LENGTHS_MM
@@ -130,7 +130,7 @@ def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> N
 
 
 def check_options(**options: Any) -> None:
-    """Refuse option values that a [head] table does not accept; options with several words are tuples."""
+    """Raise DermisError for arguments of `load_head` that a [head] table does not accept."""
     regions = options.get("regions", AUTO)
     if regions not in (AUTO, NO_REGIONS):
         advice = "Use with_regions for a table"
@@ -142,7 +142,7 @@ def check_options(**options: Any) -> None:
 
 
 def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
-    """Refuse height_mm without a height map."""
+    """Raise DermisError if height_mm is given without a height map, to which it applies."""
     if height_mm is not None and height is None:
         actual = f"got {height_mm} without a height map"
         refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")

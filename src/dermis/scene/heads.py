@@ -160,7 +160,7 @@ def load_head(
         _refuse_name(name)
     elif is_gltf(path):
         files, look = embedded_maps(path), embedded_eye_look(path)
-    chosen = _map_files(map_files, files)
+    chosen = _select_map_files(map_files, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
     obj = path if sample is None and path.suffix.lower() == ".obj" else None
@@ -173,18 +173,18 @@ def load_head(
     if notice:
         notify(notice)
     credit = f"{sample.attribution}, {sample.licence}" if sample else ""
-    loaded = _subdivided(Head(name, rigged.mesh, maps, credit, rigged.rig), levels)
+    loaded = _subdivide_with_points(Head(name, rigged.mesh, maps, credit, rigged.rig), levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_look(with_fitted_eyes(loaded, rigged.mesh, look) if eyes == "fitted" else loaded, eye)
 
 
 def is_person_name(name: str) -> bool:
-    """Return whether a name is that of the parametric human or of a file with the numbers of a person."""
+    """Return whether a name denotes a parametric human: "human", "human:SEED", or a person's .json file."""
     return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
 
 
-def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
-    """Return the head on a subdivided mesh; its rig keeps the file's own vertices for sequences."""
+def _subdivide_with_points(head: Head, levels: SubdivisionLevels) -> Head:
+    """Return the subdivided head; its rig also keeps the vertices of the file, for mesh sequences."""
     finer = subdivide_head(head, levels)
     if finer.levels and finer.rig is not None:
         return replace(finer, rig=replace(finer.rig, vertex_point=head.mesh.point))
@@ -192,9 +192,11 @@ def _subdivided(head: Head, levels: SubdivisionLevels) -> Head:
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
-    """Return the head with overrides of its eyes' look.
+    """Return the head with some fields of its eye look replaced.
 
-    Raises DermisError for a head without anatomical eyes, and for unknown or invalid values.
+    look : fields of `EyeLook` by name
+
+    Raises DermisError for a head without anatomical eyes, and for unknown or invalid fields.
     """
     if not look:
         return head
@@ -215,7 +217,10 @@ def _read_maps(
     height_mm: float | None,
     normal_y: NormalY,
 ) -> tuple[Maps, str]:
-    """Return the given maps together with those that the materials of an OBJ file name, and a notice."""
+    """Load the maps of a head: given files, and those in the materials of an OBJ file for other roles.
+
+    Also returns a note about maps of the materials that are not used, or "".
+    """
     map_files = {role: file for role, file in chosen.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y)
     if obj is None:
@@ -249,10 +254,12 @@ def _load_human(
     mesh_options: dict[str, Any],
     levels: SubdivisionLevels,
 ) -> Head:
-    """Return the head of the parametric human, in its own uv layout.
+    """Return the head of a parametric human in the layout "own".
 
-    name : "human", "human:SEED", or a file of numbers
-    mesh_options : options of mesh files, which must have their defaults
+    name : "human", "human:SEED", or a person's .json file
+    maps : map files that replace painted maps, by role
+    mesh_options : options that apply only to mesh files; DermisError unless they have their defaults
+    levels : subdivision levels, or a function of the head that returns them
     """
     texts = {"v_origin": "auto", "up": "y", "eyes": "fitted"}
     defaults = {"unit_mm": None, "opaque": (), "eye_groups": (), **texts}
@@ -269,7 +276,7 @@ def _load_human(
 
 
 def load_person(name: str) -> Human:
-    """Return the person of a name: the default person, one sampled by seed, or that of a file.
+    """Return the person for a head name: the default person, one sampled by seed, or that of a .json file.
 
     Raises DermisError for an invalid seed or file.
     """
@@ -287,10 +294,10 @@ def load_person(name: str) -> Human:
     return Human.drawn(int(words))
 
 
-def _map_files(map_files: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
-    """Return the file of each map: the given one, else that of the head.
+def _select_map_files(map_files: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
+    """Return the file of each map role: the given file, otherwise that of the sample or mesh file.
 
-    A given normal map replaces the relief of the head.
+    map_files, files : files given by the user, and files or embedded maps of the head
     """
     chosen = {role: files.get(role) if file is None else file for role, file in map_files.items()}
     return chosen | {"region": files.get("region")}

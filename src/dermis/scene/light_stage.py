@@ -1,4 +1,4 @@
-"""Light stage: lights in all directions, and their weights that reproduce an environment."""
+"""Light stage: lights in all directions, and weights with which they reproduce an environment."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MAX_LIGHTS = 10_000
 
 
 def light_stage(count: int) -> list[DirectionalLight]:
-    """Return directional lights of irradiance 1, distributed evenly on a spiral from above to below.
+    """Return directional lights of irradiance 1, distributed evenly over the sphere on a Fibonacci spiral.
 
     Raises DermisError unless the count is 1 to 10,000. Source: [Debevec2000].
     """
@@ -27,9 +27,10 @@ def light_stage(count: int) -> list[DirectionalLight]:
 
 
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
-    """Return the irradiance (n, 3) that arrives from the directions nearest to each light, linear Rec. 709.
+    """Return weights (n, 3) of the lights of a light stage that reproduce an environment, linear Rec. 709.
 
-    The sum of pictures under each light, times these weights, is the picture under the environment.
+    A weight is the irradiance from the directions that are nearest to a light. The sum of the pictures under
+    each light, times these weights, is the picture under the environment.
 
     Raises DermisError when the panorama cannot be read.
     """

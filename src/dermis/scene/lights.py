@@ -41,12 +41,12 @@ _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", 
 
 
 def _equal_channels(value: Any) -> Any:
-    """Return a number as three equal channels; other values stay the same."""
+    """Return a number as three equal channels (red, green, blue); return other values unchanged."""
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 class _LightBase(FrozenModel):
-    """Fields of all lights."""
+    """Fields that all lights have."""
 
     synonyms: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS_SYNONYMS, "irradiance")
 
@@ -65,7 +65,7 @@ class _LightBase(FrozenModel):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the methods that draw this light."""
+        """Return the bibliography keys of the shading method for this type of light."""
         return ()
 
 
@@ -94,7 +94,7 @@ class PointLight(_LightBase):
 
 
 class SpotLight(PointLight):
-    """Point light restricted to a cone around the line to the target.
+    """Point light restricted to a cone around the line from the light to its target.
 
     Examples
     --------
@@ -118,9 +118,9 @@ class SpotLight(PointLight):
 
 
 class RectangleLight(PointLight):
-    """Uniform rectangular area light, such as a window or a softbox.
+    """Rectangular area light of uniform radiance, such as a window or a softbox.
 
-    It faces the target, with two sides horizontal.
+    The rectangle faces its target, and two of its sides are horizontal.
 
     Examples
     --------
@@ -138,12 +138,12 @@ class RectangleLight(PointLight):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the methods that draw this light."""
+        """Return the bibliography keys of the shading method for rectangular lights."""
         return "Baum1989", "Roberts2018"
 
 
 class SphereLight(PointLight):
-    """Uniform spherical area light, such as a globe lamp.
+    """Spherical area light of uniform radiance, such as a globe lamp.
 
     Examples
     --------
@@ -161,7 +161,7 @@ class SphereLight(PointLight):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the methods that draw this light."""
+        """Return the bibliography keys of the shading method for spherical lights."""
         return "ShirleyChiu1997", "Roberts2018"
 
     @model_validator(mode="after")
@@ -192,7 +192,7 @@ class DirectionalLight(_LightBase):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the methods that draw this light."""
+        """Return the bibliography keys of the shading method; none for a light without angular size."""
         return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 
@@ -251,20 +251,20 @@ NO_LIGHTS = "none"
 
 
 def light_presets() -> list[str]:
-    """Return the names of the light presets."""
+    """Return the names of the light presets, such as "studio"."""
     names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
     return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
 def preset_lights(name: str) -> tuple[Light, ...]:
-    """Return the lights of a preset."""
+    """Return the lights of a light preset."""
     if name == NO_LIGHTS:
         return ()
     return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
 
 
 def preset_toml(name: str) -> str:
-    """Return the TOML text of a preset."""
+    """Return the [[lights]] tables of a light preset as TOML text."""
     return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 

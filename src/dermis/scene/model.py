@@ -71,34 +71,34 @@ class Scene:
         environment: Environment | str | os.PathLike[str] | None = None,
         pose: Pose | Mapping[str, float] | None = None,
     ) -> None:
-        self._set("head", as_head(head))
-        self._set("environment", as_environment(environment))
-        self._set("skin", Skin() if skin is None else as_model(Skin, skin, "skin", 'profile="medium"'))
+        self._set_field("head", as_head(head))
+        self._set_field("environment", as_environment(environment))
+        self._set_field("skin", Skin() if skin is None else as_model(Skin, skin, "skin", 'profile="medium"'))
         if lights is None:
-            self._set("lights", () if self.environment else studio())
+            self._set_field("lights", () if self.environment else studio())
         else:
-            self._set("lights", as_lights(lights))
-        self._set("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
-        self._set("pose", Pose.coerce(pose))
+            self._set_field("lights", as_lights(lights))
+        self._set_field("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
+        self._set_field("pose", Pose.coerce(pose))
         if self.pose is not None:
             self.motion  # noqa: B018 checks the pose
 
     @classmethod
     def coerce(cls, scene: object) -> Scene:
-        """Return a scene unchanged, or the default scene of a head.
+        """Return a scene unchanged, or make a scene with default lights and camera from a head.
 
         Raises DermisError for any other object.
         """
         return scene if isinstance(scene, Scene) else cls(scene)  # type: ignore[arg-type]
 
     def replace(self, **parts: Any) -> Scene:
-        """Return a validated copy with other parts."""
+        """Return a validated copy in which the given fields, such as skin or lights, have new values."""
         return replace(self, **parts)
 
-    def _set(self, part: str, value: object) -> None:
+    def _set_field(self, part: str, value: object) -> None:
         object.__setattr__(self, part, value)
 
     @cached_property
     def motion(self) -> Motion | None:
-        """Return the pose as arrays, or None for the rest pose."""
+        """Return the pose as arrays of target weights and bone matrices, or None for the rest pose."""
         return None if self.pose is None else self.pose.motion(self.head.control)

@@ -1,4 +1,4 @@
-"""Loading of motion from files of any supported format."""
+"""Loading of facial motion from animation, capture and mesh sequence files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from dermis.mesh.head import Head
 from dermis.scene.head_table import UpAxis, check_options
 
 _JSON_LINES = (".jsonl", ".ndjson", ".json")
-_KINDS = "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"
+_ACCEPTED_FILES = (
+    "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"
+)
 
 
 def load_motion(
@@ -71,7 +73,7 @@ def load_motion(
     >>> dermis.load_motion(folder, head, fps=10).duration_s
     0.2
     """
-    clip_path = checked_path(path, _KINDS)
+    clip_path = checked_path(path, _ACCEPTED_FILES)
     check_options(unit_mm=unit_mm, up=up)
     fps = None if fps is None else check_rate("fps", fps)
     source, clip_name = _split_clip_name(clip_path, clip)
@@ -82,15 +84,15 @@ def load_motion(
     if is_sequence(source):
         return load_sequence(source, head, fps, unit_mm, up)
     if not is_file(source):
-        refuse(source, _KINDS, "there is no such file", "Check the name")
+        refuse(source, _ACCEPTED_FILES, "there is no such file", "Check the name")
     if source.suffix.lower() not in (".csv", *_JSON_LINES):
-        refuse(source, _KINDS, f"the suffix is {source.suffix!r}", "Convert it to one of these")
+        refuse(source, _ACCEPTED_FILES, f"the suffix is {source.suffix!r}", "Convert it to one of these")
     load = load_live_link if source.suffix.lower() == ".csv" else load_mediapipe
     return load(source, head, fps)
 
 
 def _split_clip_name(path: Path, clip: str | None) -> tuple[Path, str | None]:
-    """Return the path of a file and the name of a clip, which may follow the path after "#"."""
+    """Split "file.glb#clip" into the path of the glTF file and the name of the clip."""
     file, sign, name = str(path).rpartition("#")
     if sign and not is_file(path) and is_gltf(file):
         return Path(file), clip or name

@@ -1,4 +1,4 @@
-"""Conversion between cameras and the matrices of OpenCV: intrinsics, rotation and translation."""
+"""Conversion between cameras and OpenCV matrices: intrinsics, rotation and translation."""
 
 from __future__ import annotations
 
@@ -19,10 +19,13 @@ _MAX_PIXELS = 1e6  # along a side
 
 
 class OpenCvCamera(NamedTuple):
-    """Camera of OpenCV: X_cam = R X + t [mm], pixel K X_cam; x to the right, y down, z forward.
+    """Pinhole camera in OpenCV's convention: X_cam = R X + t, with x to the right, y down and z forward.
 
-    K, R : (3, 3); fx, fy, cx and cy [pixel]
-    t : (3,) [mm]
+    The homogeneous pixel coordinates of a scene point X [mm] are K X_cam.
+
+    K : (3, 3) intrinsic matrix [pixel]
+    R : (3, 3) rotation from the scene to the camera
+    t : (3,) translation [mm]
     """
 
     K: Doubles
@@ -31,16 +34,23 @@ class OpenCvCamera(NamedTuple):
 
 
 def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> dict[str, Any]:
-    """Return the fields of a `Camera` from the matrices of OpenCV.
+    """Return the fields of a `Camera` from OpenCV matrices.
+
+    K, R, t : intrinsic matrix [pixel], rotation, and translation [mm], see `OpenCvCamera`
+    size : width and height of the picture [pixel]
 
     Raises DermisError for matrices that do not describe a pinhole camera.
     """
-    k, rotation, translation = _matrix("K", K, (3, 3)), _matrix("R", R, (3, 3)), _matrix("t", t, (3,))
+    k, rotation, translation = (
+        _checked_matrix("K", K, (3, 3)),
+        _checked_matrix("R", R, (3, 3)),
+        _checked_matrix("t", t, (3,)),
+    )
     _check_intrinsics(k)
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > _TOLERANCE or np.linalg.det(rotation) < 0:
         actual = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
         refuse("R", "a rotation matrix", actual, "Convert a rotation vector with cv2.Rodrigues")
-    width, height = _size(size)
+    width, height = _checked_size(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     position = -rotation.T @ translation
     distance = translation[2]
@@ -57,20 +67,25 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
 
 
 def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
-    """Return the intrinsic matrix K (3, 3) [pixel].
+    """Return the intrinsic matrix K (3, 3) of a camera [pixel].
 
-    lens : tangent of half the vertical angle of view, principal point as fractions of width and height from
-        the upper left corner, and width of a pixel over its height
+    lens : tangent of half the vertical angle of view; principal point as fractions of width and height from
+        the upper left corner; and width of a pixel divided by its height
+    size : width and height of the picture [pixel]
     """
     half_tangent, principal_point, pixel_aspect = lens
-    size = _size(size)
+    size = _checked_size(size)
     fy = 0.5 * size[1] / half_tangent
     cx, cy = np.multiply(principal_point, size) - _PIXEL_CENTRE
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
 
 def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[Doubles, Doubles]:
-    """Return the rotation (3, 3) and the translation (3,) [mm] of a camera that looks at a target."""
+    """Return the rotation R (3, 3) and translation t (3,) [mm] of a camera that looks at a target.
+
+    position, target : (3,) positions of camera and target [mm]
+    up : (3,) direction that is up in the picture
+    """
     forward = _normalise(np.subtract(target, position))
     right = _normalise(np.cross(forward, np.asarray(up, np.float64)))
     rotation = np.array([right, np.cross(forward, right), forward])
@@ -87,7 +102,7 @@ def _check_intrinsics(k: Doubles) -> None:
         refuse("K", "pixels with right angles", actual, advice)
 
 
-def _matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
+def _checked_matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     try:
         found = np.asarray(values, np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -100,7 +115,7 @@ def _matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     return found
 
 
-def _size(size: tuple[int, int]) -> tuple[int, int]:
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
     width, height = checked_array("size", size, (2,), 1, _MAX_PIXELS, "pixels").tolist()
     return int(width), int(height)
 

@@ -1,4 +1,4 @@
-"""Registry of the outputs of a frame besides colour: depth, normals, motion, ..."""
+"""Registry of the outputs that a frame can have besides the picture: depth, normals, motion, ..."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Quantisation(NamedTuple):
 
 @dataclass(frozen=True)
 class Output:
-    """Quantity that a frame computes at the centre of each pixel.
+    """Quantity that a frame computes at the centre of each pixel, such as depth.
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ class Output:
     kind : str
         NumPy name of the element type: "float32", "int32" or "uint8".
     unit : str
-        Unit of the values; empty if they have none.
+        Unit of the pixel values; empty for dimensionless outputs.
     description : str
         A few words for help texts.
     background : float
-        Value of pixels that show nothing.
+        Pixel value where there is neither head nor hair.
     quantisation : Quantisation, optional
         Quantisation in PNG files; without it only 8-bit outputs can be written as PNG.
     shader : Path, optional
@@ -73,12 +73,12 @@ class Output:
 
     @property
     def channels(self) -> int:
-        """Return the number of channels; 0 for one channel for each light."""
+        """Return the number of channels; 0 for an output with one channel per light."""
         return len(self.channel_names)
 
     @property
     def wgsl_type(self) -> str:
-        """Return the type of one channel in shaders, which has four bytes."""
+        """Return the WGSL type of one channel in the output buffer, which has four bytes."""
         return _WGSL_TYPES[self.kind]
 
 
@@ -116,7 +116,7 @@ OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output i
 
 
 def check_outputs(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of outputs without duplicates.
+    """Validate names of outputs and return them without duplicates.
 
     Raises DermisError for a name that is not registered.
     """

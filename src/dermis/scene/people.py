@@ -1,4 +1,4 @@
-"""Scattering settings of the skin of a parametric human."""
+"""Skin settings of parametric humans."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from dermis.scene.skin import Pigments, Skin
 
 
 def skin_of(person: Human, base: Skin | None = None) -> Skin:
-    """Return skin settings whose scattering follows the pigments of a person.
+    """Return skin settings whose subsurface scattering matches the pigments of a person.
 
-    base : settings to start from; the default skin when left out
+    Darker skin scatters light less far. The colour of the skin does not change: it is that of the person's
+    painted maps.
 
-    The colour is still that of the person's painted maps; darker skin scatters light less far.
+    base : settings to start from; the default skin if None
     """
     look = person.look
     pigments = Pigments(

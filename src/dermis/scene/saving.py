@@ -1,4 +1,4 @@
-"""Scenes written as the TOML files that `load_scene` reads."""
+"""Export of scenes to the TOML files that `load_scene` reads."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
 
 
 def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
-    """Write a scene to a TOML file from which `dermis render` draws the same picture; the write is atomic.
+    """Write a scene to a TOML file in an atomic write, so that `dermis render` draws the same picture.
 
-    head : the [head] table with absolute file names
+    head : [head] table of the scene with absolute file names
 
     Raises DermisError when the file cannot be written.
     """
@@ -36,9 +36,11 @@ def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, 
 
 
 def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
-    """Return the TOML text of a scene.
+    """Return a scene as the text of a TOML file.
 
-    Raises DermisError for a pose with positions of single points.
+    head : [head] table of the scene with absolute file names
+
+    Raises DermisError for a pose with positions of points, which do not fit into a scene file.
     """
     excluded = _SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
@@ -56,7 +58,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
 
 def _pose_tables(pose: Pose | None) -> list[str]:
-    """Return the tables of a pose's weights and bones."""
+    """Return the TOML tables [pose.weights] and [pose.bones] of a pose, those that are not empty."""
     if pose is None:
         return []
     if pose.positions_mm is not None:
@@ -71,12 +73,12 @@ def _pose_tables(pose: Pose | None) -> list[str]:
 def _model_table(title: str, values: FrozenModel, exclude: set[str] | None = None) -> str:
     table = values.model_dump(exclude=exclude, exclude_none=True)
     for key in _PATH_FIELDS & table.keys():
-        table[key] = _absolute(table[key])
+        table[key] = _absolute_path(table[key])
     return table_text(title, table)
 
 
-def _absolute(name: Any) -> Any:
-    """Return the absolute name of an existing file, or a tuple of them; preset names stay the same."""
+def _absolute_path(name: Any) -> Any:
+    """Return a file name, or each of a tuple of names, as an absolute path; keep names of presets."""
     if isinstance(name, tuple):
-        return tuple(map(_absolute, name))
+        return tuple(map(_absolute_path, name))
     return str(Path(name).resolve()) if is_file(name) else name

@@ -1,4 +1,4 @@
-"""Settings of how a picture is computed and encoded."""
+"""Settings of rendering and encoding: sizes, quality, technique, exposure, background."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 def _parse_colour(value: Any) -> Any:
-    """Return "#rrggbb" or "red,green,blue" as linear Rec. 709 numbers; other values stay the same."""
+    """Convert "#rrggbb" or "red,green,blue" to linear Rec. 709; return other values unchanged."""
     if not isinstance(value, str):
         return value
     if not _HEX.fullmatch(value):
@@ -53,13 +53,13 @@ else:
     Background = Annotated[Colour, BeforeValidator(_parse_colour), _BACKGROUNDS]
 
 
-def _both_sides(value: Any) -> Any:
-    """Return a number as width and height; other values stay the same."""
+def _square_size(value: Any) -> Any:
+    """Return an integer as the width and height of a square; return other values unchanged."""
     return (value, value) if isinstance(value, int) else value
 
 
 class Settings(FrozenModel):
-    """Sizes, quality and encoding of a picture.
+    """Settings of a picture: size, antialiasing, technique, exposure and background.
 
     Examples
     --------
@@ -70,7 +70,7 @@ class Settings(FrozenModel):
 
     synonyms: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
 
-    size: Annotated[tuple[_Side, _Side], BeforeValidator(_both_sides)] = (1024, 1024)
+    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square_size)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64, le=16384), Reason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light is diffused [texel]."""

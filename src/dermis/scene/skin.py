@@ -1,4 +1,4 @@
-"""Settings of the skin: surface reflection and scattering."""
+"""Settings of the skin: specular reflection and subsurface scattering."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_OTHER_PROFILES = 2
 """Number of profiles that a map can mix with the main profile."""
 _OILY_RHO_S_FACTOR, _OILY_ROUGHNESS_FACTOR = 2.0, 0.6
 DEFAULT_ROUGHNESS, DEFAULT_RHO_S = 0.3, 0.45
-PRESETS: dict[str, dict[str, Any]] = {
+SKIN_PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "deck-2007": {"specular": "kelemen", "rho_s": 0.18, "direction": "lambertian"},
 }
@@ -34,7 +34,7 @@ _COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, log=True))
 
 
 class Pigments(FrozenModel):
-    """Pigments that replace those of a skin profile; None keeps the value of the profile."""
+    """Overrides of the pigments of a skin profile; a field that is None keeps the pigment of the profile."""
 
     structure: Structure | None = None
     """Model of the layers: "dj2006" has two, "donner2008" adds a layer of melanin, "biospec" has four."""
@@ -56,12 +56,12 @@ class Pigments(FrozenModel):
     """Volume fraction of blood in the epidermis, for "donner2008" only."""
 
     def overrides(self) -> dict[str, float]:
-        """Return the values that replace those of the profile."""
+        """Return the overriding pigment fractions and thicknesses by name, without fields that are None."""
         return self.model_dump(exclude={"structure"}, exclude_none=True)
 
 
 class TissueLayer(FrozenModel):
-    """Layer of a medium with coefficients for red, green and blue."""
+    """Layer of a skin medium, with absorption and reduced scattering for red, green and blue."""
 
     name: str = "layer"
     """Name of the layer."""
@@ -137,12 +137,12 @@ class Skin(FrozenModel):
 
     @classmethod
     def preset(cls, name: str) -> Skin:
-        """Return the skin of a preset.
+        """Return the settings of a skin preset.
 
         Parameters
         ----------
         name : str
-            A key of `PRESETS`: "default" or "deck-2007".
+            A key of `SKIN_PRESETS`: "default" or "deck-2007".
 
         Returns
         -------
@@ -154,31 +154,33 @@ class Skin(FrozenModel):
         DermisError
             For any other name.
         """
-        if not isinstance(name, str) or name not in PRESETS:
-            refuse("skin", f"one of {', '.join(PRESETS)}", f"got {format_value(name)}", "Choose one of them")
-        return cls(**PRESETS[name])
+        if not isinstance(name, str) or name not in SKIN_PRESETS:
+            refuse(
+                "skin", f"one of {', '.join(SKIN_PRESETS)}", f"got {format_value(name)}", "Choose one of them"
+            )
+        return cls(**SKIN_PRESETS[name])
 
     @property
     def overrides_tissue(self) -> bool:
-        """Return whether pigments or layers replace those of the profile."""
+        """Return whether `pigments` or `layers` override those of the skin profile."""
         return self.pigments is not None or bool(self.layers)
 
     @property
     def strength(self) -> float:
-        """Return the specular strength rho_s including oiliness, at most 1 [-]."""
+        """Return the specular strength rho_s with oiliness, at most 1; 0 without a specular lobe [-]."""
         oily = min(1.0, self.rho_s * (1.0 + (_OILY_RHO_S_FACTOR - 1.0) * self.oiliness))
         return 0.0 if self.specular == "none" else oily
 
     @property
     def smoothing(self) -> float:
-        """Return the factor of the roughness due to oiliness [-]."""
+        """Return the factor by which oiliness reduces the roughness of the skin, at most 1 [-]."""
         return 1.0 - (1.0 - _OILY_ROUGHNESS_FACTOR) * self.oiliness
 
 
 def lobe_name(skin: Skin) -> str:
-    """Return the name of the skin's lobe, or of the default lobe for skin without one.
+    """Return the name of the specular lobe of a skin, or of the default lobe if the skin has none.
 
-    Wet materials beside the skin still need a lobe.
+    Wet materials, such as eyes, have a lobe even if the skin has none.
     """
     from dermis.specular.models import MODELS
 

@@ -1,4 +1,4 @@
-"""Levels of subdivision that make the silhouette of a head look smooth in a picture."""
+"""Subdivision levels with which the silhouette of a head looks smooth in a picture."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ _NEAR_PLANE_MM = 1.0
 
 @dataclass(frozen=True)
 class SmoothIn:
-    """Choice of the levels of subdivision that make the outline of a head look smooth in a picture.
+    """Choice of the subdivision levels with which the outline of a head looks smooth in a picture.
 
-    camera : function of the head before subdivision
-    size : of the picture [pixel]
+    It is a function of the head that `load_head` accepts as `subdivide`. The result depends only on the
+    camera, the size and the head in rest pose.
 
-    It is a value of `subdivide` of `load_head`. The result depends only on these and on the head in rest
-    pose.
+    camera : function that returns a camera for the head before subdivision
+    size : width and height of the picture [pixel]
     """
 
     camera: Callable[[Head], Camera] = portrait
     size: tuple[int, int] = (1024, 1024)
 
     def __call__(self, head: Head) -> int:
-        """Return the levels, 0 to 3, with which the mesh has at most `MAX_SMOOTH_TRIANGLES` triangles."""
+        """Return the subdivision levels for a head, 0 to 3, limited by `MAX_SMOOTH_TRIANGLES`."""
         triangles = len(head.mesh.triangles)
         if 4 * triangles > MAX_SMOOTH_TRIANGLES:
             return 0
@@ -55,9 +55,9 @@ class SmoothIn:
 
 
 def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
-    """Return the levels, or the function that computes them; "auto" is `SmoothIn()`.
+    """Return subdivision levels, or the function that computes them, which is `SmoothIn()` for "auto".
 
-    Raises DermisError for other words.
+    Raises DermisError for other text.
     """
     if subdivide == AUTO:
         return SmoothIn()
@@ -67,10 +67,10 @@ def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
 
 
 class Silhouette(NamedTuple):
-    """Edges between faces that face the camera and faces that do not, in picture space.
+    """Silhouette edges of a mesh in a picture: edges between a front-facing and a back-facing triangle.
 
-    length_px : (e,) length of each edge
-    deviation_px : (e,) largest distance of each edge from the smooth curve through its ends
+    length_px : (e,) length of each edge [pixel]
+    deviation_px : (e,) largest distance of each edge from the smooth curve through its ends [pixel]
     """
 
     length_px: Doubles
@@ -78,7 +78,7 @@ class Silhouette(NamedTuple):
 
     @property
     def typical_deviation_px(self) -> float:
-        """Return the deviation that 90 % of the silhouette's length does not exceed [pixel]; 0 if empty."""
+        """Return the 90th percentile of the deviation, weighted by edge length [pixel]; 0 without edges."""
         if not len(self.deviation_px):
             return 0.0
         order = np.argsort(self.deviation_px)
@@ -88,12 +88,13 @@ class Silhouette(NamedTuple):
 
 
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
-    """Return the silhouette of a mesh without eyeballs; occlusion is ignored.
+    """Return the visible silhouette edges of a mesh, without eyeballs and without regard to occlusion.
 
-    K, R, t : matrices of OpenCV; t for positions of the mesh [mm]
+    The smooth curve between two points with unit normals n0 and n1 deviates from its chord d by |(n1 - n0) .
+    d| / 8.
+
+    K, R, t : OpenCV matrices of the camera, for positions of the mesh [mm]
     size : width and height of the picture [pixel]
-
-    The curve between two points with normals n deviates from its chord d by |dn . dd| / 8.
     """
     camera_points = mesh.points_mm @ R.T + t
     normals = sum_by_index(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
@@ -116,10 +117,11 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
 
 
 def smooth_levels(typical_deviation_px: float, triangles: int) -> int:
-    """Return the fewest levels of subdivision with which a silhouette looks smooth.
+    """Return the smallest number of subdivision levels with which a silhouette looks smooth.
 
-    typical_deviation_px : of the mesh; each level leaves a quarter of it
-    triangles : number of triangles of the mesh; each level multiplies it by 4
+    typical_deviation_px : deviation of the silhouette before subdivision, which each level divides by 4
+        [pixel]
+    triangles : number of triangles before subdivision, which each level multiplies by 4
     """
     needed = math.ceil(math.log(max(typical_deviation_px / MAX_DEVIATION_PX, 1.0), 4))
     affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangles, 1.0), 4))
@@ -127,7 +129,7 @@ def smooth_levels(typical_deviation_px: float, triangles: int) -> int:
 
 
 def _faces_camera(pixels: Doubles, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Return the mask (f,) of triangles that face the camera; y is down in the picture."""
+    """Return the mask (f,) of front-facing triangles, from vertices in pixel coordinates with y down."""
     a, b, c = (pixels[triangles[:, corner]] for corner in range(3))
     one, other = b - a, c - a
     return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0)

@@ -1,4 +1,4 @@
-"""Bibliography keys of the methods that draw a picture."""
+"""Bibliography keys of the methods used to render a picture, for `dermis cite` and metadata."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-_FRAME = ("dEonLuebke2007", "Burns2013")
-_FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
-_HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
-_ANISOTROPY = ("HenyeyGreenstein1941", "Wiscombe1977")
-_TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
-_SHADOWS = ("Williams1978", "Reeves1987", "Hanika2021")
-_RELIEF = ("Mikkelsen2010", "OlanoBaker2010")
-_ENVIRONMENT = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
-_OCCLUSION = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
+_FRAME_SOURCES = ("dEonLuebke2007", "Burns2013")
+_FRESNEL_SOURCES = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
+_HALF_SPACE_SOURCES = ("Chandrasekhar1960", "Jensen2001")
+_ANISOTROPY_SOURCES = ("HenyeyGreenstein1941", "Wiscombe1977")
+_TONE_SOURCES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
+_SHADOW_SOURCES = ("Williams1978", "Reeves1987", "Hanika2021")
+_RELIEF_SOURCES = ("Mikkelsen2010", "OlanoBaker2010")
+_ENVIRONMENT_SOURCES = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
+_OCCLUSION_SOURCES = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
 
 
 def picture_sources(
@@ -29,27 +29,27 @@ def picture_sources(
     *,
     relief: bool = True,
 ) -> tuple[str, ...]:
-    """Return the bibliography keys of a picture without duplicates.
+    """Return the bibliography keys of all methods used for a picture, without duplicates.
 
     relief : whether the head has a normal map or a height map
 
     Raises DermisError for an unknown profile.
     """
-    keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
+    keys = [*_FRAME_SOURCES, *scattering_sources(settings), *_surface_sources(skin)]
     keys += profile_sources(skin)
     if skin.direction == "half-space":
-        keys += _HALF_SPACE + _ANISOTROPY * (skin.anisotropy > 0)
-    keys += _RELIEF * relief
-    keys += _light(lights)
+        keys += _HALF_SPACE_SOURCES + _ANISOTROPY_SOURCES * (skin.anisotropy > 0)
+    keys += _RELIEF_SOURCES * relief
+    keys += _light_sources(lights)
     if environment is not None:
-        keys += _ENVIRONMENT + _OCCLUSION * (settings.occlusion != "none")
-    keys += _TONES[settings.tone]
+        keys += _ENVIRONMENT_SOURCES + _OCCLUSION_SOURCES * (settings.occlusion != "none")
+    keys += _TONE_SOURCES[settings.tone]
     keys += ("BurtAdelson1983",) * (settings.bloom > 0)
     return tuple(dict.fromkeys(keys))
 
 
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
-    """Return the keys of the technique, its treatment of seams, and translucency."""
+    """Return the bibliography keys of the scattering technique, its seam method, and translucency."""
     technique = TECHNIQUES[settings.technique]
     substituted = settings.seams != "stitch" or not technique.stitches_seams
     keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (substituted and technique.uses_atlas)
@@ -59,7 +59,7 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
 
 
 def profile_sources(skin: Skin) -> tuple[str, ...]:
-    """Return the keys of a diffusion profile; none for a user's table of Gaussians."""
+    """Return the bibliography keys of a skin's diffusion profile; none for a user's table of Gaussians."""
     from dermis.optics.profiles import find_gaussians
     from dermis.scene.tissue import skin_tissue
 
@@ -68,15 +68,15 @@ def profile_sources(skin: Skin) -> tuple[str, ...]:
     return skin_tissue(skin).profile().sources
 
 
-def _surface(skin: Skin) -> tuple[str, ...]:
+def _surface_sources(skin: Skin) -> tuple[str, ...]:
     from dermis.specular.models import MODELS
 
     if skin.specular == "none":
         return ()
     energy = ("Kelemen2001",) * (skin.energy != "none")
-    return MODELS[skin.specular].sources + _FRESNEL[skin.fresnel] + energy
+    return MODELS[skin.specular].sources + _FRESNEL_SOURCES[skin.fresnel] + energy
 
 
-def _light(lights: Sequence[Light]) -> tuple[str, ...]:
-    keys: tuple[str, ...] = _SHADOWS * any(light.shadows for light in lights)
+def _light_sources(lights: Sequence[Light]) -> tuple[str, ...]:
+    keys: tuple[str, ...] = _SHADOW_SOURCES * any(light.shadows for light in lights)
     return keys + tuple(key for light in lights for key in light.sources)

@@ -1,4 +1,4 @@
-"""Registry of the techniques for subsurface scattering."""
+"""Registry of techniques for subsurface scattering."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from dermis.base.registry import Registry
 
-_HOME = "dermis.frame.techniques"
+_TECHNIQUE_PACKAGE = "dermis.frame.techniques"
 
 TECHNIQUES: Registry[Any] = Registry("technique")
 for _name, _summary in {
@@ -17,4 +17,4 @@ for _name, _summary in {
     "screen-space": "blurs in the picture, as in game engines",
     "pre-integrated": "tables by curvature, as in game engines",
 }.items():
-    TECHNIQUES.register(_name, f"{_HOME}.{_name.replace('-', '_')}:TECHNIQUE", _summary)
+    TECHNIQUES.register(_name, f"{_TECHNIQUE_PACKAGE}.{_name.replace('-', '_')}:TECHNIQUE", _summary)

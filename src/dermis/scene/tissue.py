@@ -1,4 +1,4 @@
-"""Optical tissue of a skin's settings."""
+"""Optical tissue that the settings of a skin describe."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 
 def skin_tissue(skin: Skin) -> Tissue:
-    """Return the tissue of the skin's profile, with the pigments or layers that the skin overrides.
+    """Return the tissue of a skin: that of its profile, with the skin's pigments or layers as overrides.
 
-    Raises DermisError for a profile that is not a tissue, and for one without such pigments or layers.
+    Raises DermisError for a profile that is not a tissue, and for pigments or layers that the tissue does not
+    have.
     """
     if skin.layers:
         return load_tissue(skin.profile).with_layers(_to_media_layers(skin.layers))
@@ -23,7 +24,7 @@ def skin_tissue(skin: Skin) -> Tissue:
 
 
 def tissue_layers(skin: Skin) -> tuple[TissueLayer, ...]:
-    """Return the layers of a skin whose profile is an RGB medium; empty for any other profile.
+    """Return the layers of a skin whose tissue is a medium given by RGB coefficients, otherwise none.
 
     Raises DermisError for a profile that is not a tissue.
     """

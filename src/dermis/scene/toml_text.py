@@ -1,4 +1,4 @@
-"""Plain values formatted as TOML.
+"""Deterministic formatting of plain Python objects as TOML.
 
 Data sets are identified by the hash of this text, so its format must not depend on a library.
 """
@@ -12,18 +12,18 @@ from typing import Any
 
 
 def table_text(title: str, values: Mapping[str, Any]) -> str:
-    """Return the text of a table with its title line; an empty title is left out."""
+    """Return a mapping as a TOML table below its title line, such as "[skin]"; the title may be empty."""
     lines = [f"{key_text(key)} = {value_text(value)}" for key, value in values.items()]
     return "\n".join([*([title] if title else []), *lines, ""])
 
 
 def key_text(name: str) -> str:
-    """Return a key, in quotes if it is not a bare key of TOML."""
+    """Return a name as a TOML key, in quotes if it has characters other than letters, digits, _ and -."""
     return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else value_text(name)
 
 
 def value_text(value: Any) -> str:
-    """Return a number, a boolean, a string, or a list or mapping of them, on one line."""
+    """Return a number, boolean, string, list or mapping as a TOML value on one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):

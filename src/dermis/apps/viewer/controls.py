@@ -8,7 +8,7 @@ from typing import Any
 
 from dermis.apps.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
 from dermis.apps.viewer.state import ATLAS, AtlasView, UndoHistory, ViewerState
-from dermis.scene.camera import preset
+from dermis.scene.camera import camera_preset
 
 Event = Mapping[str, Any]
 Point = tuple[float, float]
@@ -60,7 +60,7 @@ class Controls:
         """Set the camera to a preset."""
         state = self.history.state
         self.history.end_gesture()
-        self.history.change(state.with_camera(preset(name, state.scene.head)))
+        self.history.change(state.with_camera(camera_preset(name, state.scene.head)))
 
     def _press(self, event: Event) -> None:
         self.history.end_gesture()

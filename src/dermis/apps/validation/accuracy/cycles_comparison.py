@@ -24,7 +24,7 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.optics.profiles import load_profile
 from dermis.scene import Scene, Settings, Skin, load_camera
-from dermis.scene.camera import PRESETS
+from dermis.scene.camera import CAMERA_PRESETS
 from dermis.scene.lights import PointLight
 from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
@@ -217,7 +217,7 @@ def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRe
     mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAP_SIDE))
     skin, renders = principled_skin(mapped), dict[str, list[SkinRender]]()
     for view in LOOK_VIEWS:
-        camera = PRESETS[view](painted)
+        camera = CAMERA_PRESETS[view](painted)
         preset_2007 = render_skin(renderer, Scene(one_lobe, camera=camera, skin=Skin.preset("deck-2007")))
         ours = render_skin(renderer, Scene(painted, camera=camera))
         renders[view] = [preset_2007, ours, render_cycles_skin(Scene(mapped, camera=camera), skin)]

@@ -21,7 +21,7 @@ from dermis.human.expressions import expression
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
-from dermis.scene.camera import PRESETS, Camera, cheek, portrait, side, three_quarter
+from dermis.scene.camera import CAMERA_PRESETS, Camera, cheek, portrait, side, three_quarter
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
@@ -193,7 +193,7 @@ def lips_camera(head: Head) -> Camera:
 
 def behind_ear_camera(head: Head) -> Camera:
     """Return a camera behind the left ear."""
-    preset = PRESETS["ear"](head)
+    preset = CAMERA_PRESETS["ear"](head)
     x, y, z = preset.target
     return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_FRAME_MM)
 
