@@ -1,1 +1,1 @@
-"""Pictures: reading and writing of files, colour spaces, filters and movies."""
+"""Pictures: picture files, colour spaces, filters and movies."""

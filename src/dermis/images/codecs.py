@@ -1,4 +1,4 @@
-"""Decoding of PNG, JPEG and TIFF files with all bits of their pixels, and encoding of PNG files."""
+"""Decoding of PNG, JPEG and TIFF files at full bit depth, and encoding of PNG files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _STRIP_PIXELS = 1 << 20  # pixels converted at a time
 _JPEG_SCAN = b"\xff\xda"
 _MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
-_MODES: dict[str, tuple[str, type[np.generic]]] = {
+_PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
     "L": ("L", np.uint8),
     "RGB": ("RGB", np.uint8),
@@ -45,23 +45,25 @@ _MODES: dict[str, tuple[str, type[np.generic]]] = {
     "F": ("F", np.float32),
 }
 """Pillow's mode and the NumPy type of the result by Pillow's mode of the file."""
-_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
+_PNG_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
 
 
 def decode_with_pillow(data: bytes) -> Pixels:
-    """Decode a PNG, JPEG or TIFF file to (H, W) or (H, W, 3 or 4) with all bits of its pixels.
+    """Decode a PNG, JPEG or TIFF file at full bit depth to an array (H, W, C).
 
-    Raises ValueError, OSError and other errors when the data are damaged, too large or of an unsupported
-    kind.
+    C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF.
+
+    Raises ValueError, OSError and other errors for a file that is damaged, too large or of an unsupported
+    type.
     """
     picture = _open_checked(data)
     pixel_format = _format_of_16_bit(data, picture)
     if pixel_format:
         image = decode_up_filtered_png(data)
         return _decode_16_bit(data, pixel_format, picture) if image is None else image
-    if picture.mode not in _MODES:
+    if picture.mode not in _PIXEL_MODES:
         raise ValueError(f"its pixels are of kind {picture.mode}, not 8 or 16 bit grey, RGB or RGBA")
-    mode, dtype = _MODES[picture.mode]
+    mode, dtype = _PIXEL_MODES[picture.mode]
     if picture.mode == "P" and "transparency" in picture.info:
         mode = "RGBA"
     picture.load()
@@ -81,14 +83,17 @@ def pillow_size(data: bytes) -> tuple[int, int]:
 
 
 def strips(image: Numbers) -> Iterator[slice]:
-    """Yield slices of rows that are large enough for fast array operations and small in memory."""
+    """Yield slices that divide the rows of an array into strips of about a million pixels.
+
+    Such strips are large enough for fast array operations and need little memory.
+    """
     rows = max(1, _STRIP_PIXELS // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
         yield slice(top, min(top + rows, len(image)))
 
 
 def _open_checked(data: bytes) -> Image:
-    """Open a picture with Pillow after checking its header and its size."""
+    """Open a picture with Pillow after checking its header, its size and the checksums of a PNG file."""
     picture = _open_header(data)
     check_size(picture.width, picture.height)
     if picture.format == "PNG":
@@ -113,7 +118,10 @@ def _open_header(data: bytes) -> Image:
 
 
 def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
-    """Return FFmpeg's name of the pixel format if Pillow would drop the lower 8 of 16 bits, else None."""
+    """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for others.
+
+    Pillow would reduce such a picture to 8 bits, so FFmpeg decodes it.
+    """
     if data.startswith(PNG_SIGNATURE):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
@@ -144,12 +152,12 @@ def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np
 def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> bytes:
     """Encode a picture (H, W, 1, 3 or 4) of uint8 or uint16 as a PNG file.
 
-    effort : level of zlib's compression, from 1 (fast) to 9 (small files)
-    use_isal : compress with ISA-L of the extra "batch", four times as fast as zlib's level 1 for rendered
+    effort : compression level of zlib, from 1 (fast) to 9 (small files)
+    use_isal : compress with ISA-L of the extra "batch", four times as fast as zlib at level 1 for rendered
         pictures
 
-    Each row is stored as its difference from the row above. For rendered pictures the files are as small as
-    with a choice among all filters for every row, in half of the time.
+    Every row uses PNG's "up" filter: it is stored as its difference from the row above. For rendered pictures
+    the files are as small as with the best filter for every row, in half of the time.
     """
     height, width, channels = levels.shape
     bits = 8 * levels.itemsize
@@ -168,9 +176,9 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def png_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of a PNG file after checking that it is complete; pixels are not decoded.
+    """Return width and height of a PNG file after checking its chunks; pixels are not decoded.
 
-    Raises ValueError when it is another file, truncated or damaged.
+    Raises ValueError for a file that is not PNG, truncated or damaged.
     """
     if not data.startswith(PNG_SIGNATURE):
         raise ValueError("its first bytes are not those of PNG")
@@ -181,19 +189,19 @@ def png_size(data: bytes) -> tuple[int, int]:
 
 
 def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
-    """Decode a PNG file written by `encode_png` to (H, W, 1, 3 or 4) uint8 or uint16.
+    """Decode a PNG file whose rows all use the "up" filter, as those of `encode_png`.
 
-    The result is None for PNG files with other filters and for other files.
+    The result is (H, W, 1, 3 or 4) uint8 or uint16, or None for any other file.
 
     Raises ValueError when the file is damaged or too large.
     """
     if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
         return None
     width, height, bits, colour, *methods = struct.unpack_from(">IIBBBBB", data, 16)
-    if bits not in (8, 16) or colour not in _CHANNELS or methods != [0, 0, 0]:
+    if bits not in (8, 16) or colour not in _PNG_CHANNELS or methods != [0, 0, 0]:
         return None
     check_size(width, height)
-    channels = _CHANNELS[colour]
+    channels = _PNG_CHANNELS[colour]
     step = 1 + width * channels * bits // 8
     compressed = _compressed_pixels(data)
     if compressed is None:
@@ -225,7 +233,7 @@ def _compressed_pixels(data: bytes) -> bytes | None:
 
 
 def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
-    """Yield kind and content of each chunk of a PNG file after checking its checksum.
+    """Yield type and data of each chunk of a PNG file after checking its checksum.
 
     Raises ValueError when the file is truncated or damaged.
     """

@@ -1,4 +1,4 @@
-"""Colours in linear Rec. 709: conversion from and to sRGB, luminance and CIEDE2000."""
+"""Colour spaces: linear Rec. 709 from and to sRGB, luminance and colour differences (CIEDE2000)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _XYZ_OF_REC709 = np.array(
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
 )
 _WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
-_DELTA = 6.0 / 29.0  # of the CIELAB function
+_CIELAB_DELTA = 6.0 / 29.0  # of the CIELAB function
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
-    """Return sRGB values of linear values by the exact piecewise curve, neither clipped nor rounded [-].
+    """Convert linear values to sRGB by the exact piecewise curve, neither clipped nor rounded [-].
 
     linear : any shape; float32 stays float32, all other types become float64
     """
@@ -29,7 +29,7 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
 
 
 def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
-    """Return linear values of sRGB values by the exact piecewise curve, not clipped [-].
+    """Convert sRGB values to linear ones by the exact piecewise curve, not clipped [-].
 
     encoded : any shape; float32 stays float32, all other types become float64
     """
@@ -39,7 +39,7 @@ def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
 
 
 def encode_srgb8(linear: ArrayLike) -> Bytes:
-    """Return 8-bit sRGB levels of linear values, rounded to nearest.
+    """Convert linear values to 8-bit sRGB levels, rounded to nearest.
 
     linear : any shape; clipped to [0, 1], NaN becomes 0
     """
@@ -48,12 +48,12 @@ def encode_srgb8(linear: ArrayLike) -> Bytes:
 
 
 def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
-    """Return linear values of 8- or 16-bit sRGB levels of any shape, by table lookup [-]."""
+    """Convert 8- or 16-bit sRGB levels of any shape to linear values from 0 to 1, by table lookup."""
     return _linear_by_level(np.iinfo(levels.dtype).max + 1)[levels]
 
 
 def luminance(linear: ArrayLike) -> NDArray[np.floating]:
-    """Return the relative luminance Y of linear Rec. 709 colours [-].
+    """Return the relative luminance Y (...) of linear Rec. 709 colours [-].
 
     linear : (..., 3) or (..., 4), whose alpha is ignored
     """
@@ -76,13 +76,15 @@ def _as_float(values: ArrayLike) -> NDArray[np.floating]:
 def lab(linear: ArrayLike) -> Doubles:
     """Return CIE L*a*b* (..., 3) under D65 of linear Rec. 709 colours (..., 3)."""
     t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
-    f = np.where(t > _DELTA**3, np.cbrt(t), t / (3.0 * _DELTA**2) + 4.0 / 29.0)
+    f = np.where(t > _CIELAB_DELTA**3, np.cbrt(t), t / (3.0 * _CIELAB_DELTA**2) + 4.0 / 29.0)
     X, Y, Z = np.moveaxis(f, -1, 0)
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
 
 
 def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
-    """Return the CIEDE2000 difference (...) of linear Rec. 709 colours (..., 3); 1 is just noticeable.
+    """Return the CIEDE2000 colour difference (...) of two arrays of linear Rec. 709 colours (..., 3).
+
+    A difference of 1 is just noticeable.
 
     Source: [Sharma2005].
     """

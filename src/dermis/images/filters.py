@@ -1,4 +1,4 @@
-"""Filters over whole pictures: mip levels and smoothing."""
+"""Filters of whole pictures: mip levels, and smoothing of quantised height maps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _STRIP = 16  # rows filtered at a time, which fit into the processor cache
 
 
 def mip_chain(image: NDArray[np.floating]) -> list[Floats]:
-    """Return a picture and its mip levels down to one texel, each averaged from the one before.
+    """Return a picture and its mip levels down to one texel, each a reduction of the previous level.
 
     image : (H, W, C) or (H, W), linear values; level k has max(1, H >> k) x max(1, W >> k) texels
 
-    Even sides are averaged in pairs. An odd side of 2m + 1 texels becomes m texels, each the mean of 2 + 1/m
-    old texels: three taps weighted by overlap.
+    Even sides are averaged in pairs. An odd side of 2m + 1 texels becomes m texels, each the mean of a window
+    of 2 + 1/m texels: three texels weighted by their overlap with the window.
     """
     levels = [np.asarray(image, np.float32)]
     while max(levels[-1].shape[:2]) > 1:
@@ -40,7 +40,7 @@ def _halve_axis(image: Floats, axis: int) -> Floats:
 
 
 def smooth_quantisation(height: NDArray[np.floating]) -> Floats:
-    """Smooth a height map by 1.2 texels, because 8-bit steps would be visible as contour lines.
+    """Smooth a height map by 1.2 texels to remove 8-bit quantisation, whose steps look like contour lines.
 
     height : (H, W) in any unit
 

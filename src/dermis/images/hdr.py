@@ -1,4 +1,4 @@
-"""OpenEXR and Radiance files; headers are checked before pixels are decoded."""
+"""Decoding and encoding of OpenEXR and Radiance files; headers are checked before pixels are decoded."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from dermis.base.arrays import Bytes, Floats, Index
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
-_CHANNELS = ("RGBA", "RGB", "Y")
-_NAMES = {1: "Y", 3: "RGB"}  # by number of channels
+_READABLE_CHANNELS = ("RGBA", "RGB", "Y")
+_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # by number of channels
 _MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 RADIANCE_SIGNATURE = b"#?"
 _MAX_HEADER = 1 << 16
-_STRIP = 1 << 18  # pixels decoded at a time
+_STRIP_PIXELS = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
-_COUNT = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
-_STEP = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
+_DECODED_BYTES = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
+_CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
 
 
 def decode_exr(data: bytes) -> Floats:
-    """Decode the channels Y, RGB or RGBA of an OpenEXR file to (H, W, 1, 3 or 4).
+    """Decode an OpenEXR file with channels Y, RGB or RGBA to an array (H, W, 1, 3 or 4).
 
-    Raises ValueError when there are no such channels, and for files that are too large or damaged.
+    Raises ValueError for a file with other channels, and for one that is too large or damaged.
     """
     import OpenEXR
 
@@ -58,9 +58,11 @@ def _exr_header(data: bytes) -> Any:
 
 
 def _check_exr_header(file: Any) -> str:
-    """Return the names of the channels to decode after checking the size of everything that is decoded.
+    """Check the header of an OpenEXR file, and return the channels to decode: "RGBA", "RGB" or "Y".
 
-    file : opened with its header only
+    The size of all channels of all parts is limited, because the library decodes all of them.
+
+    file : OpenEXR.File that was opened with header_only
     """
     samples = 0
     for part in file.parts:
@@ -77,7 +79,7 @@ def _check_exr_header(file: Any) -> str:
     if samples > _MAX_SAMPLES:
         raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
     channels = {channel.name: channel for channel in file.parts[0].header["channels"]}
-    names = next((names for names in _CHANNELS if set(names) <= channels.keys()), None)
+    names = next((names for names in _READABLE_CHANNELS if set(names) <= channels.keys()), None)
     if names is None or len(channels) > _MAX_CHANNELS:
         listed = ", ".join(sorted(channels)[:20])
         raise ValueError(f"it has channels {listed}, not R, G, B or Y")
@@ -94,11 +96,11 @@ def _window_size(window: Any) -> tuple[int, int]:
 def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """Encode a picture (H, W, 1 or 3) of float16 or float32 as an OpenEXR file with channels Y or R, G, B.
 
-    Only runs of equal bytes are compressed: for noisy pictures other methods are slower and no smaller.
+    The compression is run-length encoding: for noisy pictures other methods are slower and no smaller.
     """
     import OpenEXR
 
-    names = _NAMES[picture.shape[2]]
+    names = _CHANNELS_BY_COUNT[picture.shape[2]]
     channels = {name: np.ascontiguousarray(picture[..., k]) for k, name in enumerate(names)}
     header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage}
     file = io.BytesIO()
@@ -107,19 +109,19 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
 
 
 def decode_radiance(data: bytes) -> Floats:
-    """Decode a .hdr file to linear radiance (H, W, 3), divided by its EXPOSURE.
+    """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the EXPOSURE in its header.
 
-    Rows have to be top-down and pixels left to right, as programs write them. FFmpeg is not used because it
+    Rows must be top-down and pixels left to right, as programs write them. FFmpeg is not used because it
     accepts truncated files.
 
-    Raises ValueError for files that are truncated, damaged, or in another order or colour space.
+    Raises ValueError for a file that is truncated, damaged, or in another order or colour space.
     """
     height, width, exposure, offset = _radiance_header(data)
     compressed = data[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
     if len(data) - offset < height * (4 if compressed else 4 * width):
         raise ValueError("it is truncated")
     radiance = np.empty((height, width, 3), np.float32)
-    rows = max(1, _STRIP // width)
+    rows = max(1, _STRIP_PIXELS // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
         decode = _decode_runs if compressed else _decode_flat
@@ -131,13 +133,13 @@ def decode_radiance(data: bytes) -> Floats:
 
 
 def radiance_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of a .hdr file from its header."""
+    """Return width and height of a Radiance .hdr file from its header."""
     height, width, _, _ = _radiance_header(data)
     return width, height
 
 
 def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
-    """Return height, width, exposure and the offset of the pixels."""
+    """Parse the header of a Radiance .hdr file: height, width, exposure, and byte offset of the pixels."""
     found = re.search(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:_MAX_HEADER])
     if not found:
         raise ValueError("its header has no size of the form -Y height +X width")
@@ -153,12 +155,16 @@ def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
 
 
 def _scanline_marker(width: int) -> bytes:
-    """Return the first bytes of a run-length encoded scanline."""
+    """Return the four bytes with which a run-length encoded scanline starts."""
     return bytes((2, 2, width >> 8 & 255, width & 255))
 
 
 def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
-    """Decode run-length encoded scanlines to (H, W, 4) bytes, and return the offset of the next scanline."""
+    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the offset where they end.
+
+    offset : byte at which the first scanline starts
+    height : number of scanlines
+    """
     starts: list[int] = []
     marker, append = _scanline_marker(width), starts.append
     for _ in range(height):
@@ -171,8 +177,8 @@ def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Byt
                 while x < width:
                     code = data[offset]
                     append(offset)
-                    x += _COUNT[code]
-                    offset += _STEP[code]
+                    x += _DECODED_BYTES[code]
+                    offset += _CODE_BYTES[code]
             except IndexError:
                 raise ValueError("it is truncated") from None
             if x != width:
@@ -184,9 +190,13 @@ def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Byt
 
 
 def _expand_runs(data: Bytes, starts: Index) -> Bytes:
-    """Return the bytes encoded by runs that start at offsets (n,)."""
+    """Return the decoded bytes of run-length codes.
+
+    data : bytes of the file
+    starts : (n,) offset of each code in `data`
+    """
     code = data[starts]
-    count = np.array(_COUNT)[code]
+    count = np.array(_DECODED_BYTES)[code]
     if not count.all():
         raise ValueError("a run is empty")
     first = np.repeat(starts + 1, count)

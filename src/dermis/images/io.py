@@ -35,7 +35,7 @@ _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
-    """Picture file embedded in another file.
+    """Picture file that is part of another file, such as a .glb file.
 
     name : for error messages
     data : bytes of the PNG, JPEG or TIFF file
@@ -45,17 +45,18 @@ class EmbeddedPicture:
     data: bytes = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name."""
+        """Return the name, which stands in error messages instead of a path."""
         return self.name
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return a picture (H, W, C) as stored, row 0 at the top; C is 1 (grey), 3 (RGB) or 4 (RGBA).
+    """Return the pixels (H, W, C) of a picture file as stored, row 0 at the top.
 
-    path : PNG, JPEG or TIFF, as uint8 or uint16 (a float TIFF as float32), or EXR or HDR, as linear float32;
-        recognised by content, not by suffix
+    C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA. Colour profiles and camera orientation
+    are ignored, as usual for textures.
 
-    Grey with alpha becomes RGBA. Colour profiles and camera orientation are ignored, as usual for textures.
+    path : PNG, JPEG or TIFF, returned as uint8 or uint16 (a float TIFF as float32), or EXR or HDR, returned as
+        linear float32; the format is recognised by content, not by suffix
 
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
@@ -79,7 +80,12 @@ def _apply_codec(
     radiance: Callable[[bytes], T],
     pillow: Callable[[bytes], T],
 ) -> T:
-    """Return the result of the function for the file format, which the first bytes determine."""
+    """Call the function for the format of a picture file, which its first bytes determine.
+
+    exr, radiance, pillow : functions of the file's bytes, for OpenEXR, for .hdr, and for PNG, JPEG and TIFF
+
+    Raises DermisError if the format is unknown, or if the function fails.
+    """
     kinds = {EXR_SIGNATURE: exr, RADIANCE_SIGNATURE: radiance} | dict.fromkeys(PILLOW_SIGNATURES, pillow)
     codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
     if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
@@ -98,9 +104,9 @@ def _apply_codec(
 
 
 def check_output(path: str | Path) -> Path:
-    """Check that a picture can be written to a path, and return the path; call it before long work.
+    """Check before a long computation that a picture can be written to a path, and return the path.
 
-    Raises DermisError for other suffixes than `OUTPUT_SUFFIXES`, and when the folder is missing or not
+    Raises DermisError for a suffix that is not in `OUTPUT_SUFFIXES`, and when the folder is missing or not
     writable.
     """
     return atomic_write.check_output(path, OUTPUT_SUFFIXES, "Choose .png for viewing, .exr for processing")
@@ -154,10 +160,10 @@ def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
 
 
 def write_png(path: str | Path, levels: Numbers, effort: int = 6) -> None:
-    """Write levels unchanged to an 8- or 16-bit PNG file, by dtype.
+    """Write integer levels unchanged to a PNG file of 8 or 16 bits, as given by their type.
 
     levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
-    effort : level of compression, from 1 (fast) to 9 (small files)
+    effort : compression level of zlib, from 1 (fast) to 9 (small files)
     """
     image = levels[..., None] if levels.ndim == 2 else levels
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
@@ -172,7 +178,7 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
     """Write a float32 OpenEXR file with lossless compression.
 
     linear : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
-    fast : compress only runs of equal bytes: twice as fast, and 4 % larger for a rendered head
+    fast : use run-length encoding instead of ZIP: twice as fast, and files of a rendered head are 4 % larger
     """
     import OpenEXR
 
@@ -184,10 +190,10 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
 
 
 def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], fast: bool = False) -> bytes:
-    """Encode several pictures as one float32 OpenEXR file with lossless compression.
+    """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    parts : channels (H, W) by name, by name of the part; other programs show the first part
-    fast : as in `write_exr`
+    parts : for each part by name, its channels (H, W) by name; most programs show only the first part
+    fast : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR
 

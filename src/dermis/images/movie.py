@@ -1,4 +1,4 @@
-"""Movies written on another thread, so that rendering need not wait: H.264 in MP4."""
+"""H.264 movies in MP4 files, encoded on another thread so that rendering need not wait."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
 _BT709, _LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
 _QUEUE_LENGTH = 8
 _MAX_SIDE = 1 << 14  # of a frame in H.264
-_NTSC = tuple(Fraction(1000 * rate, 1001) for rate in (24, 30, 48, 60, 120))
+_NTSC_RATES = tuple(Fraction(1000 * rate, 1001) for rate in (24, 30, 48, 60, 120))
 _NTSC_TOLERANCE = Fraction(5, 1000)
-_RATE = re.compile(
+_RATE_PATTERN = re.compile(
     r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?"
 )  # limits the digits, because exponents of fractions are expensive
 _MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
@@ -43,19 +43,22 @@ def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") ->
     """
     text = str(value).strip() if isinstance(value, str | float | Fraction) else format_value(value)
     try:
-        rate = Fraction(text if _RATE.fullmatch(text) else 0)
+        rate = Fraction(text if _RATE_PATTERN.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
     if not 0 < rate <= _MAX_RATE:
         expected = f"frames a second up to {_MAX_RATE}, such as 30, 23.976 or 24000/1001"
         refuse(culprit, expected, f"got {format_value(text)}", "Correct it")
-    nearest = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
+    nearest = min(_NTSC_RATES, key=lambda ntsc: abs(ntsc - rate))
     rate = nearest if abs(nearest - rate) < _NTSC_TOLERANCE else rate.limit_denominator(_MAX_DENOMINATOR)
     return max(rate, Fraction(1, _MAX_DENOMINATOR))
 
 
 def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
-    """Check that a movie can be written to a path, and return the path; call it before long work.
+    """Check before a long computation that a movie can be written to a path, and return the path.
+
+    size : width and height of the frames [pixel]
+    crf : constant rate factor, from 0 (lossless) to 51
 
     Raises DermisError when the path is not writable, a side is odd, the rate factor is invalid, or there is
     no encoder.
@@ -199,7 +202,7 @@ class MovieWriter:
         self._container.mux(self._stream.encode(frame))
 
     def _finish(self) -> None:
-        """Wait for all frames, and flush the encoder."""
+        """Wait until all queued frames are encoded, and flush the encoder."""
         while self._queue:
             self._queue.popleft().result()
         if self._count == 0:

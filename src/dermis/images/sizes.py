@@ -11,11 +11,11 @@ MAX_TOTAL_PIXELS = 2 * MAX_PIXELS
 
 
 class TooLargeError(ValueError):
-    """Error of a picture that is valid but too large."""
+    """Error for a valid picture with too many pixels."""
 
 
 def check_size(width: int, height: int) -> tuple[int, int]:
-    """Return width and height after checking that they are positive and not too large.
+    """Return the width and height of a picture after checking that they are positive and not too large.
 
     Raises ValueError if there are no pixels, TooLargeError if there are too many.
     """

@@ -1,4 +1,4 @@
-"""Writing of numbered pictures on other threads, with continuation of interrupted sequences."""
+"""Writing of numbered pictures on other threads; an interrupted sequence can be continued."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes, write_ex
 
 _FAST_COMPRESSION = 1  # zlib level
 _QUEUE_PER_THREAD = 4
-_NUMBER = re.compile(r"%(?:0(\d+))?d")
+_NUMBER_PLACEHOLDER = re.compile(r"%(?:0(\d+))?d")
 
 
 class ImageWriter:
-    """Writer that encodes and writes pictures on other threads; leaving its context waits for all.
+    """Context manager that encodes and writes pictures on other threads; its end waits for all pictures.
 
     threads : number of threads, by default one per core
 
@@ -67,7 +67,7 @@ class ImageWriter:
             self._queue.popleft().result()
 
     def _check_folder(self, path: Path) -> None:
-        """Check that a path is writable, once per folder and suffix, as it takes longer than a frame."""
+        """Check that a path is writable, once per folder and suffix, as a check takes longer than a frame."""
         key = path.parent, path.suffix
         if key not in self._checked_folders:
             check_output(path)
@@ -98,16 +98,16 @@ class ImageWriter:
 
 @dataclass(frozen=True)
 class FrameFiles:
-    """Numbered picture files named by a pattern such as frames/%05d.png.
+    """Numbered picture files of a sequence, named by a pattern such as frames/%05d.png.
 
-    A hidden record file stores which content the existing pictures belong to.
+    A hidden record file stores the content key of the sequence to which the existing pictures belong.
     """
 
     pattern: Path
 
     def path(self, number: int) -> Path:
-        """Return the file of a frame."""
-        name = _NUMBER.sub(lambda found: f"{number:0{found[1] or 1}d}", self.pattern.name)
+        """Return the path of the picture with a frame number."""
+        name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{number:0{found[1] or 1}d}", self.pattern.name)
         return self.pattern.with_name(name)
 
     def prepare(self) -> None:
@@ -116,7 +116,7 @@ class FrameFiles:
         Raises DermisError for an invalid pattern, and for a folder that is not writable.
         """
         name = self.pattern.name
-        if len(_NUMBER.findall(name)) != 1 or name.count("%") != 1:
+        if len(_NUMBER_PLACEHOLDER.findall(name)) != 1 or name.count("%") != 1:
             actual = f"the name is {name!r}"
             refuse(self.pattern, "one placeholder for the number", actual, "Write frames/%05d.png")
         if self.pattern.suffix.lower() not in OUTPUT_SUFFIXES:
@@ -129,22 +129,25 @@ class FrameFiles:
         check_output(self.path(0))
 
     def start(self, content_key: str, *, force: bool = False) -> None:
-        """Start a sequence; existing frames are kept if they belong to the same content.
+        """Start or continue a sequence; existing pictures are kept if the record file has its content key.
 
         content_key : text that is equal for sequences with equal frames
-        force : render all frames again
+        force : discard existing pictures in any case
         """
         if force or not self._record_matches(content_key):
             with atomic_file(self._record_path) as temporary:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
-        """Return the numbers of frames that are not complete files of this sequence and size."""
+        """Return those frame numbers whose pictures are not complete files of this sequence.
+
+        size : width and height of the pictures
+        """
         start_ns = self._record_path.stat().st_mtime_ns
         return [number for number in numbers if not _is_complete(self.path(number), size, start_ns)]
 
     def _record_matches(self, content_key: str) -> bool:
-        """Return whether the record file contains this content key."""
+        """Return whether the record file contains a content key."""
         text = content_key.encode()
         try:
             return read_file(self._record_path, "a record of frames", len(text)) == text
@@ -157,7 +160,10 @@ class FrameFiles:
 
 
 def _is_complete(path: Path, size: tuple[int, int], start_ns: int) -> bool:
-    """Return whether a file is a complete picture of this size written since a time."""
+    """Return whether a file is a complete picture of a size, written after the start of its sequence.
+
+    start_ns : modification time of the record file [ns]
+    """
     try:
         if not path.is_file() or path.stat().st_mtime_ns < start_ns:
             return False
