@@ -26,7 +26,7 @@ from dermis.images.io import write_exr
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
-from dermis.specular.fresnel import ENERGY
+from dermis.specular.fresnel import ENERGY_SCHEMES
 
 Floats = NDArray[np.float64]
 SIZE = 32
@@ -139,7 +139,7 @@ def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str
     inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
     seen = middle(download(renderer.device, inputs.resources.post.picture.exposed).astype(float))
     albedo, mean = surface_albedo(np.linspace(0.0, 1, 200), 0.3)
-    expected = ENERGY[energy].furnace_radiance(albedo, mean, rho_s)
+    expected = ENERGY_SCHEMES[energy].furnace_radiance(albedo, mean, rho_s)
     assert seen.min() > expected.min() - FURNACE and seen.max() < expected.max() + FURNACE
     if energy == "full" or rho_s == 0.0:
         assert seen.mean() == pytest.approx(1.0, abs=FURNACE)

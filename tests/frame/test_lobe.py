@@ -20,7 +20,7 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import cosines
-from dermis.specular.fresnel import ENERGY, FRESNEL
+from dermis.specular.fresnel import ENERGY_SCHEMES, FRESNEL
 from dermis.specular.kelemen import kelemen
 from dermis.specular.models import MODELS
 
@@ -101,12 +101,12 @@ def test_kelemen_by_table_near_the_mirror_direction(renderer: Renderer, m: float
     assert worst(lobe, exact) < TABLE_LOBE
 
 
-@pytest.mark.parametrize("energy", ENERGY)
+@pytest.mark.parametrize("energy", ENERGY_SCHEMES)
 @pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow-smith", "phong-plain"])
 def test_shares_that_pass(renderer: Renderer, model: str, energy: str) -> None:
     light, view, m, rho_s = directions(7), directions(8), 0.25, 0.6
     *_, entering, everywhere, leaving = shader(renderer, light, view, m, rho_s, specular=model, energy=energy)
-    law = ENERGY[energy]
+    law = ENERGY_SCHEMES[energy]
     inwards, mean = twins.surface_albedo(light[..., 2], m, model)
     outwards, _ = twins.surface_albedo(view[..., 2], m, model)
     assert worst(entering, law.entering_fraction(inwards, rho_s)) < LOBE_TWIN

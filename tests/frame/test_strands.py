@@ -23,7 +23,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
-from dermis.specular.hair import attenuations, fibre, scattering
+from dermis.specular.hair import fibre_parameters, fibre_scattering, lobe_fractions
 
 Floats = NDArray[np.float64]
 FRAME_MM, SIZE = 40.0, 40  # a pixel is a millimetre, at the sheet
@@ -65,12 +65,15 @@ def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
     seen, white = probe(renderer.device, "hair_probe", (24, 24), ["seen", "white"], **bound)
     depth = drawn[..., 3:] * [0.5, 1.0, 2.0]
     twin = np.array(
-        [[scattering(*d[:3], depth[i, j], fibre()) for j, d in enumerate(row)] for i, row in enumerate(drawn)]
+        [
+            [fibre_scattering(*d[:3], depth[i, j], fibre_parameters()) for j, d in enumerate(row)]
+            for i, row in enumerate(drawn)
+        ]
     )
     assert np.abs(seen[..., :3] - twin).max() < LOBE_TWIN * twin.max()
     h = (np.arange(16) + 0.5) / 8 - 1
     for i, j in ((0, 0), (5, 9), (20, 3)):
-        mean = sum(attenuations(drawn[i, j, 1], np.broadcast_to(depth[i, j], (16, 3)), h)).mean(axis=0)
+        mean = sum(lobe_fractions(drawn[i, j, 1], np.broadcast_to(depth[i, j], (16, 3)), h)).mean(axis=0)
         assert white[i, j, :3] == pytest.approx(mean, abs=LOBE_TWIN)
 
 

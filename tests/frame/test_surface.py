@@ -21,7 +21,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.cosines import cosines
-from dermis.specular.fresnel import ENERGY, FRESNEL
+from dermis.specular.fresnel import ENERGY_SCHEMES, FRESNEL
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -43,14 +43,14 @@ def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
 def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:
     """Return the (3,) radiance from below the surface, and the reflected radiance."""
     to_light = np.array([-0.6, 0.0, 1.0]) / np.sqrt(1.36)
-    arriving, law = 2.0 * to_light[2], ENERGY[energy]
+    arriving, law = 2.0 * to_light[2], ENERGY_SCHEMES[energy]
     entering = law.entering_fraction(twins.surface_albedo([to_light[2]], m, model, fresnel)[0], rho_s)
     leaving = law.exitance_factor(*twins.surface_albedo([1.0], m, model, fresnel), rho_s)
     lobe = MODELS[model].lobe(cosines(Z, to_light, Z), m, FRESNEL[fresnel])
     return arriving * entering * leaving * COLOUR / np.pi, float(arriving * rho_s * lobe)
 
 
-@pytest.mark.parametrize("energy", ENERGY)
+@pytest.mark.parametrize("energy", ENERGY_SCHEMES)
 @pytest.mark.parametrize("fresnel", FRESNEL)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_choice_reaches_the_picture(renderer: Renderer, model: str, fresnel: str, energy: str) -> None:

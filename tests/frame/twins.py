@@ -22,7 +22,7 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
-from dermis.specular.fresnel import ENERGY
+from dermis.specular.fresnel import ENERGY_SCHEMES
 
 Floats = NDArray[np.float64]
 SMOOTH = 1.6
@@ -157,12 +157,12 @@ def surface_albedo(
 
 def enters(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
     """Return the fraction of light from a direction that enters the skin."""
-    return ENERGY["full"].entering_fraction(surface_albedo(cosine, m)[0], rho_s)
+    return ENERGY_SCHEMES["full"].entering_fraction(surface_albedo(cosine, m)[0], rho_s)
 
 
 def leaves(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
     """Return the fraction of uniform light that leaves in a direction."""
-    return ENERGY["full"].exitance_factor(*surface_albedo(cosine, m), rho_s)
+    return ENERGY_SCHEMES["full"].exitance_factor(*surface_albedo(cosine, m), rho_s)
 
 
 def beckmann_by_table(cos_h: Floats, m: float) -> Floats:

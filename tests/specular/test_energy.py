@@ -10,7 +10,7 @@ from tolerances import FURNACE
 
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
-from dermis.specular.fresnel import ENERGY, EnergyModel
+from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyScheme
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -24,21 +24,21 @@ def mean_albedo(m: float, model: str = "kelemen") -> float:
     return float(w @ (directional_albedo(mu, m, MODELS[model].lobe) * mu))
 
 
-def furnace(energy: EnergyModel, views: Floats, m: float, rho_s: float, model: str = "kelemen") -> Floats:
+def furnace(energy: EnergyScheme, views: Floats, m: float, rho_s: float, model: str = "kelemen") -> Floats:
     rho = directional_albedo(views, m, MODELS[model].lobe)
     return energy.furnace_radiance(rho, mean_albedo(m, model), rho_s)
 
 
 def test_published_use_loses_what_others_measured() -> None:
     """Check strength 0.18 and m = 0.3: 0.96 overall and 0.85 at grazing angles, 0.99 if divided by pi."""
-    ends = furnace(ENERGY["published"], np.array([1.0, 0.05]), 0.3, 0.18)
+    ends = furnace(ENERGY_SCHEMES["published"], np.array([1.0, 0.05]), 0.3, 0.18)
     assert ends == pytest.approx([0.96, 0.85], abs=0.005)
-    divided = furnace(EnergyModel(1.0, returned=False), np.array([1.0, 0.05]), 0.3, 0.18)
+    divided = furnace(EnergyScheme(1.0, returns_internal_light=False), np.array([1.0, 0.05]), 0.3, 0.18)
     assert divided == pytest.approx([0.99, 0.99], abs=0.005)
 
 
 def test_without_the_term_skin_gives_more_than_it_gets() -> None:
-    assert (furnace(ENERGY["none"], VIEWS, 0.3, 0.18) > 1.0).all()
+    assert (furnace(ENERGY_SCHEMES["none"], VIEWS, 0.3, 0.18) > 1.0).all()
 
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
@@ -49,7 +49,7 @@ def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
     table, mean = twins.surface_albedo(VIEWS, m, model)
     for rho_s in (0.18, 1.0):
         entered = 1.0 - rho_s * mean_albedo(m, model)
-        out = rho_s * rho + entered * ENERGY["full"].exitance_factor(table, mean, rho_s)
+        out = rho_s * rho + entered * ENERGY_SCHEMES["full"].exitance_factor(table, mean, rho_s)
         assert out.max() < 1.0 + FURNACE
         assert abs((out * VIEWS).sum() / VIEWS.sum() - 1.0) < FURNACE
 
@@ -58,7 +58,7 @@ def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
 @pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "two-lobe"])
 def test_furnace_light_by_light(model: str, view: float) -> None:
     """Sum the whole reflection over light directions, without a quadrature of the model."""
-    m, rho_s, energy = 0.35, 0.7, ENERGY["full"]
+    m, rho_s, energy = 0.35, 0.7, ENERGY_SCHEMES["full"]
     mu, phi = (np.arange(500) + 0.5) / 500, np.pi * (np.arange(240) + 0.5) / 240
     sine = np.sqrt(1 - mu**2)
     light = np.stack(
@@ -78,9 +78,9 @@ def test_dark_skin_gets_no_lighter_than_its_own_colour() -> None:
     """Check that light reflected back inside is dimmed by the skin once."""
     m, rho_s, colour = 0.3, 1.0, 0.2
     rho, mean = directional_albedo(VIEWS, m), mean_albedo(m)
-    below = (1 - rho_s * mean) * colour * ENERGY["full"].exitance_factor(rho, mean, rho_s)
+    below = (1 - rho_s * mean) * colour * ENERGY_SCHEMES["full"].exitance_factor(rho, mean, rho_s)
     assert (below * VIEWS).sum() / VIEWS.sum() == pytest.approx(colour * (1 - mean), rel=0.002)
 
 
 def test_the_published_term_stops_at_nothing() -> None:
-    assert ENERGY["published"].entering_fraction(0.5, 1.0) == 0.0
+    assert ENERGY_SCHEMES["published"].entering_fraction(0.5, 1.0) == 0.0

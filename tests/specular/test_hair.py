@@ -10,11 +10,11 @@ from dermis.base import citations as cite
 from dermis.specular.hair import (
     LONGITUDINAL_ROUGHNESS,
     absorption_per_mm,
-    attenuations,
-    fibre,
-    logistic,
-    longitudinal,
-    scattering,
+    azimuthal_logistic,
+    fibre_parameters,
+    fibre_scattering,
+    lobe_fractions,
+    longitudinal_scattering,
 )
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,9 @@ def albedo(sin_o: float, depth: Floats, roughness: float = LONGITUDINAL_ROUGHNES
     """Return the radiance (3,) under uniform light."""
     (sines, ds), (phi, dphi) = bands(1000, -1, 1), bands(60, -np.pi, np.pi)
     i, p = np.meshgrid(sines, phi, indexing="ij")
-    return np.asarray(scattering(i, sin_o, p, depth, fibre(roughness)).sum(axis=(0, 1)) * ds * dphi)
+    return np.asarray(
+        fibre_scattering(i, sin_o, p, depth, fibre_parameters(roughness)).sum(axis=(0, 1)) * ds * dphi
+    )
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -45,32 +47,37 @@ def test_a_white_hair_gives_back_what_it_gets(angle: float, roughness: float) ->
 @pytest.mark.parametrize("angle", ANGLES)
 def test_shares_of_the_lobes_add_up(angle: float) -> None:
     h = np.linspace(-0.999, 0.999, 101)
-    white = sum(attenuations(np.sin(angle), np.zeros(3), h))
+    white = sum(lobe_fractions(np.sin(angle), np.zeros(3), h))
     assert np.allclose(white, 1.0)
-    dark = sum(attenuations(np.sin(angle), np.array([0.1, 1.0, 10.0]), h))
+    dark = sum(lobe_fractions(np.sin(angle), np.array([0.1, 1.0, 10.0]), h))
     assert (np.diff(dark, axis=-1) < 0).all() and (dark < 1).all()
 
 
-@pytest.mark.parametrize("variance", fibre().variance)
+@pytest.mark.parametrize("variance", fibre_parameters().variance)
 def test_along_the_fibre_nothing_is_lost_and_both_ways_are_one(variance: float) -> None:
     sines, step = bands(20_000, -1, 1)
     for angle in ANGLES:
-        assert longitudinal(sines, np.sin(angle), variance).sum() * step == pytest.approx(1.0, abs=1e-5)
+        assert longitudinal_scattering(sines, np.sin(angle), variance).sum() * step == pytest.approx(
+            1.0, abs=1e-5
+        )
     i, o = np.random.default_rng(0).uniform(-1, 1, (2, 500))
-    assert np.allclose(longitudinal(i, o, variance), longitudinal(o, i, variance))
+    assert np.allclose(longitudinal_scattering(i, o, variance), longitudinal_scattering(o, i, variance))
 
 
 def test_around_the_fibre_nothing_is_lost() -> None:
     phi, step = bands(5000, -np.pi, np.pi)
     for width in (0.05, 0.27, 2.0):
-        assert logistic(phi + 9.0, width).sum() * step == pytest.approx(1.0, abs=1e-6)
+        assert azimuthal_logistic(phi + 9.0, width).sum() * step == pytest.approx(1.0, abs=1e-6)
 
 
 def test_left_and_right_are_alike() -> None:
     rng = np.random.default_rng(1)
     (i, o), phi = rng.uniform(-0.99, 0.99, (2, 300)), rng.uniform(-np.pi, np.pi, 300)
     depth = np.array([0.2, 0.5, 1.0])
-    assert np.allclose(scattering(i, o, phi, depth, fibre()), scattering(i, o, -phi, depth, fibre()))
+    assert np.allclose(
+        fibre_scattering(i, o, phi, depth, fibre_parameters()),
+        fibre_scattering(i, o, -phi, depth, fibre_parameters()),
+    )
 
 
 def test_pigments_colour_hair() -> None:

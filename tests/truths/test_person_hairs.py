@@ -17,7 +17,7 @@ from dermis.apps.truths.person.shapes import (
     hair_shapes,
     write_curves,
 )
-from dermis.specular.hair import fibre, scattering
+from dermis.specular.hair import fibre_parameters, fibre_scattering
 
 pytest.importorskip("mitsuba")
 STEPS = 400
@@ -68,6 +68,6 @@ def test_a_hair_under_even_light_shines_as_our_lobe_does(radius_mm: float) -> No
     sines = (np.arange(STEPS) + 0.5) * 2 / STEPS - 1
     around = (np.arange(STEPS) + 0.5) * 2 * np.pi / STEPS
     s, phi = np.meshgrid(sines, around)
-    lobe = scattering(s, 0.0 * s, phi, depth, fibre())
+    lobe = fibre_scattering(s, 0.0 * s, phi, depth, fibre_parameters())
     expected = lobe.sum(axis=(0, 1)) * (2 / STEPS) * (2 * np.pi / STEPS)
     np.testing.assert_allclose(found[0, 0, :3], expected, rtol=0.04)

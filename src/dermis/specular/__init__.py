@@ -1,1 +1,1 @@
-"""Specular lobes in NumPy and WGSL, with Fresnel reflectance, albedo and energy conservation."""
+"""Specular lobes in NumPy and WGSL, with Fresnel reflectance, directional albedo and energy conservation."""

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 MIN_ROUGHNESS_ROOT = 0.2
 TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
 TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
-"""Columns and rows of the shader's table, uniform in the square root to resolve grazing angles."""
+"""Cosines and roughnesses of `albedo_table`, uniform in the square root to resolve grazing angles."""
 
 _TABLE_NODES = (24, 12)
 _MIN_COSINE = 1e-3
@@ -32,12 +32,14 @@ def directional_albedo(
     """Return the directional-hemispherical reflectance rho_dt of a lobe for rho_s = 1 [-].
 
     cos_theta : cosine of the exitant angle or, equally for reciprocal models, of the incident angle
-    m : roughness; broadcast against cos_theta
-    nodes : numbers of quadrature nodes along and across the plane of incidence
+    m : roughness; broadcast against cos_theta [-]
+    lobe : BRDF that is integrated
+    fresnel : Fresnel reflectance of the lobe
+    nodes : number of quadrature nodes along and across the plane of incidence
 
     The integral runs over the slopes (x, y) of the half vector, where lobes are smooth and of width m. The
     light is above the surface for slopes within a circle of radius 1 / cos theta around (tan theta, 0).
-    Gauss-Legendre rules in atan(x / m) and atan(y / m) between its borders resolve narrow peaks and grazing
+    Gauss-Legendre rules in atan(x / m) and atan(y / m) over this circle resolve narrow peaks and grazing
     angles, unlike the 80 x 80 directions of the published rule.
 
     Source: [dEonLuebke2007] section 14.3 for the quantity.
@@ -59,7 +61,10 @@ def directional_albedo(
 
 
 def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
-    """Return quadrature nodes and weights between two slopes, dense within m of 0, on the last axis."""
+    """Return quadrature nodes and weights for slopes from `low` to `high`, on the last axis.
+
+    The nodes are dense within m of slope 0, where lobes of roughness m have their peak.
+    """
     nodes_unit, weight = np.polynomial.legendre.leggauss(nodes)
     first, last = np.arctan(low / m), np.arctan(high / m)
     t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * nodes_unit)
@@ -68,11 +73,11 @@ def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple
 
 @cache
 def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np.float32]:
-    """Return the shader's table (roughness, cosine, 2) of the directional albedo and the mean albedo.
+    """Return the shader's table (roughness, cosine, 2) of directional albedo and mean albedo [-].
 
-    Rows and columns are TABLE_ROUGHNESSES and TABLE_COSINES.
+    Roughnesses and cosines are TABLE_ROUGHNESSES and TABLE_COSINES.
 
-    model, fresnel : names in MODELS and FRESNEL
+    model, fresnel : names of the specular model and of the Fresnel function, in MODELS and FRESNEL
     """
     lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
     # row by row, so that the nodes fit into the CPU's cache

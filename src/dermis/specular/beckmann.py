@@ -1,4 +1,4 @@
-"""Beckmann distribution of microfacet slopes, and its table for the shader."""
+"""Beckmann distribution of microfacet slopes, and its texture for the shader."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _EXPONENT = 0.1
 
 
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
-    """Return exp(-tan^2 / m^2) / (m^2 cos^4), without the 1/pi of a normalised distribution [-].
+    """Return the Beckmann distribution exp(-tan^2 / m^2) / (m^2 cos^4) without its factor 1/pi [-].
 
-    cos_h : cosine between normal and half vector
-    m : roughness, the root mean square slope
+    cos_h : cosine between normal and half vector; the tangent is that of the same angle
+    m : roughness, the root mean square slope [-]
 
     Source: [Beckmann1963], in the form of [dEonLuebke2007] section 14.3.
     """
@@ -28,10 +28,11 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def beckmann_table(size: int = TABLE_SIZE) -> NDArray[np.float32]:
-    """Return the table (size, size) of beckmann(x, y)^0.1 / 2 for the shader.
+    """Return beckmann(cos_h, m)^0.1 / 2 as a table (size, size) for the shader.
 
     Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
-    texel centres. The power flattens the peak for accurate interpolation; the value is decoded as (2 t)^10.
+    texel centres. The power flattens the peak for accurate interpolation; the shader decodes a value t as (2
+    t)^10.
 
     Source: [dEonLuebke2007] section 14.3.
     """

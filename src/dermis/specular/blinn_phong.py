@@ -1,4 +1,4 @@
-"""Blinn-Phong lobes: the original highlight and an energy-conserving version."""
+"""Blinn-Phong lobes: the original highlight, and a normalised BRDF that conserves energy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dermis.specular.models import Model
 
 
 def exponent(m: ArrayLike) -> Floats:
-    """Return the exponent s of a cosine lobe as wide as a Beckmann lobe of roughness m: 2 / m^2 - 2 [-].
+    """Return the Blinn-Phong exponent s = 2 / m^2 - 2 of the lobe as wide as Beckmann's of roughness m [-].
 
     Source: [Walter2007] section 5.2.
     """
@@ -19,33 +19,36 @@ def exponent(m: ArrayLike) -> Floats:
 
 
 def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
+    """Return the normalised Blinn-Phong BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
 
-    m : roughness, broadcast against the angles [-]
+    m : roughness, from which `exponent` yields s; broadcast against the angles [-]
+    fresnel : function that returns F from the cosine v.h
 
-    The factor is that of a normalised slope distribution divided by 4. Without masking and division by both
-    cosines the lobe fades at grazing angles, where that of skin does not.
+    The factor (s + 2) / 8 pi is a quarter of that of a normalised slope distribution. The lobe has no masking
+    and no division by n.l n.v, so it fades at grazing angles, where that of skin does not.
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
     s = exponent(m)
-    lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power(angles, s)
+    lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(angles, s)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the highlight F (n.h)^s of early renderers as a BRDF, divided by n.l [1/sr].
+    """Return the original Blinn-Phong highlight F (n.h)^s as a BRDF, divided by pi n.l [1/sr].
 
-    The highlight has no factor n.l, so the BRDF is not reciprocal. It was added to a diffuse term without
-    1/pi; here both are divided by pi.
+    m : roughness, from which `exponent` yields s; broadcast against the angles [-]
+
+    The original highlight has no factor n.l, so the BRDF is not reciprocal. Early renderers added it to a
+    diffuse term without 1/pi; here both terms are divided by pi.
 
     Source: [Blinn1977].
     """
-    lobe = fresnel(angles.v_h) * _power(angles, exponent(m)) / (np.pi * np.maximum(angles.n_l, 1e-6))
+    lobe = fresnel(angles.v_h) * _power_of_n_h(angles, exponent(m)) / (np.pi * np.maximum(angles.n_l, 1e-6))
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 
-def _power(angles: Cosines, s: Floats) -> Floats:
+def _power_of_n_h(angles: Cosines, s: Floats) -> Floats:
     return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** s)
 
 

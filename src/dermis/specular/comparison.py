@@ -1,4 +1,4 @@
-"""Numbers that compare the specular models."""
+"""Properties of the specular models for a comparison: peak, reciprocity error and directional albedo."""
 
 from __future__ import annotations
 
@@ -14,32 +14,35 @@ from dermis.specular.models import MODELS
 Floats = NDArray[np.float64]
 ROUGHNESSES = np.round(np.arange(1, 6) / 10, 1)
 COSINES = np.round(np.arange(1, 21) / 20, 2)
-_PAIRS = 4000
-_UP = np.array([0.0, 0.0, 1.0])
+_DIRECTION_PAIRS = 4000
+_NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def normal_incidence_peak(model: str, m: float) -> float:
-    """Return the BRDF for light and view along the normal, for rho_s = 1 [1/sr]."""
-    return float(MODELS[model].lobe(cosines(_UP, _UP, _UP), m))
+    """Return the BRDF of a model for light and view along the normal, for rho_s = 1 [1/sr]."""
+    return float(MODELS[model].lobe(cosines(_NORMAL, _NORMAL, _NORMAL), m))
 
 
 def reciprocity_error(model: str) -> float:
-    """Return the largest change of the BRDF when light and view are exchanged, relative to its maximum [-].
+    """Return the largest change of a model's BRDF when light and view are exchanged, over its maximum [-].
 
-    Directions are up to 85 degrees from the normal, with all ROUGHNESSES.
+    Light and view are random directions up to 85 degrees from the normal; the roughnesses are ROUGHNESSES.
     """
     rng = np.random.default_rng(1)
-    l, v = (_directions(rng) for _ in range(2))
+    l, v = (_random_directions(rng) for _ in range(2))
     lobe = MODELS[model].lobe
     errors = []
     for m in ROUGHNESSES:
-        forward, backward = lobe(cosines(_UP, l, v), m), lobe(cosines(_UP, v, l), m)
+        forward, backward = lobe(cosines(_NORMAL, l, v), m), lobe(cosines(_NORMAL, v, l), m)
         errors.append(np.abs(forward - backward).max() / max(forward.max(), backward.max()))
     return float(max(errors))
 
 
 def albedo_rows(model: str) -> list[dict[str, float]]:
-    """Return `directional_albedo` over ROUGHNESSES and COSINES as rows with m, cos_theta and rho."""
+    """Return the directional albedo rho of a model at all ROUGHNESSES m and COSINES cos_theta.
+
+    Each row of the result has the keys m, cos_theta and rho, for a CSV file.
+    """
     rho = directional_albedo(COSINES, ROUGHNESSES[:, None], MODELS[model].lobe)
     return [
         {"m": float(m), "cos_theta": float(c), "rho": float(rho[i, k])}
@@ -48,7 +51,10 @@ def albedo_rows(model: str) -> list[dict[str, float]]:
     ]
 
 
-def _directions(rng: Any) -> Floats:
-    cosine, phi = rng.uniform(np.cos(np.radians(85)), 1.0, _PAIRS), rng.uniform(0, 2 * np.pi, _PAIRS)
+def _random_directions(rng: Any) -> Floats:
+    cosine, phi = (
+        rng.uniform(np.cos(np.radians(85)), 1.0, _DIRECTION_PAIRS),
+        rng.uniform(0, 2 * np.pi, _DIRECTION_PAIRS),
+    )
     sine = np.sqrt(1.0 - cosine**2)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)

@@ -1,4 +1,4 @@
-"""Cosines between normal, light, view and half vector."""
+"""Cosines between normal, light, view and half vector, from which lobes are evaluated."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cosines:
-    """Cosines between normal n, light l, view v and half vector h = (l + v) / |l + v|, of equal shape.
+    """Cosines n.l, n.v, n.h and v.h of the normal n, light l, view v and half vector h, of one array shape.
 
-    They suffice for isotropic microfacet lobes, as l.v is 2 v_h^2 - 1.
+    The half vector is (l + v) / |l + v|. These cosines suffice for isotropic microfacet lobes, as l.v is 2
+    (v.h)^2 - 1.
     """
 
     n_l: Floats
@@ -24,12 +25,15 @@ class Cosines:
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """Return the mask of light and view directions that are both above the surface."""
+        """Return the mask of directions for which both light and view are above the surface."""
         return (self.n_l > 0.0) & (self.n_v > 0.0)
 
 
 def cosines(n: Floats, l: Floats, v: Floats) -> Cosines:
-    """Return the cosines of unit vectors (..., 3): normal, direction to the light, and to the viewer."""
+    """Return the cosines for a normal n, a direction l to the light and v to the viewer.
+
+    n, l, v : (..., 3) unit vectors
+    """
     h = l + v
     unit = h / np.sqrt(np.maximum((h * h).sum(-1), 1e-12))[..., None]
     n_l, n_v, n_h, v_h = ((a * b).sum(-1) for a, b in ((n, l), (n, v), (n, unit), (v, unit)))

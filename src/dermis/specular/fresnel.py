@@ -20,9 +20,12 @@ SKIN_ETA = 1.4
 
 
 def schlick(cos_theta: ArrayLike, f0: float = SKIN_F0) -> Floats:
-    """Return Schlick's approximation of the Fresnel reflectance [-]. Source: [Schlick1994].
+    """Return Schlick's approximation of the Fresnel reflectance [-].
 
     cos_theta : cosine between view and half vector
+    f0 : reflectance at normal incidence [-]
+
+    Source: [Schlick1994].
     """
     c = np.clip(np.asarray(cos_theta, dtype=np.float64), 0.0, 1.0)
     reflectance: Floats = f0 + (1.0 - f0) * (1.0 - c) ** 5
@@ -32,7 +35,8 @@ def schlick(cos_theta: ArrayLike, f0: float = SKIN_F0) -> Floats:
 def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
     """Return the exact Fresnel reflectance for unpolarised light from air onto a dielectric [-].
 
-    eta : index of refraction, 1 or more
+    cos_theta : cosine between view and half vector
+    eta : index of refraction of the dielectric, 1 or more [-]
 
     Source: [CookTorrance1982], in their form for unpolarised light.
     """
@@ -48,54 +52,71 @@ FRESNEL: dict[str, Fresnel] = {"schlick": schlick, "exact": dielectric}
 
 
 def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) -> float:
-    """Return the reflectance of a smooth surface under uniform illumination, 2 int F mu dmu [-]."""
+    """Return the reflectance 2 int F(mu) mu dmu of a smooth surface under a uniform sky [-].
+
+    fresnel : function that returns F from the cosine mu of incidence
+    nodes : number of quadrature nodes
+    """
     x, w = np.polynomial.legendre.leggauss(nodes)
     mu = 0.5 * (x + 1.0)
     return float(w @ (fresnel(mu) * mu))
 
 
 @dataclass(frozen=True)
-class EnergyModel:
-    """Energy conservation of the diffuse light below a specular lobe.
+class EnergyScheme:
+    """Energy conservation scheme, which reduces diffuse light by the light that the specular lobe reflects.
 
-    f = (1 - loss rho_s rho_dt(n.l)) (1 - loss rho_s rho_dt(n.v)) / (pi c), where c = 1 unless `returned`
-    divides by the mean of the second factor.
+    The diffuse BRDF is albedo / pi times (1 - k rho_dt(n.l)) (1 - k rho_dt(n.v)) / c, with the directional
+    albedo rho_dt of the lobe and k = `loss` times the specular strength rho_s. The divisor c is 1 minus k
+    times the mean albedo if `returns_internal_light` is true, otherwise 1.
 
-    loss : factor of the lobe's albedo: 0 for no correction, 1, or pi
-    returned : whether light that the surface reflects back inside leaves the skin later
+    loss : factor of the reflected light: 0 for no conservation, 1 for the light of the lobe, pi as published
+    returns_internal_light : whether light that the surface reflects back into the skin leaves it later;
+        otherwise it is lost
     """
 
     loss: float
-    returned: bool
+    returns_internal_light: bool
 
     def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
-        """Return the fraction of light from a direction that enters the skin, from the lobe's albedo [-]."""
+        """Return the fraction of light from a direction that enters the skin [-].
+
+        albedo : directional albedo of the lobe for this direction [-]
+        rho_s : specular strength [-]
+        """
         return np.maximum(0.0, 1.0 - self.loss * rho_s * np.asarray(albedo, float))
 
     def exitance_factor(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
-        """Return the factor by which the surface scales diffuse radiance that leaves in a direction [-].
+        """Return the factor by which the surface scales diffuse radiance towards a viewer [-].
 
-        albedo : directional albedo of the lobe
-        mean : mean albedo, cosine-weighted
-        rho_s : specular strength
+        albedo : directional albedo of the lobe for the direction to the viewer [-]
+        mean : mean albedo of the lobe, cosine-weighted over the hemisphere [-]
+        rho_s : specular strength [-]
         """
-        lost = self.loss * rho_s * np.asarray(mean, float) if self.returned else 0.0
+        lost = self.loss * rho_s * np.asarray(mean, float) if self.returns_internal_light else 0.0
         return np.asarray(self.entering_fraction(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))
 
     def furnace_radiance(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
-        """Return the outgoing radiance of white skin under uniform incoming radiance 1 [-]."""
+        """Return the radiance of white skin under uniform incident radiance of 1 [-].
+
+        The result is 1 if the scheme conserves energy (white furnace test).
+
+        albedo : directional albedo of the lobe for the direction to the viewer [-]
+        mean : mean albedo of the lobe [-]
+        rho_s : specular strength [-]
+        """
         inside = 1.0 - self.loss * rho_s * np.asarray(mean, float)
         return np.asarray(
             rho_s * np.asarray(albedo, float) + inside * self.exitance_factor(albedo, mean, rho_s)
         )
 
 
-ENERGY: dict[str, EnergyModel] = {
-    "none": EnergyModel(0.0, returned=False),
-    "published": EnergyModel(np.pi, returned=False),
-    "full": EnergyModel(1.0, returned=True),
+ENERGY_SCHEMES: dict[str, EnergyScheme] = {
+    "none": EnergyScheme(0.0, returns_internal_light=False),
+    "published": EnergyScheme(np.pi, returns_internal_light=False),
+    "full": EnergyScheme(1.0, returns_internal_light=True),
 }
-"""Energy models by their names in scene files.
+"""Energy conservation schemes by their names in scene files.
 
 `published` uses rho_dt of the book [dEonLuebke2007], whose lobe and integral lack 1/pi, and so overestimates
 the loss by pi for diffuse light that is divided by pi. `full` has the factor and also returns the light that

@@ -1,4 +1,4 @@
-"""Scattering of a hair fibre: a rough, absorbing dielectric cylinder in the far field."""
+"""Light scattering by a hair fibre: a rough, absorbing dielectric cylinder, seen from afar."""
 
 from __future__ import annotations
 
@@ -9,32 +9,36 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-ETA = 1.55
+KERATIN_ETA = 1.55
 """Index of refraction of keratin [Marschner2003]."""
-TILT = np.radians(2.0)
+CUTICLE_TILT = np.radians(2.0)
 """Tilt of the scales of the cuticle towards the tip [rad]."""
 LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
-"""Perceptual roughness along and around the fibre, 0 to 1 [Chiang2016]."""
+"""Default perceptual roughness along and around the fibre, 0 to 1 [Chiang2016]."""
 FIBRE_SAMPLES = 16
-"""Number of rays across the fibre, also in hair.wgsl."""
+"""Number of rays across the width of the fibre over which scattering is averaged."""
 _MIN_COS_SQUARED = 1e-5
 _EUMELANIN, _PHEOMELANIN = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
-_REFERENCE_RADIUS_MM = 0.04  # radius of the hairs to which these absorptions per radius apply
+_REFERENCE_RADIUS_MM = 0.04  # radius of a hair, over which the absorptions above are given
 
 
 class FibreParameters(NamedTuple):
-    """Widths of a fibre's scattering lobes.
+    """Widths of the scattering lobes of a hair fibre.
 
-    variance : longitudinal, of the lobes R, TT, TRT and all further ones
-    width : of the azimuthal logistic distribution [rad]
+    variance : longitudinal variance of the lobes R, TT, TRT and of all lobes with more internal reflections
+    width : scale of the azimuthal logistic distribution [rad]
     """
 
     variance: tuple[float, float, float, float]
     width: float
 
 
-def fibre(along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS) -> FibreParameters:
-    """Return the lobe widths of a fibre by its longitudinal and azimuthal roughness.
+def fibre_parameters(
+    along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS
+) -> FibreParameters:
+    """Return the lobe widths of a fibre from its perceptual roughness along and around its axis.
+
+    along, around : longitudinal and azimuthal roughness, 0 to 1 [-]
 
     Source: [Chiang2016] equations 7 and 8.
     """
@@ -44,33 +48,35 @@ def fibre(along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGH
 
 
 def hair_constants() -> dict[str, float]:
-    """Return the constants that are filled into hair.wgsl."""
-    default = fibre()
+    """Return the values of the placeholders in hair.wgsl, by name."""
+    default = fibre_parameters()
     return {
-        "hair_eta": ETA,
+        "hair_eta": KERATIN_ETA,
         "hair_width": default.width,
         "hair_logistic_norm": float(1.0 / np.tanh(np.pi / (2 * default.width))),
         "hair_variance": default.variance[0],
-        "hair_tilt": float(TILT),
+        "hair_tilt": float(CUTICLE_TILT),
         "hair_samples": FIBRE_SAMPLES,
     }
 
 
 def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
-    """Return the absorption (..., 3) of the inside of hairs from concentrations of pigments [1/mm].
+    """Return the absorption coefficient (..., 3) inside hairs from their pigment concentrations [1/mm].
 
-    Eumelanin of 0.3 is blond, 1.3 brown, 8 black; pheomelanin of 2 alone is red. Source: [dEon2011] section
-    6.1.
+    eumelanin : concentration of brown pigment: 0.3 is blond, 1.3 brown, 8 black
+    pheomelanin : concentration of red pigment: 2 without eumelanin is red
+
+    Source: [dEon2011] section 6.1.
     """
     brown, red = (np.asarray(c, float)[..., None] for c in (eumelanin, pheomelanin))
     return np.asarray((brown * _EUMELANIN + red * _PHEOMELANIN) / _REFERENCE_RADIUS_MM)
 
 
-def longitudinal(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
-    """Return the longitudinal scattering function, which integrates to 1 over the light's cosines.
+def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
+    """Return the longitudinal scattering function, which integrates to 1 over the sine of the light [-].
 
-    sin_i, sin_o : sines of light and view along the fibre
-    v : variance
+    sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
+    v : variance of the lobe
 
     Source: [dEon2011] equation 7.
     """
@@ -80,34 +86,44 @@ def longitudinal(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
     return np.asarray(np.i0(a) * np.exp(-a) * np.exp(a - i * o / v - 1 / v) / (v * -np.expm1(-2 / v)))
 
 
-def logistic(x: ArrayLike, width: float) -> Floats:
-    """Return the logistic distribution over angles, truncated to (-pi, pi) [1/rad]. Source: [Chiang2016]."""
+def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
+    """Return the logistic distribution of azimuths x, truncated to (-pi, pi) [1/rad].
+
+    width : scale of the distribution [rad]
+
+    Source: [Chiang2016].
+    """
     wrapped = np.abs(np.mod(np.asarray(x, float) + np.pi, 2 * np.pi) - np.pi)
     e = np.exp(-wrapped / width)
     return np.asarray(e / (width * (1 + e) ** 2) / np.tanh(np.pi / (2 * width)))
 
 
 def fresnel(cosine: ArrayLike) -> Floats:
-    """Return the Fresnel reflectance of the cuticle for a cosine of incidence [-]."""
+    """Return the Fresnel reflectance of keratin at a cosine of incidence [-]."""
     c = np.clip(np.asarray(cosine, float), 0.0, 1.0)
-    t = np.sqrt(1 - (1 - c * c) / ETA**2)
-    parallel, across = (ETA * c - t) / (ETA * c + t), (c - ETA * t) / (c + ETA * t)
+    t = np.sqrt(1 - (1 - c * c) / KERATIN_ETA**2)
+    parallel, across = (
+        (KERATIN_ETA * c - t) / (KERATIN_ETA * c + t),
+        (c - KERATIN_ETA * t) / (c + KERATIN_ETA * t),
+    )
     return np.asarray(0.5 * (parallel**2 + across**2))
 
 
-def attenuations(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Floats]:
-    """Return the fractions (..., 3) of light in the lobes R, TT, TRT and all further ones.
+def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Floats]:
+    """Return the fractions (..., 3) of light in the lobes R, TT and TRT, and in all further lobes together.
 
-    sin_o : sine of the view along the fibre
-    depth : (..., 3) absorption over a radius
-    h : offset of the incident ray across the fibre, -1 to 1
+    R is reflected, TT transmitted, and TRT reflected once inside. Without absorption the fractions sum to 1.
 
-    Without absorption they sum to 1. Source: [Chiang2016] section 4.
+    sin_o : sine of the inclination of the view
+    depth : (..., 3) absorption coefficient times the radius of the fibre [-]
+    h : offset of the incident ray from the fibre's axis, over the radius, -1 to 1 [-]
+
+    Source: [Chiang2016] section 4.
     """
     o, h = np.asarray(sin_o, float), np.asarray(h, float)
     cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
-    sin_inner = h * cos_o / np.sqrt(ETA**2 - o * o)
-    path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / ETA) ** 2)
+    sin_inner = h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o)
+    path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / KERATIN_ETA) ** 2)
     attenuation = np.exp(-np.asarray(depth, float) * path_length[..., None])
     f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
     transmitted = (1 - f) ** 2 * attenuation
@@ -116,35 +132,40 @@ def attenuations(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Float
     return [np.broadcast_to(f, attenuation.shape), transmitted, internal, residual]
 
 
-def scattering(
+def fibre_scattering(
     sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, parameters: FibreParameters
 ) -> Floats:
-    """Return the radiance (..., 3) per irradiance, averaged over the fibre's width [1/sr].
+    """Return the radiance (..., 3) of a fibre per irradiance, averaged over its width [1/sr].
 
-    sin_i, sin_o : sines of light and view along the fibre, towards its tip
-    phi : azimuth between them [rad]
-    depth : (3,) absorption over a radius
+    sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
+    phi : azimuth from light to view around the fibre [rad]
+    depth : (3,) absorption coefficient times the radius of the fibre [-]
+    parameters : widths of the lobes
 
     The irradiance is that of a plane that faces the light. The cosine of incidence on the fibre is included:
-    without absorption the integral over all light directions is 1. Source: [Marschner2003], with the terms of
-    [dEon2011, Chiang2016].
+    without absorption the integral over all light directions is 1.
+
+    Source: [Marschner2003], with the terms of [dEon2011, Chiang2016].
     """
     i, o, phi = np.broadcast_arrays(*(np.asarray(x, float) for x in (sin_i, sin_o, phi)))
     cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
     total = np.zeros((*o.shape, 3))
     for h in (np.arange(FIBRE_SAMPLES) + 0.5) * 2 / FIBRE_SAMPLES - 1:
-        entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(ETA**2 - o * o))
-        for p, term in enumerate(attenuations(o, depth, np.full(o.shape, h))):
+        entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o))
+        for p, term in enumerate(lobe_fractions(o, depth, np.full(o.shape, h))):
             exit_azimuth = 2 * p * inner - 2 * entry + p * np.pi
             around = np.full(o.shape, 0.5 / np.pi)
             if p < 3:
-                around = logistic(phi - exit_azimuth, parameters.width)
-            along = longitudinal(i, tilted_sine(o, p), parameters.variance[p])
+                around = azimuthal_logistic(phi - exit_azimuth, parameters.width)
+            along = longitudinal_scattering(i, tilted_sine(o, p), parameters.variance[p])
             total += term * (along * around / FIBRE_SAMPLES)[..., None]
     return total
 
 
 def tilted_sine(sin_o: ArrayLike, p: int) -> Floats:
-    """Return the sine of the view corrected for the tilt of the cuticle's scales, for lobe p."""
+    """Return the sine of the view's inclination, corrected for the tilt of the cuticle's scales.
+
+    p : index of the lobe: 0 for R, 1 for TT, 2 for TRT, 3 for all further lobes
+    """
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
-    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * TILT))
+    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * CUTICLE_TILT))

@@ -1,4 +1,4 @@
-"""Kelemen and Szirmay-Kalos lobe."""
+"""Specular lobe of Kelemen and Szirmay-Kalos with Beckmann slopes, as in the published skin shader."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dermis.specular.models import Model
 
 
 def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF for rho_s = 1, without the cosine [1/sr].
+    """Return the BRDF D F / (4 pi (v.h)^2) for rho_s = 1, without the cosine of the light [1/sr].
 
-    m : roughness, broadcast against the angles [-]
+    m : roughness of the Beckmann distribution D; broadcast against the angles [-]
+    fresnel : function that returns F from the cosine v.h
 
-    f = D F / (h.h) with the unnormalised h = l + v, so h.h = 4 (v.h)^2 of the unit half vector. The published
-    lobe omits the 1/pi of the Beckmann distribution, as its diffuse term does; here both have it, so their
-    ratio is the published one.
+    The denominator is pi |l + v|^2. The published lobe omits the 1/pi of the Beckmann distribution, as its
+    diffuse term omits 1/pi; here both have it, so the ratio of the two terms is the published one.
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """

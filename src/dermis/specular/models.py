@@ -1,4 +1,4 @@
-"""Registry of the specular models."""
+"""Registry of the specular models by their names in scene files."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 
 class Lobe(Protocol):
-    """BRDF for rho_s = 1, without the cosine [1/sr]; 0 unless light and view are above the surface."""
+    """Specular BRDF for rho_s = 1, without the cosine of the light [1/sr]; 0 below the surface."""
 
     def __call__(self, angles: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
-        """Return the BRDF for an array of angles.
+        """Return the BRDF for arrays of cosines.
 
+        angles : cosines between normal, light, view and half vector
         m : roughness, broadcast against the angles [-]
+        fresnel : function from the cosine between view and half vector to the Fresnel reflectance
         """
 
 
@@ -32,20 +34,20 @@ class Model:
     """Specular model: a lobe, its shader and its description.
 
     The shader has the file name of the lobe's module and defines `fn NAME(a: Angles, m: f32) -> f32`, where
-    NAME is the name in scene files with underscores for hyphens.
+    NAME is the model's name in scene files with underscores for hyphens.
 
     Parameters
     ----------
     lobe : Lobe
-        The BRDF in NumPy.
+        BRDF in NumPy.
     note : str
-        Short description; for a lobe that is not reciprocal with the reason.
+        Short description; for a lobe that is not reciprocal, also the reason for this.
     reciprocal : bool
-        Whether light and view may be exchanged.
+        Whether the BRDF is unchanged when light and view are exchanged.
     sources : tuple of str
         Keys of the bibliography.
     numbers : mapping
-        Constants that are filled into the shader.
+        Values of the placeholders in the shader, by name.
 
     Examples
     --------
@@ -62,7 +64,7 @@ class Model:
 
     @property
     def shader(self) -> Path:
-        """Return the path of the shader."""
+        """Return the path of the WGSL file that implements the lobe."""
         return Path(inspect.getfile(self.lobe)).with_suffix(".wgsl")
 
 

@@ -1,4 +1,4 @@
-"""Phong lobes: the original highlight and an energy-conserving version."""
+"""Phong lobes: the original highlight, and a normalised BRDF that conserves energy."""
 
 from __future__ import annotations
 
@@ -12,31 +12,35 @@ from dermis.specular.models import Model
 
 
 def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF with a normalisation (s + 2) / 2 pi that reflects F at normal incidence [1/sr].
+    """Return the Phong BRDF F (s + 2) / 2 pi (r.v)^s with the mirrored light direction r [1/sr].
 
-    m : roughness; s is a quarter of `exponent(m)`, as the mirror direction rotates twice as far as h
+    The factor (s + 2) / 2 pi makes the lobe reflect F at normal incidence.
 
-    Source: [LafortuneWillems1994], with the Fresnel reflectance of v.h, which keeps it reciprocal.
+    m : roughness; s is a quarter of `exponent(m)`, as r rotates twice as far as the half vector
+    fresnel : function that returns F from the cosine v.h, which keeps the BRDF reciprocal
+
+    Source: [LafortuneWillems1994].
     """
     s = 0.25 * exponent(m)
-    lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power(angles, s)
+    lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power_of_r_v(angles, s)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 
 def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the highlight W(i) cos^s of 1975 as a BRDF, divided by n.l [1/sr].
+    """Return the highlight W(i) (r.v)^s of 1975 as a BRDF, divided by pi n.l [1/sr].
 
-    W(i) is the Fresnel reflectance of the angle of incidence. That and the division make it not reciprocal.
-    It was added to a diffuse term without 1/pi; here both are divided by pi.
+    r is the mirrored light direction, s a quarter of `exponent(m)`, and W(i) the Fresnel reflectance at the
+    angle of incidence i. W(i) and the division by n.l make the BRDF not reciprocal. The original highlight
+    was added to a diffuse term without 1/pi; here both terms are divided by pi.
 
     Source: [Phong1975].
     """
     n_l = np.maximum(angles.n_l, 1e-6)
-    lobe = fresnel(n_l) * _power(angles, 0.25 * exponent(m)) / (np.pi * n_l)
+    lobe = fresnel(n_l) * _power_of_r_v(angles, 0.25 * exponent(m)) / (np.pi * n_l)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 
-def _power(angles: Cosines, s: Floats) -> Floats:
+def _power_of_r_v(angles: Cosines, s: Floats) -> Floats:
     """Return (r.v)^s, with the mirrored light direction r."""
     r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** s)

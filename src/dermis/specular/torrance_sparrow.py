@@ -12,25 +12,27 @@ from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
 
-_GRAZING = 1e-6
+_MIN_COSINE = 1e-6
 
 
 def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF D F G / (4 n.l n.v) with V-cavity masking [1/sr].
+    """Return the BRDF D F G / (4 n.l n.v) with Beckmann's distribution D and V-cavity masking G [1/sr].
 
     m : roughness, broadcast against the angles [-]
+    fresnel : function that returns F from the cosine v.h
 
     Source: [TorranceSparrow1967]; masking in the form of [Blinn1977].
     """
-    n_l, n_v = _raised(angles)
-    groove = 2.0 * angles.n_h * np.minimum(n_l, n_v) / np.maximum(angles.v_h, _GRAZING)
-    return _lobe(angles, beckmann(angles.n_h, m), fresnel, np.minimum(1.0, groove))
+    n_l, n_v = _clamped_cosines(angles)
+    groove = 2.0 * angles.n_h * np.minimum(n_l, n_v) / np.maximum(angles.v_h, _MIN_COSINE)
+    return _microfacet_brdf(angles, beckmann(angles.n_h, m), fresnel, np.minimum(1.0, groove))
 
 
 def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith masking [1/sr].
+    """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith masking G1 [1/sr].
 
-    m : roughness, broadcast against the angles [-]
+    m : roughness of the Beckmann distribution D; broadcast against the angles [-]
+    fresnel : function that returns F from the cosine v.h
 
     Source: [Walter2007] section 5; [Smith1967].
     """
@@ -40,13 +42,21 @@ def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = sch
 def masked_lobe(
     angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
 ) -> Floats:
-    """Return the BRDF for a slope distribution `slopes` / pi and a masking function of the cosine [1/sr]."""
-    n_l, n_v = _raised(angles)
-    return _lobe(angles, slopes, fresnel, masking(n_l) * masking(n_v))
+    """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) for any distribution D and masking G1 [1/sr].
+
+    slopes : values of pi D
+    fresnel : function that returns F from the cosine v.h
+    masking : function that returns G1 from the cosine n.l or n.v
+    """
+    n_l, n_v = _clamped_cosines(angles)
+    return _microfacet_brdf(angles, slopes, fresnel, masking(n_l) * masking(n_v))
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
-    """Return the visible fraction of facets G1 in a direction, exact for Beckmann slopes [-].
+    """Return Smith's masking G1, the fraction of facets visible from a direction [-].
+
+    cos_theta : cosine of the direction from the normal
+    m : roughness of Beckmann's slope distribution, for which G1 is exact [-]
 
     Source: [Smith1967]; [Walter2007] section 5.2, before its rational approximation.
     """
@@ -57,13 +67,13 @@ def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     return np.asarray(2.0 / (1.0 + erf(a) + np.exp(-(a**2)) / (a * np.sqrt(np.pi))))
 
 
-def _raised(angles: Cosines) -> tuple[Floats, Floats]:
-    """Return the cosines of light and view, clamped to a positive minimum."""
-    return np.maximum(angles.n_l, _GRAZING), np.maximum(angles.n_v, _GRAZING)
+def _clamped_cosines(angles: Cosines) -> tuple[Floats, Floats]:
+    """Return n.l and n.v, clamped to a small positive minimum to avoid divisions by 0."""
+    return np.maximum(angles.n_l, _MIN_COSINE), np.maximum(angles.n_v, _MIN_COSINE)
 
 
-def _lobe(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) -> Floats:
-    n_l, n_v = _raised(angles)
+def _microfacet_brdf(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) -> Floats:
+    n_l, n_v = _clamped_cosines(angles)
     lobe = slopes / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
     return np.where(angles.above, lobe, 0.0)
 

@@ -1,4 +1,4 @@
-"""Two-lobe model of game engines: two roughnesses with common masking."""
+"""Two-lobe model of game engines: a narrow and a wide Beckmann lobe with common Smith masking."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from dermis.specular.models import Model
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
 NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
-"""Factors of m of both lobes; the engine's 0.75 and 1.3 apply to the root of m [EpicGames2025]."""
+"""Roughness of the narrow and of the wide lobe over m; the engine applies 0.75 and 1.3 to the root of m
+[EpicGames2025]."""
 
 NARROW_WEIGHT = 0.85
-"""Weight of the narrow lobe; that of the wide lobe is the rest [-] [EpicGames2025]."""
+"""Weight of the narrow lobe; the wide lobe has the weight 1 - NARROW_WEIGHT [-] [EpicGames2025]."""
 
 MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 
@@ -25,24 +26,28 @@ MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF of a mixture of a narrow and a wide Beckmann slope distribution [1/sr].
 
-    m : roughness, broadcast against the angles [-]; those of both lobes are clamped to 0.05 to 1
+    m : roughness, broadcast against the angles; its products with both factors are clamped to 0.05 to 1 [-]
+    fresnel : function from the cosine v.h to the Fresnel reflectance
 
     Source: [EpicGames2025] for the two lobes; [Walter2007] section 5 for the BRDF.
     """
-    slopes = _mean(lambda rough: beckmann(angles.n_h, rough), m)
+    slopes = _mix_lobes(lambda rough: beckmann(angles.n_h, rough), m)
     return masked_lobe(angles, slopes, fresnel, lambda cosine: two_lobe_masking(cosine, m))
 
 
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
-    """Return the visible fraction of facets G1 in a direction [-].
+    """Return the masking G1 of both lobes together, the fraction of facets visible from a direction [-].
 
     Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
+
+    cos_theta : cosine of the direction from the normal
+    m : roughness before it is multiplied by the factors of both lobes [-]
     """
-    return np.asarray(1.0 / _mean(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
+    return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
-def _mean(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
-    """Return the weighted mean of a quantity for the roughnesses of both lobes."""
+def _mix_lobes(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
+    """Return the mean of a function of roughness over both lobes, by their weights."""
     factors = NARROW_FACTOR, WIDE_FACTOR
     narrow, wide = (np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors)
     return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))

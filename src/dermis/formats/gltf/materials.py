@@ -15,7 +15,7 @@ from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
-from dermis.specular.hair import ETA
+from dermis.specular.hair import KERATIN_ETA
 
 _SKIN_IOR = {"KHR_materials_ior": {"ior": 1.4}}
 EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
@@ -147,7 +147,11 @@ def eye_material(material: Material) -> Tree:
 def hair_material(name: str) -> Tree:
     """Return the glTF material of hairs, whose colours are in the picture called `name`."""
     surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGHNESS}
-    return {"name": name, "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_ior": {"ior": ETA}}}
+    return {
+        "name": name,
+        "pbrMetallicRoughness": surface,
+        "extensions": {"KHR_materials_ior": {"ior": KERATIN_ETA}},
+    }
 
 
 def colours_png(linear: Floats) -> bytes:

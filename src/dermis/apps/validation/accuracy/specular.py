@@ -12,16 +12,16 @@ from scipy.interpolate import RegularGridInterpolator
 from dermis.apps.validation.pages import print_tables
 from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
 from dermis.specular.beckmann import beckmann, beckmann_table
-from dermis.specular.fresnel import ENERGY, EnergyModel, hemispherical_reflectance, schlick
+from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyScheme, hemispherical_reflectance, schlick
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 VIEWS = (np.arange(200) + 0.5) / 200
 ENERGY_MODELS = {
-    "none": ENERGY["none"],
-    "published": ENERGY["published"],
-    "divided by π, internally reflected light lost": EnergyModel(1.0, returned=False),
-    "full": ENERGY["full"],
+    "none": ENERGY_SCHEMES["none"],
+    "published": ENERGY_SCHEMES["published"],
+    "divided by π, internally reflected light lost": EnergyScheme(1.0, returns_internal_light=False),
+    "full": ENERGY_SCHEMES["full"],
 }
 SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
 REFERENCE_NODES = (96, 96)
@@ -65,7 +65,7 @@ def peak_error() -> float:
     return float(np.abs(peak[visible] / exact[visible] - 1).max())
 
 
-def furnace_cell(model: EnergyModel, m: float, rho_s: float) -> str:
+def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
     """Return least, mean and largest outgoing over incoming light of a white sphere in uniform light."""
     albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEWS, m)

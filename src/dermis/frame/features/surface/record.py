@@ -1,4 +1,4 @@
-"""Surface of the skin as shaders read it: records and pipeline constants."""
+"""Uniform records and pipeline constants of the skin's surface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.optics.slabs import anisotropic_response
 from dermis.optics.thin_parts import oblique_transmittance
 from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin, lobe_name
 from dermis.specular.albedo import MIN_ROUGHNESS_ROOT
-from dermis.specular.fresnel import ENERGY, SKIN_ETA, SKIN_F0
+from dermis.specular.fresnel import ENERGY_SCHEMES, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -30,18 +30,18 @@ _MAX_OFFSET_MM = 3.0  # limit, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[Member]:
-    """Return the shaders of the specular lobes in order, for lobe.wgsl to include."""
+    """Return the shaders of the specular lobes, which lobe.wgsl includes and numbers in this order."""
     return [Member(name, model.shader) for name, model in MODELS.items()]
 
 
 def lobe_constants() -> dict[str, float]:
-    """Return the constants of lobe.wgsl and of the lobes' shaders, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in lobe.wgsl and in the shaders of the lobes, by name."""
     model_numbers = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": MIN_ROUGHNESS_ROOT, **model_numbers}
 
 
 def eye_constants() -> dict[str, float]:
-    """Return the constants of eye.wgsl and mouth.wgsl, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in eye.wgsl and mouth.wgsl, by name."""
     return {
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,
@@ -57,14 +57,14 @@ def eye_constants() -> dict[str, float]:
 
 
 def fill_eye(record: UniformRecord, look: EyeLook) -> None:
-    """Write the appearance of eyes to one shader record `Eye` or to several."""
+    """Write the appearance of eyes to the members of one or more records of the shader struct `Eye`."""
     for name in ("eumelanin", "pupil_mm", "redness"):
         record[name] = getattr(look, name)
     record["seed"] = look.seed % _EYE_SEEDS
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lobe.wgsl that differ from 0."""
+    """Return the pipeline constants of lobe.wgsl for a skin, apart from zeros, which are their defaults."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
@@ -72,9 +72,11 @@ def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 def skin_record(
     program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
 ) -> UniformRecord:
-    """Return the shader record `Skin`.
+    """Return the uniform record of the shader struct `Skin`.
 
-    Members with the name of a field or property of `Skin` have its value, the others are derived from it.
+    Members with the name of a field or property of `Skin` are copied from it, the others are derived.
+
+    light_count : number of lights, where each part of a divided light counts
     """
     members = struct_dtype(program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
@@ -82,14 +84,14 @@ def skin_record(
 
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members of the record that no field or property of `Skin` has."""
-    energy, usual = ENERGY[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
+    """Return the members of the struct `Skin` that are not fields or properties of the Python class."""
+    energy, usual = ENERGY_SCHEMES[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
         "m": skin.smoothing * skin.roughness / usual,
         "f0": SKIN_F0,
         "eta": SKIN_ETA,
         "loss": energy.loss,
-        "returned": energy.returned,
+        "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
         "relief_band": _relief_band(maps),
         **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
@@ -97,7 +99,7 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLik
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return the (3,) diffuse reflectance [-] and index of refraction of a half-space of mean skin colour."""
+    """Return the (3,) diffuse reflectance [-] and index of refraction of a half-space like the mean skin."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -108,7 +110,10 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 
 
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members that direction.wgsl reads, for a half-space of mean skin colour."""
+    """Return the members that direction.wgsl reads: reflectance and transmittance by the direction of light.
+
+    They are those of a half-space with the mean colour of the skin.
+    """
     half_space = mean_half_space(skin, maps, profile)
     response = anisotropic_response(*half_space, skin.anisotropy)
     return {
@@ -125,9 +130,10 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Arr
 
 
 def _relief_band(maps: Maps) -> float:
-    """Return the mip level of the height map that has the size of the normal map, -1 without both maps.
+    """Return the mip level at which the height map is as large as the normal map, -1 without both maps.
 
-    The height map then adds only finer relief to the normal map; with -1 it adds all of it.
+    Only relief finer than that level is taken from the height map and added to the normal map. With -1, all
+    relief of the height map is added.
     """
     if maps.normal is None or maps.height is None:
         return _NO_BAND
