@@ -19,7 +19,15 @@ RESULTS = ROOT / "benchmarks" / "results"
 IMAGES = 10_000_000
 _SHARD = 1000  # images
 _KINDS = {"new": "new people", "moving": "one person, moving"}
-_HEADS = "what", "workers", "adapters", "encoders of each", "images/s", "over the first", "memory of one [MB]"
+_HEADS = (
+    "task",
+    "workers",
+    "adapters",
+    "encoders per worker",
+    "images/s",
+    "relative to the first",
+    "memory per worker [MB]",
+)
 
 
 def main() -> None:
@@ -39,16 +47,16 @@ def _machine(figures: JsonObject) -> str:
     width, height = machine["size"]
     parts = [
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
-        f"{width} x {height}, atlas {machine['atlas']}; with each picture {', '.join(machine['outputs'])}, "
-        f"landmarks and parameters.\n{figures['date'][:10]}, dermis {versions['dermis']}, "
-        f"wgpu {versions['wgpu']}; load average before: {figures['load']}.{_remarks(figures)}\n",
+        f"{width} x {height}, atlas {machine['atlas']}; outputs of each picture: "
+        f"{', '.join(machine['outputs'])}, landmarks and parameters.\n{figures['date'][:10]}, dermis {versions['dermis']}, "
+        f"wgpu {versions['wgpu']}; load average before the run: {figures['load']}.{_remarks(figures)}\n",
         "### Measured\n",
         _rates(figures),
     ]
     if steps := figures.get("steps"):
         rows = [(name.replace("_", " "), f"{ms:.3g}") for name, ms in steps.items()]
-        parts += ["### An image by itself\n", _table(("step", "ms"), rows)]
-    parts += [f"### On paper: {IMAGES:,} images of new people\n", _table(("", ""), paper(figures))]
+        parts += ["### Steps of a single image\n", _table(("step", "ms"), rows)]
+    parts += [f"### Extrapolation: {IMAGES:,} images of new people\n", _table(("", ""), paper(figures))]
     return "\n".join(parts)
 
 
@@ -65,7 +73,7 @@ def _memory(figures: JsonObject) -> str:
         for one in figures.get(name, [])
         for mark, size in one.get("resident_bytes", {}).items()
     ]
-    heads = "what", "workers", "images of each, about", "memory of the largest [MB]"
+    heads = "task", "workers", "images per worker, about", "memory of the largest [MB]"
     return f"\n{_table(heads, rows)}" if rows else ""
 
 
@@ -82,7 +90,8 @@ def _rates(figures: JsonObject) -> str:
     if dask := figures.get("dask"):
         ratio = dask["dask_over_plain"]
         text += (
-            f"\n{dask['workers']} workers of dask draw {ratio:.3f} times what as many plain processes do.\n"
+            f"\n{dask['workers']} workers of dask render {ratio:.3f} times as many images per second as the "
+            "same number of plain processes.\n"
         )
     return text
 
@@ -94,14 +103,14 @@ def paper(figures: JsonObject) -> list[tuple[str, str]]:
     hours, limits = IMAGES / rate / 3600, ceilings(figures, best)
     rows = [
         ("images/s", f"{rate:.3g}"),
-        ("hours of this machine", f"{hours:,.0f}"),
-        ("hours of an adapter", f"{hours * best['adapters']:,.0f}"),
+        ("hours on this machine", f"{hours:,.0f}"),
+        ("adapter hours", f"{hours * best['adapters']:,.0f}"),
         ("bytes", f"{IMAGES * size / 1e12:.3g} TB"),
         ("files", f"{IMAGES // _SHARD:,} shards of {_SHARD * size / 1e6:,.0f} MB"),
-        *((f"at most, by {name}", f"{limit:,.3g} images/s") for name, limit in limits.items()),
+        *((f"limit by {name}", f"{limit:,.3g} images/s") for name, limit in limits.items()),
     ]
     if "steps" in figures and "disk" in figures:
-        rows.append(("what is reached first", min(limits, key=lambda name: limits[name])))
+        rows.append(("lowest limit", min(limits, key=lambda name: limits[name])))
     return rows
 
 
@@ -127,13 +136,14 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 _HEAD = f"""\
 # Data sets at scale
 
-What {IMAGES:,} images take, extrapolated from what `python benchmarks/batch.py` measures in one run on a
-machine. `python benchmarks/batch_page.py` writes this page.
+This page lists measured rates of `dermis batch`, and the time and space that {IMAGES:,} images need at these
+rates. `python benchmarks/batch.py` measures them in one run per machine, and
+`python benchmarks/batch_page.py` writes this page.
 
-Rates are those between a quarter and nine tenths of a run, when all processes are at work. Steps are timed
-one after the other in one process, the device waiting for Python and Python for the device; in a run they
-overlap, so that workers can draw more than "by the workers' own time" says. On a machine that others use too,
-only ratios mean something.
+Rates are measured between a quarter and nine tenths of a run, when all processes are busy. Steps are timed
+one after the other in one process, in which the device and Python wait for each other. In a run they
+overlap, so the rate can exceed the limit "by the workers' own time". On a machine with other load,
+only ratios are meaningful.
 """
 
 if __name__ == "__main__":

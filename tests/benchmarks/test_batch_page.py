@@ -35,12 +35,12 @@ def test_paper_goes_on_with_the_fastest_run() -> None:
 
     steps = {"parameters": 1.0, "scene": 5.0, "draw_and_read": 4.0, "encode": 50.0}
     rows = dict(paper(told(steps=steps, disk={"bytes_per_s": 5e8})))
-    assert (rows["hours of this machine"], rows["hours of an adapter"]) == ("14", "28")
+    assert (rows["hours on this machine"], rows["adapter hours"]) == ("14", "28")
     assert (rows["bytes"], rows["files"]) == ("10 TB", "10,000 shards of 1,000 MB")
-    assert rows["at most, by the workers' own time"] == "200 images/s"
-    assert rows["at most, by encoding"] == "160 images/s"
-    assert rows["at most, by the disk"] == "500 images/s"
-    assert rows["what is reached first"] == "encoding"
+    assert rows["limit by the workers' own time"] == "200 images/s"
+    assert rows["limit by encoding"] == "160 images/s"
+    assert rows["limit by the disk"] == "500 images/s"
+    assert rows["lowest limit"] == "encoding"
 
 
 def test_the_page_has_each_run_with_its_ratio() -> None:
@@ -48,7 +48,7 @@ def test_the_page_has_each_run_with_its_ratio() -> None:
 
     text = page([told(dask={"workers": 2, "dask_over_plain": 0.98})])
     assert "| new people | 2 | 2 | 4 | 200 | 2.00 | 1000 to 1000 |" in text
-    assert "0.980 times" in text and "what is reached first" not in text
+    assert "0.980 times" in text and "lowest limit" not in text
 
 
 def test_memory_is_told_by_images() -> None:
