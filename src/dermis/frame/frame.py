@@ -1,4 +1,4 @@
-"""Passes of one frame, in order."""
+"""Passes of one frame in their order, from the posed shape to the picture and its outputs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ from dermis.gpu import Graph, Texture
 
 
 def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
-    """Declare the passes that light the skin, scatter the light and shade the picture; stale ones run."""
+    """Declare all passes of a frame: pose, shadows, light in the skin, shading, post-processing and outputs.
+
+    The graph runs only stale passes.
+    """
     resources, bindings, view = inputs.resources, inputs.bindings, inputs.view
     shape.draw(graph, resources.shape.shape, inputs.motion)
     if resources.shape.rest_shape:
@@ -57,7 +60,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
 
 
 def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
-    """Return the inputs of the outputs' passes."""
+    """Collect what the passes of outputs need: shading inputs, geometry, picture and technique."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:

@@ -1,4 +1,4 @@
-"""Inputs of a frame: persistent resources, and records of the camera, the lights and the pose."""
+"""Inputs of a frame: cached resources, and records of the camera, the lights and the pose."""
 
 from __future__ import annotations
 
@@ -20,19 +20,22 @@ from dermis.scene.settings import Settings
 
 @dataclass(frozen=True, eq=False)
 class FrameInputs:
-    """Inputs of a frame.
+    """Inputs of a frame: cached resources, and what differs between frames that share them.
 
     motion : pose of the head, as bytes for the shaders
-    face_movements : (9,) amounts of the expressions that change the painted maps, None for none
-    layouts, blurs : layouts and blurs of the resources, with the lights and the light scale of this frame
-    shadow_views : view of each shadow map
+    face_movements : (9,) strength of the facial movements that change the painted maps, None without such
+        maps
+    layouts : atlas layouts of the resources, with the record of this frame's lights
+    blurs : Gaussian blurs of the layouts, with the light scale of this frame
+    shadow_views : projections of all shadow maps
     light_constants : pipeline constants of the lights in use
-    camera_views : view of each sample of a pixel
-    window : part of the image plane that the picture shows
-    sky_view : views of the head from the sky, and their record; None unless occlusion follows the shape
-    view, constants : record of the camera for the shading pass, and its pipeline constants
+    camera_views : projection of the camera, with the positions of samples in a pixel
+    window : rectangle of the image plane that the picture shows
+    sky_view : views of the head from all directions of the sky, and their uniform record; None unless
+        occlusion follows the shape
+    view, constants : uniform record of the shading pass, and its pipeline constants
     centre_mm : centre of the head, the origin of positions in the scene [mm]
-    previous : previous scene for motion vectors, None unless requested
+    previous : pose and camera of the previous scene for motion vectors, None unless requested
     """
 
     resources: Resources
@@ -53,5 +56,5 @@ class FrameInputs:
 
     @property
     def bindings(self) -> Bindings:
-        """Return the resources of the first layout, by their names in the shaders."""
+        """Return the shader resources of the first layout, from which the picture is shaded."""
         return self.layouts[0].bindings

@@ -1,4 +1,4 @@
-"""Memory and size limits of a device: larger frames are refused, with settings that would fit."""
+"""Memory and size limits of a device: larger frames are refused, with advice on settings that would fit."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _MIN_SIDE = 64  # smaller sides save nothing
 
 
 def check_limits(device: Device, request: FrameRequest) -> None:
-    """Raise DermisError for sizes over the limits of the device."""
+    """Raise DermisError for sizes or memory over the limits of the device."""
     limit, name, settings = device.max_texture_size, device.adapter.name, request.settings
     sides = {
         "size": max(settings.size),
@@ -50,7 +50,10 @@ def check_limits(device: Device, request: FrameRequest) -> None:
 
 
 def out_of_memory_error(error: OutOfMemoryError, device: Device, request: FrameRequest) -> OutOfMemoryError:
-    """Return an error that suggests settings that fit, and release the memory of the failed frame."""
+    """Return an error that suggests settings that fit, and release the memory of the failed frame.
+
+    error : error that the allocation raised
+    """
     for raised in filter(None, (error, error.__cause__)):
         traceback.clear_frames(raised.__traceback__)
     needed = sum(frame_bytes(request).values())
@@ -62,9 +65,9 @@ def out_of_memory_error(error: OutOfMemoryError, device: Device, request: FrameR
 
 
 def suggest_settings(request: FrameRequest, budget: float) -> str:
-    """Return advice on settings whose frame fits into a number of bytes.
+    """Return advice on settings whose frame fits into `budget` bytes.
 
-    The options that need most memory are halved.
+    The setting that needs most memory is halved until the frame fits.
     """
     smaller, changed = request, dict[str, str]()
     needed = frame_bytes(request)
@@ -81,7 +84,7 @@ def suggest_settings(request: FrameRequest, budget: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory that a frame needs for each size option, without the head and its maps [bytes]."""
+    """Return the memory of a frame for each size setting [bytes], without that of the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
@@ -99,14 +102,17 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
 
 
 def _mixing_bytes(request: FrameRequest) -> float:
-    """Return the memory per atlas texel that blending profiles needs [bytes]."""
+    """Return the memory per atlas texel that a blend of several profiles adds [bytes]."""
     others = len(request.other_profiles)
     maps = len(request.atlas_plan.layouts) + sum_count(others)
     return others * request.technique.texel_bytes(request.blur_count) + _FLOATS * maps if others else 0.0
 
 
 def _halved(settings: Settings, option: str) -> Settings | None:
-    """Return settings with half of an option, None when that is too small; samples go before the size."""
+    """Return settings with half the value of a size option, None if that is too small.
+
+    For "size", the samples per pixel are halved first.
+    """
     if option == "size" and settings.samples > _FEW_SAMPLES:
         return settings.model_copy(update={"samples": settings.samples // 2})
     value: Any = getattr(settings, option)
@@ -115,7 +121,7 @@ def _halved(settings: Settings, option: str) -> Settings | None:
 
 
 def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
-    """Return the command line options of a setting, by the name of the setting."""
+    """Return the command line options for a size setting, by the name of the setting."""
     if option != "size":
         return {option: f"--{option.replace('_', '-')} {getattr(settings, option)}"}
     width, height = settings.size
@@ -128,7 +134,7 @@ def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int)
     It covers geometry, pyramid levels, temporary light and the sum of the levels.
 
     blur_count : number of Gaussians that blur light
-    layouts : number of atlases of that size
+    layouts : number of atlas layouts
     """
     if not blur_count:
         return layouts * _GEOMETRY

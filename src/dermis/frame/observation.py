@@ -83,10 +83,10 @@ def observation_jobs(
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """Yield a function that submits each scene, and one that returns the observation from its readback.
+    """Yield two functions for each scene: one submits its frame, the other reads back its observation.
 
-    submit : function that submits a scene, given the previous scene and `settings`
-    previous : as for `pair_with_previous`
+    submit : function that submits a frame, given a scene, the previous scene and `settings`
+    previous : previous scenes for motion vectors, see `pair_with_previous`
     settings : settings of each scene
     """
     for (scene, before), chosen in zip(pair_with_previous(scenes, previous), settings, strict=False):
@@ -112,8 +112,8 @@ def pair_with_previous(
 ) -> Iterator[tuple[Scene, Scene | None]]:
     """Yield each scene with the previous scene from which its motion is computed, None for none.
 
-    previous : scene before the first one, where each scene follows the one before it unless the head changes;
-        or the previous scenes of all scenes
+    previous : one scene or None, which precedes the first scene; each later scene then follows the one before
+        it unless the head changes. Or an iterable with the previous scene of each scene
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_MISSING):

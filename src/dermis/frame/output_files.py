@@ -1,4 +1,4 @@
-"""Outputs as OpenEXR, PNG and NumPy files."""
+"""Writing of outputs as OpenEXR, PNG and NumPy files."""
 
 from __future__ import annotations
 
@@ -23,21 +23,27 @@ _PICTURE = "rgba"  # name of the first part, a convention of compositing program
 
 
 def check_formats(names: Iterable[str], kind: Format) -> None:
-    """Raise DermisError for an output that a format cannot store."""
+    """Raise DermisError for an output that a file format cannot store.
+
+    names : names of outputs
+    kind : file format
+    """
     for name in names:
         if kind == "png" and OUTPUTS[name].quantisation is None and OUTPUTS[name].kind != "uint8":
             refuse(f"output {name}", "exr or npy", "got png, which cannot hold it", "Choose one of these")
 
 
 def output_path(path: Path, name: str, kind: Format) -> Path:
-    """Return the path of an output's file beside a picture, such as face.depth.exr."""
+    """Return the path of an output's file beside a picture, such as face.depth.exr beside face.png."""
     return path.with_name(f"{path.stem}.{name}.{kind}")
 
 
 def encode_output(name: str, values: PlaneArray, kind: Format) -> bytes:
-    """Return an output as the bytes of a file, identical in each run.
+    """Return the bytes of a file with one output; equal arrays give equal bytes.
 
-    values : (h, w) or (h, w, c)
+    name : name of the output
+    values : (h, w) or (h, w, c) array of the output
+    kind : file format
     """
     return _ENCODERS[kind](name, values)
 
@@ -45,7 +51,8 @@ def encode_output(name: str, values: PlaneArray, kind: Format) -> bytes:
 def write_output(path: Path, name: str, values: PlaneArray) -> None:
     """Write an output as .exr, .png or .npy, atomically.
 
-    values : (h, w) or (h, w, c)
+    name : name of the output
+    values : (h, w) or (h, w, c) array of the output
     """
     kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
     _write(path, encode_output(name, values, kinds[path.suffix.lower()]))
@@ -54,8 +61,8 @@ def write_output(path: Path, name: str, values: PlaneArray) -> None:
 def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
-    picture : (h, w, 3 or 4)
-    values : outputs by name
+    picture : (h, w, 3 or 4) linear floats
+    values : arrays of the outputs by name
     """
     parts = {_PICTURE: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
     parts |= {name: _channels(OUTPUTS[name], one) for name, one in values.items()}
@@ -63,9 +70,9 @@ def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneA
 
 
 def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
-    """Return an output as the (h, w) or (h, w, 3) integers of a PNG file.
+    """Return an output as integers for a PNG file, (h, w) or (h, w, 3).
 
-    Outputs of two channels get a third one of 0.
+    Outputs with two channels get a third one of zeros, as PNG has no such format.
     """
     if values.dtype == np.uint8:
         return values
@@ -76,7 +83,7 @@ def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
 
 
 def _channels(output: Output, values: PlaneArray) -> dict[str, PlaneArray]:
-    """Return the channels of an output by their names in a file: depth.Z, normal.X, ..."""
+    """Return the channels of an output by their names in an OpenEXR file: depth.Z, normal.X, ..."""
     channels = np.atleast_3d(values)
     names = output.channel_names or [str(k) for k in range(channels.shape[2])]
     return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""Preparation of the inputs of a frame from a scene; unchanged ones are cached."""
+"""Preparation of the inputs of a frame from a scene, with a cache of what did not change."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ Names = tuple[str, ...]
 
 
 class HeadState(NamedTuple):
-    """Pose of a head, its outline, and the poses of its eyes."""
+    """Current state of a head: its pose, the outline of its shape, and the poses of its eyes."""
 
     motion: MotionBytes
     outline: Outline
@@ -60,9 +60,10 @@ class HeadState(NamedTuple):
 
 
 class Preparation:
-    """Preparation of the inputs of frames on a device.
+    """Preparation of the inputs of frames on a device, with the cache of its resources.
 
-    cache_size, cache_ttl : as for `Memo`
+    cache_size : number of variants of each resource that are cached
+    cache_ttl : number of frames after which unused resources are released
     """
 
     def __init__(self, device: Device, cache_size: int = 1, cache_ttl: int = 1) -> None:
@@ -156,7 +157,10 @@ class Preparation:
         )
 
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
-        """Return the profiles of the skin, only the first one for techniques that cannot blend profiles."""
+        """Return the profiles of the skin and their blend weights.
+
+        Techniques that cannot blend profiles get the first one, and None as weights.
+        """
         if technique.mixes_profiles:
             return self.profiles.mixture(skin)
         return (self.profiles.profile(skin),), None
@@ -164,12 +168,12 @@ class Preparation:
     def _sky_view(
         self, head: Head, motion: Motion | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
-        """Return the views of the posed head from the sky, and their shader record."""
+        """Return the views of the posed head from all directions of the sky, and their uniform record."""
         anchors, motion = self.memo.get(make_anchors, head.topology), motion or head.control.rest
         return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
 
     def _previous(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
-        """Return the previous pose and camera for motion vectors.
+        """Return the pose and the camera of the previous scene, for motion vectors.
 
         Raises DermisError for a scene of another head.
         """
@@ -185,18 +189,18 @@ class Preparation:
         return PreviousScene(None if motion == inputs.motion else motion, view)
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
-        """Return the state of the posed head, at rest without a motion."""
+        """Return the pose, outline and eyes of a head; without a motion, those of the rest pose."""
         at_rest = self.memo.get(_rest_motion, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 
 
 def interreflection_constants(resources: Resources) -> Constants:
-    """Return the pipeline constant that enables interreflection, if there are resources for it."""
+    """Return the pipeline constant that enables interreflection, if the head has any."""
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
 def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
-    """Return a motion as bytes for the shaders; unchanged rest positions reuse the bytes of `at_rest`."""
+    """Return a pose as bytes for the shaders; unchanged rest positions reuse the bytes of `at_rest`."""
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     is_rest = motion.positions_mm is head.control.positions_mm
     positions = at_rest.positions if is_rest else motion.positions_mm.tobytes()
@@ -204,7 +208,7 @@ def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionByt
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the rest positions of the control points, None where they equal those of the topology [mm]."""
+    """Return the (p, 3) control points of the person at rest [mm], None where they equal the topology's."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
@@ -242,7 +246,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights: UniformRecord) -> AtlasLayout:
-    """Return the layout with a shader record of lights."""
+    """Return a copy of the layout whose shaders read the uniform record of these lights."""
     return replace(layout, bindings=layout.bindings | {"lights": lights})
 
 
@@ -253,6 +257,9 @@ def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
 def _lights(
     _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
-    """Return the shader record of the lights, the views of their shadow maps, and their numbers of parts."""
+    """Return the uniform record of the lights, the views of shadow maps, and the parts of each light.
+
+    The first two parameters only serve as cache keys.
+    """
     views, part_counts = light_views(scene, outline, size), light_part_counts(scene)
     return light_records(shade_program(device), scene, views), shadow_map_views(views), part_counts

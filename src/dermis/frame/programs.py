@@ -1,4 +1,4 @@
-"""Compute programs of a frame, and the places where their includes, lists and constants are found."""
+"""Compute programs of a frame, and the folders, lists and constants from which shaders are assembled."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ _ALWAYS = (  # shaders of most frames
 
 
 def shader_folders(*options: str) -> tuple[Folder, ...]:
-    """Return the folders of includes, with the lists and constants that all features add.
+    """Return the folders in which shaders are included, with the lists and constants of all features.
 
     A feature is a package in `features`. Its functions `shader_constants` and `shader_lists` are discovered
     here, so that features need no registration.
 
-    options : names for which `//#if` holds
+    options : names of the `//#if` conditions that hold
     """
     numbers: dict[str, float] = {
         **light_shader_constants(),
@@ -84,7 +84,7 @@ def program(
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
 
-    The device's own constants are added to `constants`.
+    Pipeline constants that suit the device are added to `constants`.
 
     path : "FEATURE/NAME.wgsl", or the path of any other file
     constants : pipeline constants
@@ -101,7 +101,7 @@ def program(
 
 
 def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
-    """Return the names for which `//#if` holds in a shader, see `program`."""
+    """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {"FILTERED_SOURCE": source == HALVES, "STORED_HALVES": store == HALVES, "HAIR_LABELS": labels}
     return tuple(name for name, value in values.items() if value)
 
@@ -109,12 +109,12 @@ def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return pipeline constants together with those device constants that a shader declares."""
+    """Add to pipeline constants those of the device that a shader declares."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
 def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, int, int]:
-    """Return the numbers of workgroups for shaders with one invocation per list entry, see each.wgsl.
+    """Return the grid of workgroups for a shader with one invocation per list entry, see each.wgsl.
 
     count : number of entries
     workgroup : entries per workgroup
@@ -124,12 +124,15 @@ def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, in
 
 
 def registry_version() -> int:
-    """Return a number that changes whenever a light, a lobe or an output is registered or removed."""
+    """Return a number that changes whenever a light, a lobe or an output is registered or removed.
+
+    Shaders that list these are then compiled again.
+    """
     return KINDS.changes + MODELS.changes + OUTPUTS.changes
 
 
 def device_constants(device: Device) -> Constants:
-    """Return the pipeline constants that suit the device, for shaders that declare them.
+    """Return the pipeline constants that are fastest on the device, for shaders that declare them.
 
     GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
     shade columns of pixels and take longer steps along hairs that cast shadows; see geometry.wgsl,
@@ -141,16 +144,16 @@ def device_constants(device: Device) -> Constants:
 
 
 def strip_constants(device: Device, samples: int) -> Constants:
-    """Return the constants that shorten the strips of `device_constants` for many samples per pixel."""
+    """Return constants that shorten the columns of pixels per invocation, for many samples per pixel.
+
+    Software adapters shade columns of pixels, and a driver limits the iterations of an invocation.
+    """
     strip = max(1, _MAX_SAMPLES // samples)
     return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP else ()
 
 
 def level_format(device: Device) -> str:
-    """Return the texture format of pyramid levels: half floats on GPUs, floats on software adapters.
-
-    Each is the faster format there.
-    """
+    """Return the faster texture format of pyramid levels: half floats on GPUs, floats in software."""
     return FLOATS if device.adapter.kind == "CPU" else HALVES
 
 

@@ -1,4 +1,4 @@
-"""Projection matrices of cameras and shadow maps for column vectors; reversed depth, 1 near and 0 far."""
+"""Projection matrices of cameras and shadow maps, for column vectors and reversed depth (1 near, 0 far)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PIXEL_CENTRE = np.full((1, 2), 0.5)
 
 
 class Views(NamedTuple):
-    """Views of the world for the layers of a texture array, one layer per sample of each view.
+    """Projections for the layers of a texture array, one layer for each sample position of each view.
 
     clips : (k, 4, 4) matrices from world to clip space
     sample_positions : (n, 2) positions of the samples in a pixel, from 0 to 1 to the right and down [pixels]
@@ -40,9 +40,9 @@ class Views(NamedTuple):
     sample_positions: Matrix
 
     def matrices(self, size: tuple[int, int]) -> Matrix:
-        """Return (k n, 4, 4) matrices to clip space, shifted so that each layer samples pixel centres.
+        """Return (k n, 4, 4) matrices to clip space, shifted so that pixel centres fall on sample positions.
 
-        size : of the picture [pixels]
+        size : (width, height) of a layer [pixels]
         """
         shift = (self.sample_positions - 0.5) * (-2.0 / size[0], 2.0 / size[1])  # in clip space
         matrices = np.repeat(self.clips[:, None], len(shift), axis=1)
@@ -54,9 +54,9 @@ class ShadowView(NamedTuple):
     """View of the head from a light, for its shadow map.
 
     clip : (4, 4) matrix from world to clip space
-    texel : side of a texel of the map, in parallel light [mm], else per mm of distance [-]
-    origin : position of the light, in parallel light the centre of the map [mm]
-    right, up : axes of the map, unit vectors
+    texel : side of a texel: in parallel light [mm], for other lights divided by the distance [-]
+    origin : position of the light; in parallel light the centre of the map [mm]
+    right, up : unit vectors along the rows and columns of the map
     near, far : depths at which the map stores 1 and 0 [mm]
     """
 
@@ -70,18 +70,22 @@ class ShadowView(NamedTuple):
 
 
 def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
-    """Return one layer for each view that is not None, sampled at pixel centres."""
+    """Return the projections of all shadow maps, sampled at pixel centres; views of None are skipped."""
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 
 def view_axes_array(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
-    """Return the unit vectors right, up and forward as arrays."""
+    """Return the unit vectors right, up and forward of a view direction, as NumPy arrays."""
     right, upward, ahead = view_axes(forward.tolist(), up.tolist())
     return np.array(right), np.array(upward), np.array(ahead)
 
 
 def view_axes(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
-    """Return the unit vectors right, up and forward as tuples, faster than NumPy for single vectors."""
+    """Return the unit vectors right, up and forward of a view direction, as tuples.
+
+    For single vectors this is faster than NumPy. A horizontal axis is chosen where `up` is parallel to
+    `forward`.
+    """
     f = normalised(forward)
     r = _cross(f, up)
     if math.hypot(*r) <= 1e-6 * math.hypot(*up):
@@ -91,20 +95,21 @@ def view_axes(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
 
 
 def world_position(position: Sequence[float], centre: Sequence[float]) -> Triple:
-    """Return a point in world space [mm].
+    """Return the world position of a point that is given relative to the centre of the head [mm].
 
-    position : relative to the centre of the head [mm]
+    position : point relative to the centre of the head [mm]
+    centre : centre of the head [mm]
     """
     return position[0] + centre[0], position[1] + centre[1], position[2] + centre[2]
 
 
 def vector_between(start: Sequence[float], end: Sequence[float]) -> Triple:
-    """Return the vector from one point to another."""
+    """Return the vector from `start` to `end`."""
     return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
 
 def normalised(v: Sequence[float]) -> Triple:
-    """Return the unit vector in the direction of a vector."""
+    """Return a vector scaled to unit length."""
     x, y, z = v
     length = math.hypot(x, y, z)
     return x / length, y / length, z / length
@@ -120,7 +125,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> Triple:
 
 
 def view_rows(eye: Triple, axes: Axes) -> Rows:
-    """Return the upper three rows of the view matrix: right, up and depth."""
+    """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward."""
     right, up, forward = axes
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
@@ -128,7 +133,10 @@ def view_rows(eye: Triple, axes: Axes) -> Rows:
 def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
     """Return the rows of the matrix to clip space for a window on the image plane, with reversed depth.
 
-    Depth is 1 at `near` and 0 at `far`: floats are densest at 0, so precision is even over the whole range.
+    rows : upper three rows of the view matrix
+    near, far : distances at which depth is 1 and 0 [mm]
+
+    Reversed depth has an even precision over the whole range, because floats are densest near 0.
     """
     scale = -near / (far - near)
     depth = [scale * c for c in rows[2]]
@@ -141,7 +149,10 @@ def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Seq
 
 
 def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
-    """Return the nearest and farthest depth of a shape in view space, slightly extended [mm]."""
+    """Return the nearest and farthest depth of a shape in view space, with a small margin [mm].
+
+    rows : upper three rows of the view matrix
+    """
     z = np.array(rows[2], np.float32) @ outline.homogeneous
     near, far = float(z.min()) - outline.margin_mm, float(z.max()) + outline.margin_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
@@ -150,10 +161,12 @@ def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
 def point_shadow_views(
     lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, size: int
 ) -> list[ShadowView]:
-    """Return the tightest views of the whole mesh from point lights, computed for all lights at once.
+    """Return a view from each point light that just contains the whole mesh, computed for all at once.
 
-    lights : names and lights
-    size : side of the maps [texels]
+    lights : name and light, for each light
+    centre : centre of the head, the origin of light positions [mm]
+    outline : outline of the head's shape
+    size : side of the shadow maps [texels]
 
     Raises DermisError when a light is inside the bounds of the mesh, which a single map cannot cover.
     """
@@ -191,7 +204,11 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
 
 
 def _steepest(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
-    """Return the largest tangent in each view; overwrites `sides` to avoid allocations."""
+    """Return the largest tangent of the view angle of any point, for each view.
+
+    sides : (2, k, n) x and y of points in k views, which is overwritten to avoid allocations
+    depth : (k, n) depths of the points
+    """
     for side in sides:
         side /= depth  # one by one: NumPy allocates buffers when it divides both at once
     largest: list[float] = np.abs(sides, out=sides).max(axis=(0, 2)).tolist()
@@ -199,9 +216,9 @@ def _steepest(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[
 
 
 def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
-    """Return the tightest view of the whole mesh in parallel light.
+    """Return a view in the direction of parallel light that just contains the whole mesh.
 
-    size : side of the map [texels]
+    size : side of the shadow map [texels]
     """
     points = outline.points_mm
     axes = view_axes_array(direction, np.array(_UP))
@@ -221,7 +238,7 @@ def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowV
 
 @cache
 def pixel_samples(count: int) -> NDArray[np.float64]:
-    """Return a (count, 2) Hammersley set in the unit square, even in both axes for any count."""
+    """Return sample positions in a pixel, a (count, 2) Hammersley set in the unit square."""
     index = np.arange(count)
     y, digit, remaining = np.zeros(count), 0.5, index.copy()
     while remaining.any():

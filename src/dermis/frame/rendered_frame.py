@@ -26,10 +26,10 @@ _WHITE = 255  # largest byte of a picture
 
 @dataclass(eq=False)
 class FrameTextures:
-    """Textures of a frame; they are replaced when the device is lost and the frame is drawn again.
+    """Device, textures and buffers of a frame, replaced when the device is lost and the frame drawn again.
 
     meter : exposure meter, None for a given exposure
-    outputs : outputs besides the picture, None for none
+    outputs : resources of the outputs besides the picture, None without any
     """
 
     device: Device
@@ -42,6 +42,7 @@ class FrameTextures:
 class RenderedFrame(ShortRepr):
     """Picture on the device, valid until its renderer draws the next frame.
 
+    textures : device, picture and outputs
     gpu_ms : device time of each timed stage, and "total" [ms]; None without timestamps
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
@@ -49,8 +50,10 @@ class RenderedFrame(ShortRepr):
     unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
     suns : number of lights that the environment adds
     settings : settings of the frame
-    start_readback : function that starts the readback of the picture, with the options of `start_readback`
-    run_on_device : function that returns the result of a job for which the frame must be on the device
+    start_readback : function that starts the readback of a picture, see `features.outputs.readback`
+    run_on_device : function that runs a job and returns its result, after drawing the frame again if its
+        device was lost
+    is_current : function that tells whether the picture is still valid
     """
 
     textures: FrameTextures
@@ -72,7 +75,7 @@ class RenderedFrame(ShortRepr):
 
     @property
     def exposure(self) -> float:
-        """Return the factor from radiance to the picture, given or metered [-]."""
+        """Return the factor from radiance to linear light in the picture, given or metered [-]."""
         if self.settings.exposure != "auto":
             return float(self.settings.exposure)
         return self._read(lambda frame: read_meter(frame.device, frame.meter) if frame.meter else 1.0)

@@ -1,4 +1,4 @@
-"""Renderer: a device with cached resources, and the submission of frames."""
+"""Renderer: a device with cached resources, to which frames are submitted."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ def pipeline_frames(
 
     A frame whose device is lost is submitted again.
 
+    reopening_device : runs functions, and opens the device again when it is lost
     device : function that returns the current device
-    frames : pairs of a function that submits a frame, and one that returns the result of its readback
+    frames : for each frame, a function that submits it, and one that returns the result of its readback
     """
     pending: deque[tuple[Readback, Submit, Receive[T]]] = deque()
 
@@ -126,7 +127,7 @@ class Renderer:
         return open_device(self._adapter)
 
     def _use_device(self, device: Device) -> None:
-        """Create the caches of a device that was just opened."""
+        """Create the graph and caches of a device that was just opened."""
         warm_up(device)
         self.device, self.graph = device, Graph(device)
         preparation = Preparation(device, self._cache_size, self._cache_ttl)
@@ -147,9 +148,10 @@ class Renderer:
         force: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
-        """Declare a frame and run its stale passes.
+        """Declare the passes of a frame, run the stale ones, and start a readback in the same submission.
 
-        read_back : function that starts the readback of the picture in the same submission
+        force : whether to run all passes
+        read_back : function that starts the readback of the picture, None for no readback
         """
         if force:
             self.graph.invalidate()
@@ -181,7 +183,7 @@ class Renderer:
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
     ) -> Readback:
-        """Submit a frame and the readback of its picture and outputs."""
+        """Submit a frame together with the readback of its picture and outputs."""
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, extra = settings if alpha else None, inputs.resources.outputs
         read_back = partial(start_readback, linear=linear, alpha=coverage, outputs=extra)
@@ -247,7 +249,7 @@ class Renderer:
         return self.reopening_device.run(partial(self._draw, force, timed, *prepared))
 
     def _draw(self, force: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
-        """Render one frame.
+        """Render one frame and leave the picture on the device.
 
         prepared : arguments of `Preparation.inputs`
         """
@@ -286,7 +288,12 @@ class Renderer:
         )
 
     def _run_on_device(self, textures: FrameTextures, redraw: Callable[[], None], job: Callable[[], T]) -> T:
-        """Return `job()`, after the frame is drawn again if its device was lost."""
+        """Return the result of a job that reads a frame; draw the frame again if its device was lost.
+
+        textures : textures of the frame, which `redraw` replaces
+        redraw : function that draws the frame again
+        job : function to run
+        """
 
         def run() -> T:
             if textures.device is not self.device:

@@ -1,4 +1,4 @@
-"""Request from which the resources of a frame are created."""
+"""Request of a frame: everything on which its cached resources depend."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from dermis.scene.skin import Skin
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """Everything that the resources of a frame depend on.
+    """Everything on which the cached resources of a frame depend.
 
+    profile : diffusion profile of the skin, the first one if a map blends several
     rest_positions_mm : (p, 3) control points of the person at rest [mm], None where they equal the topology's
     environment_map : prefiltered map of `environment`
-    light_part_counts : number of parts that each light is divided into, suns of the environment last
+    light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
-    blend_weights : (h, w, 2) map of their weights [-], None without other profiles
+    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None without any
     outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """
 
@@ -54,19 +55,19 @@ class FrameRequest:
 
     @property
     def topology(self) -> Head:
-        """Return the bare head whose mesh determines the atlas and the tables."""
+        """Return the head without hair and maps whose mesh all people of a template share."""
         return self.head.topology
 
     @property
     def is_shared(self) -> bool:
-        """Return whether several people share the topology, and with it the resources."""
+        """Return whether several people share the topology, and with it the atlas and other resources."""
         return self.topology is not self.head.bare
 
     @property
     def pair_positions_mm(self) -> NDArray[np.float32] | None:
-        """Return the control points at rest for the pair search, None for those of the topology [mm].
+        """Return the control points at rest in which translucent pairs are searched [mm].
 
-        People of one template share the pairs of the template; only the weights of the pairs differ.
+        None means those of the topology: people of one template share its pairs, only the weights differ.
         """
         return None if self.is_shared else self.rest_positions_mm
 
@@ -77,12 +78,12 @@ class FrameRequest:
 
     @property
     def light_key(self) -> str:
-        """Return the cache key of light: each view and each size of shadow maps has its own."""
+        """Return the cache key of resources that hold light, one for each view name and shadow map size."""
         return f"{self.view_name} {self.settings.shadow_size}"
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the profiles, divided by the technique into relit and blurred Gaussians."""
+        """Return the Gaussians that the technique relights and blurs, other profiles included."""
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
         fine = {} if others else first.fine  # where widths vary, a stripe is as fine as texels
@@ -116,7 +117,7 @@ class FrameRequest:
 
     @property
     def painted_side(self) -> int:
-        """Return the side of the maps that the device paints, 0 for heads with maps of their own [texels]."""
+        """Return the side of the maps that the device paints [texels], 0 for heads with maps from files."""
         if not isinstance(self.head.maps, PaintedMaps):
             return 0
         side = 1 << (self.settings.atlas - 1).bit_length()
@@ -124,13 +125,13 @@ class FrameRequest:
 
     @property
     def has_fine_relief(self) -> bool:
-        """Return whether there is relief finer than maps; painted gloss maps hold its local strength."""
+        """Return whether the skin has relief finer than its maps, whose strength painted gloss maps store."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 
     @property
     def has_animated_maps(self) -> bool:
-        """Return whether expressions change the maps."""
+        """Return whether expressions change the painted maps."""
         return self.posed and self.painted_side > 0 and bool(self.head.targets)
 
     @property
@@ -145,5 +146,5 @@ class FrameRequest:
 
     @cached_property
     def atlas_plan(self) -> AtlasPlan:
-        """Return the layouts and the size of the atlases."""
+        """Return the names of the atlas layouts, and the side of the atlases."""
         return plan_atlases(self.seam_method, self.settings, self.blur_count, self.has_occlusion)

@@ -1,4 +1,4 @@
-"""Resources of a frame: those of all features, and its atlas layouts."""
+"""Resources of a frame: those of all features, and the atlas layouts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.gpu import Constants, Texture, UniformRecord
 
 @dataclass(frozen=True, eq=False)
 class AtlasLayout(LitAtlas):
-    """Atlas of the head in which light is diffused.
+    """Layout of the atlas in which light is diffused, with its resources.
 
     translucency : resources of the light through thin parts, None without it
     occlusion : resources that update the occlusion map, None where occlusion does not follow the shape
@@ -33,16 +33,17 @@ class AtlasLayout(LitAtlas):
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Resources of all features.
+    """Cached resources of a frame, for all features.
 
-    expression_maps : painted maps that expressions change, None for none
-    layouts : atlases in which light is diffused; the picture is shaded from the first
+    expression_maps : painted maps that expressions change, None if no map changes
+    layouts : atlas layouts in which light is diffused; the picture is shaded from the first
     scattered : texture of the exitance of light that scattered below the surface
     technique : tables and textures of the technique, None for none
     output_layers : textures in which the technique diffuses the light of outputs, None for none
-    sky : visibility of the sky at the vertices, None where occlusion does not follow the shape
+    sky : visible fraction of the sky at the vertices, None where occlusion does not follow the shape
     hair : resources of the hair, None without it
-    view, constants : record of the shading pass without the camera, and its pipeline constants
+    visibility : triangle at each sample of the picture
+    view, constants : uniform record of the shading pass without the camera, and its pipeline constants
     outputs : resources of the outputs besides the picture, None without any
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile

@@ -1,4 +1,4 @@
-"""Treatments of seams: the stitched atlas, and those of the 2007 talk [Dudash2007]."""
+"""Treatments of seams: the stitched atlas, and the methods of the 2007 talk [Dudash2007]."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towa
 class SeamMethod:
     """Treatment of seams: the layouts of the atlases, and the texels that blurs read beyond a chart.
 
-    layouts : layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other seams
+    layouts : names of layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other
+        seams
     edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGES`
-    feathered : whether the stretch map is edited so that blurs narrow towards the edges
+    feathered : whether the stretch map is changed near edges so that blurs become narrower there
     coloured : whether empty texels have the colour `Settings.seam_colour` instead of black
     """
 
@@ -38,7 +39,10 @@ SEAM_METHODS = {
 
 
 def seam_method(name: str, can_stitch: bool) -> SeamMethod:
-    """Return the treatment of seams by its name; techniques that cannot stitch clear the colour instead."""
+    """Return the treatment of seams by its name; "clear-colour" replaces "stitch" if that is not possible.
+
+    can_stitch : whether the technique can carry light across seams
+    """
     return SEAM_METHODS["clear-colour" if name == "stitch" and not can_stitch else name]
 
 
@@ -50,7 +54,7 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the atlases of a frame; an atlas that stores neither light nor occlusion has the least size.
+    """Return the layouts and the size of the atlases; the size is minimal where an atlas stores nothing.
 
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment

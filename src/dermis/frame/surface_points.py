@@ -1,4 +1,4 @@
-"""Surface points under pixel centres, and the light that enters the skin at given points."""
+"""Surface points under pixel centres, and the irradiance that enters the skin at given points."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ Index = NDArray[np.int64]
 class SurfacePoints:
     """Surface points of the head under the centres of pixels.
 
-    mask : (h, w) pixels that show the head
-    triangle, barycentric : (n,) triangles and (n, 3) weights of these pixels, row by row
+    mask : (h, w) mask of the pixels that show the head
+    triangle : (n,) indices of the triangles in these pixels, row by row
+    barycentric : (n, 3) barycentric weights in these triangles [-]
     """
 
     mask: NDArray[np.bool_]
@@ -63,7 +64,12 @@ def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Sur
 
 
 def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: NDArray[np.bool_]) -> Floats:
-    """Return the (n, 3) weights of the intersections of rays with their triangles, as in shade.wgsl."""
+    """Return (n, 3) barycentric weights where the camera rays of pixels meet their triangles, see shade.wgsl.
+
+    view : uniform record of the shading pass
+    triangle : (n,) indices of the triangles in the pixels of the mask
+    mask : (h, w) mask of the pixels that show the head
+    """
     height, width = mask.shape
     rows, columns = np.nonzero(mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
@@ -84,11 +90,10 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """Return the (n, 3) irradiance that enters the skin at points, times its colour before scattering.
+    """Return the irradiance that enters the skin at points, times its colour before scattering (n, 3) [-].
 
-    scene : scene without maps and environment, because these need atlas positions; interreflection is left
-        out
-    triangle, barycentric : (n,) triangles and (n, 3) weights
+    scene : scene without maps and environment, because these need atlas positions; interreflection is ignored
+    triangle, barycentric : (n,) triangle indices and (n, 3) barycentric weights of the points
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
     triangles = np.full(side * side, -1, np.int64)
@@ -104,7 +109,10 @@ def irradiance_at(
 
 
 def _irradiance(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
-    """Return the (n * n, 3) irradiance at the (n, n) points of an atlas."""
+    """Return the (n * n, 3) irradiance at surface points, one in each texel of an n x n atlas [-].
+
+    records : (n, n, 2) packed surface points
+    """
     device, side = renderer.device, len(records)
     inputs = renderer.prepare(scene, settings.model_copy(update={"interreflection": False}))
     first = inputs.layouts[0]

@@ -1,4 +1,4 @@
-"""Properties of a scattering technique that are known before its resources exist."""
+"""Properties of scattering techniques that are known before their resources exist."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Profile divided into a narrow Gaussian that is relit in the picture, and Gaussians that blur.
+    """Profile split into a narrow Gaussian that is relit in the picture, and Gaussians that blur light.
 
-    relit, total : (3,) weights of the relit Gaussian, and sums over all Gaussians [-]
+    relit : (3,) weights of the relit Gaussian [-]
+    total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
     others : splits of the profiles that a map blends with this one; they have the same Gaussians
-    fine : members of the shader's struct Fine for light finer than texels, empty without it
+    fine : members of the shader's struct Fine for light that varies within a texel, empty without it
     """
 
     relit: Floats
@@ -34,17 +35,17 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return the (o, 3) differences of the other profiles' relit weights from this one's [-]."""
+        """Return (o, 3) differences of the relit weights: each of the o other profiles minus this one [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return the (k, 3) difference of each other profile's blurred weights from this one's [-]."""
+        """Return (k, 3) differences of the blurred weights, for each other profile: minus this one's [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
 class TechniqueResources:
-    """Base class for the tables and textures of a technique."""
+    """Tables and textures of a technique; base class without any."""
 
 
 class TechniqueTraits:
@@ -58,7 +59,7 @@ class TechniqueTraits:
     needs_curvature : whether the shading pass reads the curvature of the surface
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : memory per pixel besides the picture [bytes]
-    subsurface_layer_bytes : memory per pixel of `Technique.make_subsurface_layers` [bytes]
+    subsurface_layer_bytes : memory per pixel of the textures of `Technique.make_subsurface_layers` [bytes]
     """
 
     sources: ClassVar[tuple[str, ...]] = ()
@@ -72,7 +73,7 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Return the Gaussians that the technique relights and blurs; this base class blurs none.
+        """Split a profile into a relit Gaussian and Gaussians that blur; this base class blurs none.
 
         normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
         """
@@ -80,7 +81,7 @@ class TechniqueTraits:
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
 
     def stretch(self, settings: Settings) -> str:
-        """Return the stretch correction of the blurs, one of the values of `Settings.stretch`."""
+        """Return the stretch correction of the blurs: "full", "axes" or "none", see `Settings.stretch`."""
         return settings.stretch
 
     def texel_bytes(self, levels: int) -> float:
@@ -92,5 +93,5 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians, divided by the profile's albedo to normalise them [-]."""
+    """Return the (k, 3) weights of the Gaussians, if `normalise` scaled to a sum of 1 per channel [-]."""
     return profile.weight / profile.albedo if normalise else profile.weight

@@ -1,4 +1,4 @@
-"""Parallel light, of one direction or of a sun."""
+"""Parallel light from one direction, or from the disc of a sun."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Environment as the shaders read it: prefiltered panorama and suns."""
+"""Environment on the device: prefiltered panorama, and its suns as lights."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap:
-    """Prefiltered panorama on the device.
+    """Prefiltered panorama on the device, and its suns.
 
     panorama : texture with one layer of irradiance, then reflections by roughness; black without an
         environment
-    suns : peaks of the panorama, which are lights of their own
-    peak_irradiance : largest irradiance without the suns [-]
+    suns : bright peaks that were cut out of the panorama to be rendered as lights
+    peak_irradiance : largest irradiance in the panorama without its suns [-]
     """
 
     panorama: Texture
@@ -37,7 +37,7 @@ class EnvironmentMap:
 
 
 def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
-    """Return the prefiltered panorama of an environment, or a black one for None.
+    """Return the prefiltered panorama of an environment, or a black one for the name None.
 
     Raises DermisError when there is no such environment.
     """
@@ -50,7 +50,7 @@ def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
 
 
 def unfiltered_panorama(device: Device, name: str) -> Texture:
-    """Upload an unfiltered panorama with its suns as the first of two layers, for backgrounds."""
+    """Upload an unfiltered panorama, suns included, for sharp backgrounds; a second layer is black."""
     radiance = load_panorama(name, max_rows=_BACKGROUND_ROWS).astype(np.float32)
     return _upload_layers(device, [radiance, np.zeros_like(radiance)])
 
@@ -66,14 +66,17 @@ def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArr
 
 
 def _with_border(layer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a panorama with a border for filters; rows beyond a pole continue on the other side."""
+    """Return a panorama with a border of one texel for filters.
+
+    Columns wrap around. Beyond a pole, the border continues on the opposite side of the sphere.
+    """
     half = layer.shape[1] // 2
     rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 
 def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene:
-    """Return the scene with the suns of its environment among its lights."""
+    """Return the scene with the suns of its environment appended to its lights."""
     environment = scene.environment
     if environment is None or not environment_map.suns:
         return scene
@@ -82,9 +85,9 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 
 
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
-    """Return the irradiance of a surface that faces all lights and the brightest part of the environment [-].
+    """Return an upper bound of irradiance: of a surface that faces all lights and the brightest sky [-].
 
-    scene : with the suns of its environment among its lights
+    scene : scene that has the suns of its environment among its lights
     """
     environment = environment_map.peak_irradiance * scene.environment.exposure if scene.environment else 0.0
     return environment + sum(max(light.irradiance) for light in scene.lights)
@@ -97,9 +100,10 @@ def environment_record(
     albedo: NDArray[np.float64],
     occluded: bool,
 ) -> UniformRecord:
-    """Return the shader record of the environment.
+    """Return the uniform record of the environment: rotation, exposure and lobes of reflections.
 
     albedo : (3,) albedo of the profile as the frame uses it [-]
+    occluded : whether the head hides part of the environment from its skin
     """
     if environment is None:
         return program.record("Environment")

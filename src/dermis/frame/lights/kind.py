@@ -1,4 +1,4 @@
-"""Interface of a kind of light in the frame; its shader is the WGSL file beside its module."""
+"""Interface of a kind of light in the frame; the shader is the WGSL file beside the module of the kind."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ L = TypeVar("L", bound=Light)
 
 
 class Kind(Generic[L]):
-    """Kind of light in the frame; this base class is a punctual light without members of its own.
+    """Kind of light in the frame; this base class is a punctual light without shader members of its own.
 
     The shader has the name of the module with the suffix .wgsl. With NAME as in scene files, but with
     underscores for hyphens, it defines
@@ -30,13 +30,13 @@ class Kind(Generic[L]):
     Attributes
     ----------
     always : bool
-        Whether all shaders include the kind; others are compiled only for scenes that use them.
+        Whether all shaders include this kind of light; others are compiled only for scenes that use them.
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool
         Whether the shape seen from the head is a disc instead of a rectangle.
     sheet : bool
-        Whether the light is a Gaussian across the member `half_u`, whose convolutions are known.
+        Whether irradiance is a Gaussian along the shader member `half_u`, so that blurs of it are exact.
 
     Examples
     --------
@@ -52,11 +52,11 @@ class Kind(Generic[L]):
 
     @property
     def shader(self) -> Path:
-        """Return the path of the shader."""
+        """Return the path of the WGSL file that computes the light at a point."""
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
     def has_size(self, light: L) -> bool:
-        """Return whether shadows soften with the distance from the occluder.
+        """Return whether shadows of the light soften with the distance from the occluder.
 
         Parameters
         ----------
@@ -66,12 +66,17 @@ class Kind(Generic[L]):
         return not self.punctual
 
     def parts(self, light: L) -> list[Light]:
-        """Return the lights that together equal this one, each with its own shadow map.
+        """Divide a light into parts that together equal it, each with its own shadow map.
 
         Parameters
         ----------
         light : Light
             Light of the scene.
+
+        Returns
+        -------
+        list of Light
+            The parts; the light itself for kinds that are not divided.
         """
         return [light]
 
@@ -125,10 +130,10 @@ KINDS: Registry[Kind[Any]] = Registry(
 
 
 def area_light_members(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:
-    """Return the shader members of an area light that faces its target.
+    """Return the members of the shader struct `Light` for an area light that faces its target.
 
     radiance : radiance that gives an irradiance of 1 at the target [1/sr]
-    half_width, half_height : half sides [mm]
+    half_width, half_height : half the width and half the height of the light [mm]
     """
     right, up, _ = view_axes(vector_between(light.position, light.target))
     return {
@@ -140,12 +145,15 @@ def area_light_members(light: PointLight, radiance: float, half_width: float, ha
 
 
 def override_name(name: str) -> str:
-    """Return the name of the shaders' `override` for a kind, from its name in scene files."""
+    """Return the name of the pipeline constant that enables a kind of light in shaders.
+
+    name : name of the kind in scene files
+    """
     return f"{name.replace('-', '_').upper()}_LIGHT"
 
 
 def light_shaders() -> list[Member]:
-    """Return the shaders of all kinds, for lights.wgsl to include."""
+    """Return the shaders of all kinds of lights, which lights.wgsl includes and numbers in this order."""
     return [
         Member(name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower())))
         for name, kind in KINDS.items()

@@ -1,4 +1,4 @@
-"""Light from a point."""
+"""Light from a point, equally in all directions."""
 
 from __future__ import annotations
 

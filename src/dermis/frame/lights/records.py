@@ -1,4 +1,4 @@
-"""Shader records of the scene's lights, and their shadow views."""
+"""Uniform records of the scene's lights, and the views of their shadow maps."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _RAYS, _MIN_RAYS, _SUN_RAYS = 64, 12, 32  # shadow rays to an area light, to a p
 
 
 def light_shader_constants() -> dict[str, float]:
-    """Return the constants of lights.wgsl and soft_shadows.wgsl, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in lights.wgsl and soft_shadows.wgsl, by name."""
     return {"max_lights": _MAX_LIGHTS, "max_rays": _RAYS, "min_rays": _MIN_RAYS}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
-    """Return the suns of a panorama as lights, with its rotation and exposure."""
+    """Return the suns of a panorama as parallel lights, rotated and exposed like their environment."""
     angle = np.radians(environment.rotation_degrees)
     lights = []
     for sun in suns:
@@ -59,7 +59,7 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 
 def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lighting.wgsl that the scene needs."""
+    """Return the pipeline constants of lighting.wgsl that enable what the scene's lights and skin need."""
     each = [(KINDS[light.kind], light) for light in scene.lights]
     used_kinds = sorted({light.kind for kind, light in each if not kind.always})
     flags = {
@@ -72,20 +72,20 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Return constants that enable oblique incidence if the skin is a half-space.
+    """Add the pipeline constant that enables oblique incidence, if the skin is a half-space.
 
-    Only passes that know the shape of the surface around a point may use them.
+    Only passes that know the shape of the surface around a point may use the result.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
 
 def light_part_counts(scene: Scene) -> tuple[int, ...]:
-    """Return the number of parts that each light is divided into."""
+    """Return the number of parts into which each light is divided, 1 for most lights."""
     return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
 
 
 def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
-    """Return the shadow view of each part of each light, None for those without shadows.
+    """Return the view of the shadow map of each part of each light, None for lights without shadows.
 
     outline : outline of the head's shape
     size : side of the shadow maps [texels]
@@ -116,9 +116,9 @@ def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | 
 
 
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> UniformRecord:
-    """Return the shader record of all lights.
+    """Return the uniform record `Lights` of all lights of the scene.
 
-    views : shadow view of each part of each light
+    views : view of the shadow map of each part of each light, from `light_views`
     """
     record = program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
@@ -136,7 +136,10 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
 
 @cache
 def light_sample_points() -> Floats:
-    """Return 64 evenly spread points [Roberts2018] on a disc and on a square, (64, 4) from -1 to 1."""
+    """Return evenly spread sample points of area lights, (64, 4) from -1 to 1 [Roberts2018].
+
+    Columns are x and y on the unit disc, then x and y on the square.
+    """
     even = (0.5 + np.arange(_RAYS)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
     disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
@@ -144,9 +147,9 @@ def light_sample_points() -> Floats:
 
 
 def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
-    """Return the members of a light in the shader record that are not 0.
+    """Return the members of the shader struct `Light` that are not 0.
 
-    siblings : number of parts of the light to which this part belongs
+    siblings : number of parts into which the light is divided, this part included
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)
     distance, texel, position = 1.0, 1.0, (0.0, 0.0, 0.0)

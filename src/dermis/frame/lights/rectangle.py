@@ -1,4 +1,4 @@
-"""Rectangular lights, which are divided into parts with a shadow map each."""
+"""Rectangular lights, which are divided into parts with one shadow map each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class _Rectangle(Kind[RectangleLight]):
     round = False
 
     def parts(self, light: RectangleLight) -> list[Light]:
-        """Return parts no wider or higher than 0.35 of the distance, but at most 3 x 3 of them."""
+        """Divide the rectangle into at most 3 x 3 parts no wider or higher than 0.35 of the distance."""
         path = vector_between(light.position, light.target)
         distance = math.hypot(*path)
         columns, rows = (_part_count(side, distance) for side in (light.width_mm, light.height_mm))
@@ -57,12 +57,15 @@ KIND = _Rectangle()
 
 
 def _part_count(side_mm: float, distance_mm: float) -> int:
-    """Return the number of parts along a side."""
+    """Return the number of parts along one side of a rectangle, seen from a distance."""
     return min(max(math.ceil(side_mm / (_MAX_PART * distance_mm)), 1), _MAX_PARTS)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance opposite the centre of a rectangle of radiance 1 [-].
+    """Return the irradiance at a point opposite the centre of a rectangle of radiance 1 [-].
+
+    width, height : sides of the rectangle [mm]
+    distance : distance of the point from the centre [mm]
 
     Source: the view factor of a corner, [Baum1989].
     """

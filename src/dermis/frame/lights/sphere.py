@@ -1,4 +1,4 @@
-"""Uniformly bright sphere."""
+"""Sphere that emits the same radiance everywhere."""
 
 from __future__ import annotations
 

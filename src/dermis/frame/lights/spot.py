@@ -1,4 +1,4 @@
-"""Point light within a cone."""
+"""Light from a point within a cone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sheet of parallel light."""
+"""Thin sheet of parallel light, which draws a stripe on the skin."""
 
 from __future__ import annotations
 

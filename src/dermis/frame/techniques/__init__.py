@@ -1,1 +1,1 @@
-"""Scattering techniques: a Python module each, with its shaders beside it."""
+"""Scattering techniques: one Python module for each, with its shaders beside it."""

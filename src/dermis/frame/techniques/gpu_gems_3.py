@@ -1,4 +1,7 @@
-"""Blurs of GPU Gems 3 (2007) as a baseline: seven taps, half floats, a blurred stretch map."""
+"""Texture-space diffusion of GPU Gems 3 (2007), as a baseline.
+
+It blurs with seven taps and half floats, and blurs the stretch map together with the light.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +32,16 @@ Pair = tuple[TextureOrView, TextureOrView]
 
 @dataclass(frozen=True, eq=False)
 class StretchedLevels(PyramidLevels):
-    """Pyramid levels with textures for a stretch map that is blurred together with the light."""
+    """Pyramid levels with textures for a stretch map that is blurred together with the light.
+
+    stretch : blurred stretch map, and the map that is blurred along u only
+    """
 
     stretch: Pair | None = None
 
 
 class GpuGems3(AtlasTechnique):
-    """Texture-space diffusion as published in 2007, with twelve passes for six Gaussians."""
+    """Texture-space diffusion as published in 2007: two blur passes for each Gaussian, twelve for six."""
 
     sources = ("dEonLuebke2007",)
     stitches_seams = False
@@ -50,11 +56,11 @@ class GpuGems3(AtlasTechnique):
         )
 
     def texel_bytes(self, levels: int) -> float:
-        """Return the memory per atlas texel [bytes]."""
+        """Return the memory per atlas texel of the pyramid levels and the blurred stretch map [bytes]."""
         return float(FORMAT_BYTES[HALVES] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return 0 for each level: all have the full resolution."""
+        """Return 0 for each level, as all levels have the full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
@@ -99,7 +105,12 @@ class GpuGems3(AtlasTechnique):
         into: Pair,
         side: int,
     ) -> None:
-        """Declare one pass that writes a texture of light and one of stretch."""
+        """Declare one blur pass, which writes a texture of light and one of the stretch map.
+
+        bound : resources of the shader that it reads
+        into : textures for blurred light and for the blurred stretch map
+        side : side of the atlas [texels]
+        """
         assert isinstance(shader, ComputeProgram)
         bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
         graph.compute("diffuse", shader, bound, (side, side))

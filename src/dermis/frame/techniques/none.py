@@ -1,4 +1,4 @@
-"""Dry skin: all light leaves where it enters."""
+"""Skin without subsurface scattering: all light leaves where it enters."""
 
 from dermis.frame.techniques.technique import Technique
 

@@ -11,7 +11,7 @@ from dermis.scene.settings import Settings
 
 
 class OneBlur(TextureSpace):
-    """One Gaussian instead of the profile, with the same width everywhere on the map."""
+    """Blur by one Gaussian instead of the profile, with the same width in texels everywhere."""
 
     sources = ("Borshukov2003", "Green2004")
     stitches_seams = False
@@ -22,7 +22,7 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Return the single blur, without light finer than texels."""
+        """Return the single Gaussian as blurred, without corrections for light that varies within a texel."""
         return AtlasTechnique.split(self, profile, normalise)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
@@ -30,7 +30,7 @@ class OneBlur(TextureSpace):
         return False
 
     def stretch(self, settings: Settings) -> str:
-        """Return "none": one density for the whole map."""
+        """Return "none": blurs assume the same texel density over the whole map."""
         return "none"
 
 

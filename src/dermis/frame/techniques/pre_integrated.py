@@ -30,9 +30,10 @@ _MAX_PENUMBRA_MM = 8.0
 
 @dataclass(frozen=True, eq=False)
 class PreIntegratedTables(TechniqueResources):
-    """Tables of a profile for the shading pass.
+    """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture of `sphere_table` rows, then `shadow_edge` rows
+    table : texture with the rows of `sphere_table`, then one row of `shadow_edge` for each width of shadow
+        filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
@@ -43,7 +44,7 @@ class PreIntegratedTables(TechniqueResources):
 
 
 class PreIntegratedSkin(Technique):
-    """Scattering by tables over curvature, and across the edges of shadows."""
+    """Scattering that is read from tables: by the curvature of the surface, and across shadow edges."""
 
     sources = ("Penner2011",)
     needs_curvature = True
@@ -52,13 +53,13 @@ class PreIntegratedSkin(Technique):
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> PreIntegratedTables:
-        """Return the tables of the profile."""
+        """Return the tables of scattered light for the profile."""
         return memo.get(pre_integrate, device, profile)
 
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
-        """Write the scales of the tables to the shading record."""
+        """Write the largest curvature, the penumbra width and the relief smoothing to the shading record."""
         assert isinstance(resources, PreIntegratedTables)
         scales = {
             "max_curvature": MAX_CURVATURE,
@@ -79,7 +80,7 @@ TECHNIQUE = PreIntegratedSkin()
 
 
 def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
-    """Return the tables of a profile on the device."""
+    """Compute the tables of scattered light for a profile, and upload them."""
     penumbra = penumbra_width_mm(profile)
     edges = [shadow_edge(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGES)]
     rows = np.concatenate([sphere_table(profile), np.stack(edges)])
@@ -92,9 +93,10 @@ def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
 def sphere_table(profile: GaussianSum) -> Floats:
     """Return max(N.L, 0) after scattering on spheres, (n, m, c): rows by curvature, columns by N.L [-].
 
-    Rows end at `MAX_CURVATURE`. Light spreads by straight distance: on a sphere of radius r a Gaussian of
-    variance v is exp(r^2/v (cos a - 1)), normalised over the sphere. [Penner2011] integrates around a ring
-    instead, which does not conserve energy.
+    N is the normal and L the direction to the light; N.L is from -1 to 1, curvature from 0 to
+    `MAX_CURVATURE`. Light spreads by straight distance: on a sphere of radius r, a Gaussian of variance v is
+    exp(r^2/v (cos a - 1)) at the central angle a, normalised over the sphere. [Penner2011] integrates around
+    a ring instead, which does not conserve energy.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINES)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
@@ -106,10 +108,10 @@ def sphere_table(profile: GaussianSum) -> Floats:
 
 
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
-    """Return the clamped cosine convolved on the sphere with a normalised exp(k cos a) [-].
+    """Return max(N.L, 0) convolved on the sphere with exp(k cos a), normalised; a is the central angle [-].
 
     cosines : values of N.L at which the result is evaluated [-]
-    concentration : k, the squared radius over the variance [-]
+    concentration : k, the squared radius of the sphere over the variance of the Gaussian [-]
     """
     from scipy.special import i0e
 
@@ -126,8 +128,9 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 
 
 def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Return (m, c) scattered light across a straight shadow edge, from -radius (dark) to radius (lit) [-].
+    """Return light after scattering across a straight shadow edge, (m, c) from dark to lit [-].
 
+    radius_mm : distance from the edge of the first and of the last entry [mm]
     half_width_mm : half width of the tent filter that already softens the edge [mm]
     """
     kernel = preintegrated_kernel(profile)
@@ -147,7 +150,10 @@ def penumbra_width_mm(profile: GaussianSum) -> float:
 
 
 def half_light_sigma_mm(profile: GaussianSum) -> Floats:
-    """Return the (c,) standard deviations of Gaussians with the half-light radii of the profile [mm]."""
+    """Return the (c,) standard deviations of Gaussians with the profile's half-light radii [mm].
+
+    The half-light radius is that within which half of the light emerges.
+    """
     radius = np.geomspace(1e-3, 100.0, 2048)
     within = profile.energy_within(radius) / profile.albedo
     half = [np.interp(0.5, channel, radius) for channel in within.T]

@@ -37,11 +37,11 @@ _ENTRIES = 256
 
 @dataclass(frozen=True, eq=False)
 class SubsurfaceLayers(TechniqueResources):
-    """Textures of the light below the skin, and those needed to diffuse it.
+    """Textures of the light below the skin in the picture, and those needed to diffuse it.
 
-    layers : light below the skin with its depth [mm]; fraction of it that leaves towards the camera
-    subsurface, transmittance : views of the two layers
-    scratch : light diffused along rows only
+    layers : light below the skin with its depth [mm], and the fraction of it that leaves towards the camera
+    subsurface, transmittance : views of these two layers
+    scratch : light that is diffused along rows but not yet along columns
     result : finished picture, None for outputs, which need only the light below the skin
     kernel : kernel of the profile, None for outputs, which use that of the picture
     """
@@ -56,7 +56,7 @@ class SubsurfaceLayers(TechniqueResources):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Cumulative one-sided diffusion kernel as a texture over the square root of the distance.
+    """Diffusion kernel, integrated from 0 to a distance, as a texture over the square root of the distance.
 
     reach_mm : distance of the last entry [mm]
     """
@@ -66,7 +66,7 @@ class Kernel:
 
 
 class ScreenSpace(Technique):
-    """Technique that diffuses the light of visible skin in the picture [Jimenez2015]."""
+    """Technique that diffuses the light below the skin over the pixels of the picture [Jimenez2015]."""
 
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
@@ -74,16 +74,16 @@ class ScreenSpace(Technique):
     subsurface_layer_bytes = 48
 
     def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> SubsurfaceLayers:
-        """Return the textures of a picture and the kernel of the profile."""
+        """Return the textures in which the picture's light is diffused, and the kernel of the profile."""
         layers = memo.get(make_subsurface_layers, device, settings.size)
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return the textures of the outputs, without a finished picture."""
+        """Return the textures in which the light of outputs is diffused, without a finished picture."""
         return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture of light below the skin and its transmittance."""
+        """Return the texture layers for the light below the skin and the fraction that leaves it."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
@@ -95,7 +95,11 @@ class ScreenSpace(Technique):
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
     ) -> tuple[TextureOrView, TextureOrView]:
-        """Declare the passes that diffuse the light of the outputs; return it and its transmittance."""
+        """Declare the passes that diffuse the light of outputs.
+
+        The result is texture views of the diffused light, and of the fraction of it that leaves towards the
+        camera.
+        """
         layers, own = inputs.resources.output_layers, inputs.resources.technique
         assert (
             isinstance(layers, SubsurfaceLayers)
@@ -124,7 +128,7 @@ def make_subsurface_layers(
 
 
 def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
-    """Return the kernel of a profile on the device."""
+    """Compute the diffusion kernel of a profile, and upload it."""
     table, reach_mm = kernel_table(preintegrated_kernel(profile))
     return Kernel(texture_from_array(device, table, "rgba32float"), reach_mm)
 
@@ -134,7 +138,7 @@ def draw(
 ) -> Texture:
     """Declare the passes that diffuse the light of `layers`, and return the finished picture.
 
-    window : part of the image plane that the picture shows
+    window : rectangle of the image plane that the picture shows
     surface : shaded picture without the light below the skin
     """
     assert layers.result is not None
@@ -151,9 +155,9 @@ def draw(
 
 
 def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window) -> None:
-    """Declare the passes that diffuse the light of `layers` along rows and columns.
+    """Declare the passes that diffuse the light of `layers` along rows, then along columns.
 
-    window : part of the image plane that the picture shows
+    window : rectangle of the image plane that the picture shows
     """
     device, size = graph.device, layers.scratch.size[:2]
     programs = [program(device, FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
@@ -173,9 +177,9 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
 
 
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return the (1, n, 4) cumulative one-sided kernel, and its reach [mm].
+    """Return the kernel integrated from 0 to n distances, (1, n, 4), and the largest distance [mm].
 
-    Entries are evenly spaced in the square root of the distance.
+    Distances are evenly spaced in their square root.
     """
     reach = _reach(kernel)
     fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
@@ -184,7 +188,7 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
 
 def _reach(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which no channel has more than `_TAIL` of its light [mm]."""
+    """Return the distance beyond which, on one side, no channel has more than `_TAIL` of its light [mm]."""
     distance = np.geomspace(_MIN_REACH_MM, _MAX_REACH_MM, 4096)
     beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -1,4 +1,4 @@
-"""Base classes of scattering techniques: without scattering, and with diffusion over the atlas."""
+"""Base classes of scattering techniques: one without scattering, and one that diffuses over the atlas."""
 
 from __future__ import annotations
 
@@ -49,24 +49,28 @@ class Technique(TechniqueTraits):
     """
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Create textures for light and its blurred levels, minimal where the atlas holds no light."""
+        """Create the textures of the blur pyramid, minimal for techniques that blur no light over the atlas.
+
+        side : side of the atlas [texels]
+        halvings : how often the resolution of each level is halved, for each layout
+        """
         return make_levels(device, side, halvings, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Texture:
-        """Create the texture for the exitance of scattered light."""
+        """Create the texture for the exitance of scattered light, side x side texels."""
         return combine.make_sum(device, side)
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Return the split with intermediate Gaussians of weight 0, and their level numbers; here none.
+        """Add Gaussians of weight 0 to the split that make blurs cheaper, and return their levels; here none.
 
         edge : filter mode at the edges of charts
         """
         return split, ()
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how many times the resolution of each level is halved, the unblurred one first.
+        """Return how often the resolution of each level is halved, starting with the unblurred level.
 
         edge : filter mode at the edges of charts
         """
@@ -75,57 +79,64 @@ class Technique(TechniqueTraits):
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> TechniqueResources | None:
-        """Return the tables and textures of the technique, cached by the memo; None for none."""
+        """Return the tables and textures of the technique, cached by the memo; None if it needs none."""
         return None
 
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return the textures in which light below the skin is rendered for outputs, None for none."""
+        """Return textures for outputs of the light below the skin, None for techniques that need none."""
         return None
 
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
-        """Write the technique's members of the shading record.
+        """Write the members of the shading record that only this technique reads.
 
         shade : program of the shading pass
         resources : result of `make`
         """
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture to which the shading pass writes light below the skin, None for none."""
+        """Return the texture to which shading writes light below the skin, None to add it to the picture."""
         return None
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes before shading, and return the texture that shading reads as `scattered`."""
+        """Declare the passes before shading, and return the texture that shading reads as `scattered`.
+
+        It holds the exitance of scattered light over the atlas, unless the technique stores other data there.
+        """
         return inputs.resources.scattered
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
-        """Declare the passes after shading, and return the texture of the picture."""
+        """Declare the passes after shading, and return the texture of the radiance of the picture."""
         return radiance
 
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
     ) -> tuple[TextureOrView, TextureOrView]:
-        """Diffuse the light of `make_subsurface_layers`; return it and its transmittance as textures."""
+        """Declare the passes that diffuse the light in the textures of `make_subsurface_layers`.
+
+        The result is textures of the diffused light, and of the fraction of it that leaves towards the
+        camera.
+        """
         raise NotImplementedError
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
-        """Sum only the light through thin parts; return the texture of all layouts.
+        """Sum only the light through thin parts, for outputs; return the texture that combines all layouts.
 
-        into : textures of the atlas, one per layout and, for several layouts, one of all together
+        into : textures of the atlas, one per layout and, for several layouts, one of their blend
         """
         raise NotImplementedError
 
 
 class AtlasTechnique(Technique):
-    """Technique that lights the atlas, blurs the light by each Gaussian, and sums the levels."""
+    """Technique that lights the atlas, blurs the light by each Gaussian, and sums the blurred levels."""
 
     uses_atlas = True
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """Return the sum of Gaussians by which light is blurred."""
+        """Return the Gaussians by which the technique approximates a profile; here those of the profile."""
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
@@ -133,7 +144,10 @@ class AtlasTechnique(Technique):
         return bool(profile.variance_mm2[0] <= _RELIT_MM2)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Return the relit Gaussian and those that blur."""
+        """Split a profile into the narrow Gaussian that is relit, if any, and the Gaussians that blur.
+
+        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
+        """
         profile = self.gaussians(profile)
         weight = channel_weights(profile, normalise)
         total = weight.sum(axis=0)
@@ -142,7 +156,7 @@ class AtlasTechnique(Technique):
         return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Create textures for light and its blurred levels."""
+        """Create the textures of the blur pyramid in the format that is fastest on the device."""
         return make_levels(device, side, halvings, level_format(device))
 
     def texel_bytes(self, levels: int) -> float:
@@ -151,12 +165,15 @@ class AtlasTechnique(Technique):
         return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # upper bound, as if no level were halved
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how many times the resolution of each level is halved, the unblurred one first."""
+        """Return how often the resolution of each level is halved, starting with the unblurred level.
+
+        edge : filter mode at the edges of charts
+        """
         max_halvings = len(atlas.mips_for(edge)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum each layout, and blend two layouts."""
+        """Declare the passes that light, blur and sum the light of each layout, and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -200,7 +217,11 @@ class AtlasTechnique(Technique):
         thin: Translucency | None,
         into: TextureOrView,
     ) -> None:
-        """Declare the passes that carry blurred light through thin parts and sum the exitance."""
+        """Declare the passes that sum the blurred levels as exitance, light through thin parts included.
+
+        thin : resources of the light through thin parts, None without it
+        into : texture for the exitance
+        """
         through = translucency.draw(graph, levels, blur, thin) if thin else None
         combine.draw(graph, levels, blur, into, through, thin.pairs.lost if thin else None)
 
@@ -216,8 +237,12 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that add the other profiles of a mixture to the exitance of the first.
 
-        Light from y leaves at x as much as light from x at y: each Gaussian has the weight (w(x) + w(y)) / 2,
-        half of it by the receiving and half by the entering point.
+        Transport is reciprocal: light from y leaves at x as much as light from x leaves at y. So each
+        Gaussian has the weight (w(x) + w(y)) / 2, where w is the blend weight, x the exit point and y the
+        entry point.
+
+        layout : index of the atlas layout
+        into : texture for the exitance
         """
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)
@@ -228,7 +253,7 @@ class AtlasTechnique(Technique):
         mix.draw(graph, mixture, layout, into)
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
-        """Sum only the light through thin parts, with the passes that sum the blurred levels."""
+        """Sum only the light through thin parts, by the passes that sum blurred levels, with weights of 0."""
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, into, strict=False):
             unblurred, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency

@@ -1,4 +1,4 @@
-"""Texture-space diffusion by a hierarchy of Gaussians, stitched across the seams of the atlas."""
+"""Texture-space diffusion by a hierarchy of Gaussian blurs, stitched across the seams of the atlas."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Return the relit Gaussian, those that blur, and the constants for light finer than texels."""
+        """Split a profile into relit and blurred Gaussians; `fine` corrects light within a texel.
+
+        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
+        """
         split = super().split(profile, normalise)
         relit_mm2 = float(profile.variance_mm2[0]) if self.relights_narrowest(profile) else 0.0
         return replace(split, fine=fine_light_members(split.blurred_mm2, split.weight, relit_mm2))
@@ -33,7 +36,10 @@ class TextureSpace(AtlasTechnique):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Return the split with intermediate Gaussians that make blurs cheaper, and their level numbers."""
+        """Add Gaussians of weight 0 to the split that make blurs cheaper, and return their levels.
+
+        edge : filter mode at the edges of charts
+        """
         max_halvings = len(atlas.mips_for(edge)) - 1
         variances, steps = add_intermediate_levels(
             split.blurred_mm2, atlas.median_texels_per_mm, max_halvings

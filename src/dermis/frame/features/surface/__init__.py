@@ -1,4 +1,4 @@
-"""Surface of the skin: specular lobe, maps, painted maps, and the surface at the texels of the atlas."""
+"""Surface of the skin: specular lobe, maps from files, painted maps, and the surface at atlas texels."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -8,10 +8,10 @@ from dermis.gpu.wgsl_source import Member
 
 
 def shader_constants() -> Mapping[str, float]:
-    """Return the constants of shaders of lobes, eyes, mouths and painted skin by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in shaders of lobes, eyes, mouths and painted skin."""
     return {**lobe_constants(), **eye_constants(), **painting_constants()}
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Return the lists that shaders of lobes and painted skin expand with `//#each`."""
+    """Return the names of lobes and of layers of painted skin, which `//#each` lines of shaders expand."""
     return {"lobes": lobe_shaders, **texture_names()}

@@ -1,4 +1,4 @@
-"""Maps of the head as textures."""
+"""Maps of the head as textures, from files or painted on the device."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _MEAN_SIDE = 512  # of the grid over which the mean of a map is computed [texels
 class UploadedMaps:
     """Maps of a head on the device.
 
-    bindings : resources by their names in skin.wgsl
-    expression_maps : painted maps that expressions change, None for none
+    bindings : textures and samplers by their names in skin.wgsl
+    expression_maps : painted maps that expressions change, None if no map changes
     """
 
     bindings: MutableBindings
@@ -43,7 +43,7 @@ class UploadedMaps:
 def upload_maps(
     device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, animated: bool = False
 ) -> UploadedMaps:
-    """Upload or paint the maps of a head, with their sampler and the table of the specular lobe.
+    """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
     use_colour : False replaces the colour map by white, for profiles that contain the colour
     decoded : False takes sRGB values of the colour map for linear ones, a mistake that the talk shows
@@ -62,9 +62,9 @@ def upload_maps(
 
 
 def detail_bindings(device: Device, fine: bool) -> MutableBindings:
-    """Return the texture of relief finer than maps and its sampler, by their names in skin.wgsl.
+    """Return the tiled texture of relief finer than maps and its sampler, by their names in skin.wgsl.
 
-    fine : False gives a flat texture
+    fine : False gives a flat texture, for skin without such relief
     """
     slopes = detail_slopes() if fine else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
@@ -75,7 +75,7 @@ def detail_bindings(device: Device, fine: bool) -> MutableBindings:
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps that have no file; return them, and those among them that expressions change.
+    """Paint the maps for which the head has no file; return them with their changes by expressions.
 
     paint_options : side [texels], and whether expressions change the maps
     """
@@ -92,7 +92,7 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the surface to paint: that of the topology, as all people of a template share it."""
+    """Return the mesh over which skin is painted: the template's, which all its people share."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
@@ -123,7 +123,7 @@ def _factor_channel(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
 
 
 def _relative_to_mean(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
-    """Return a map divided by its mean over the surface, as a factor of the skin's own value."""
+    """Return a map divided by its mean over the surface, a factor for uniform specular strength [-]."""
     if values is None:
         return _factor_channel(None)
     texel, triangle = rasterise(mesh, _MEAN_SIDE, np.arange(len(mesh.triangles)))
@@ -139,7 +139,7 @@ def _relative_to_mean(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray
 def _upload_grey(device: Device, values: NDArray[np.float32]) -> Texture:
     """Upload a one-channel map as half floats with all mip levels.
 
-    The CPU computes the levels, as devices need not support storing r16float.
+    The CPU computes the levels, because devices need not support writing to r16float textures.
     """
     levels = mip_chain(values)
     height, width = values.shape[:2]

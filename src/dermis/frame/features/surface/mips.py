@@ -1,4 +1,4 @@
-"""Maps of the head with mip levels, which the device computes."""
+"""Maps with mip levels, which the device computes."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ _BAND_BYTES = 96 << 20  # heights per pass: every device can bind as many
 
 
 class MippedTexture(NamedTuple):
-    """Texture with a view of each mip level."""
+    """Texture with a view of each mip level, the finest first."""
 
     texture: Texture
     levels: tuple[TextureView, ...]
 
     @property
     def size(self) -> tuple[int, int]:
-        """Return the width and height of the first level [texels]."""
+        """Return the width and height of the finest level [texels]."""
         width, height = self.texture.size[:2]
         return width, height
 
 
 def upload_colours(device: Device, image: Floats) -> Texture:
-    """Upload an (h, w, 3) picture with its mip levels."""
+    """Upload an (h, w, 3) colour map as half floats with all mip levels."""
     mipped = empty_map(device, image.shape)
     alpha = np.ones(image.shape[:2], np.float16)
     upload(device, mipped.texture, np.dstack([image.astype(np.float16), alpha]))
@@ -53,7 +53,10 @@ def upload_colours(device: Device, image: Floats) -> Texture:
 
 
 def upload_slopes(device: Device, image: Floats | None) -> Texture:
-    """Upload (h, w, 2) slopes with their squares and mip levels; None gives a flat texture."""
+    """Upload (h, w, 2) slopes and their squares with all mip levels, from which variances are filtered.
+
+    image : slopes along u and v, None for a flat texture
+    """
     if image is None:
         return _flat(device)
     mipped, frame = empty_map(device, image.shape), CommandList(device, timed=False)
@@ -66,7 +69,10 @@ def upload_slopes(device: Device, image: Floats | None) -> Texture:
 
 
 def upload_detail(device: Device, slopes: Floats) -> Texture:
-    """Upload the (h, w, 4) slopes of a tile of two kinds of relief, and their squares as a second layer."""
+    """Upload the slopes of two tiling reliefs as one layer, and their squared lengths as a second layer.
+
+    slopes : (h, w, 4) slopes along u and v of the first relief, then of the second
+    """
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
     layers = slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))
@@ -80,9 +86,11 @@ def upload_detail(device: Device, slopes: Floats) -> Texture:
 
 
 def make_relief(device: Device, height: Floats | None) -> Texture:
-    """Compute the slopes of an (h, w) height map [mm/texel], with their squares and mip levels.
+    """Compute a texture of the slopes of a height map and their squares, with all mip levels.
 
-    None gives a flat texture. Heights are extrapolated linearly beyond the edges.
+    height : (h, w) heights whose differences are slopes [mm/texel], None for a flat texture
+
+    Heights are extrapolated linearly beyond the edges.
     """
     if height is None or height.size == 1:
         return _flat(device)
@@ -95,7 +103,7 @@ def make_relief(device: Device, height: Floats | None) -> Texture:
 def relief_from_buffers(
     device: Device, bands: Iterable[Buffer], shape: tuple[int, ...], band: int
 ) -> Texture:
-    """Compute the slopes of heights in buffers, with their squares and mip levels.
+    """Compute a texture of the slopes of a height map and their squares, from heights in buffers.
 
     bands : buffers of consecutive rows, with a border of one texel on all sides
     shape : (h, w) of the height map
@@ -110,7 +118,11 @@ def relief_from_buffers(
 
 
 def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:
-    """Declare the passes that fill a texture of even size with the slopes of heights in one buffer."""
+    """Declare the passes that fill a relief texture of even size from the heights in one buffer.
+
+    relief : texture for the slopes and their squares
+    heights : buffer of heights with a border of one texel on all sides [mm]
+    """
     _draw_slopes(recorder, relief, heights, 0, relief.size[1])
     fill_mips(recorder, relief, 2)
 
@@ -135,23 +147,23 @@ def _flat(device: Device) -> Texture:
 
 
 def empty_map(device: Device, shape: tuple[int, ...]) -> MippedTexture:
-    """Create an empty (h, w) map with all mip levels."""
+    """Allocate an (h, w) map of half floats with all mip levels."""
     mips = max(shape[:2]).bit_length()
     texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips, name="painted map")
     return with_mip_views(texture)
 
 
 def with_mip_views(texture: Texture) -> MippedTexture:
-    """Return a texture with a view of each mip level."""
+    """Return a texture together with a view of each of its mip levels."""
     return MippedTexture(
         texture, tuple(make_view(texture, mip=mip) for mip in range(texture.mip_level_count))
     )
 
 
 def fill_mips(recorder: Recorder, mipped: MippedTexture, first: int = 1) -> None:
-    """Declare the passes that fill mip levels, each from the one before.
+    """Declare the passes that compute each mip level from the next finer one.
 
-    first : first level to fill
+    first : index of the first level to compute
     """
     shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALVES), mipped.levels
     width, height = mipped.size

@@ -1,4 +1,4 @@
-"""Surface at the texels of an atlas, so that lighting reads neither the mesh nor its maps."""
+"""Surface at the texels of an atlas, stored so that lighting need not read the mesh and its maps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SURFACE_BYTES = 32
 
 
 def make_surface_texture(device: Device, side: int) -> Texture:
-    """Create the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
+    """Allocate the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
     return mark_scratch(
         device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface")
     )

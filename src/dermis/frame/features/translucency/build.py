@@ -42,7 +42,7 @@ _COARSENING = 1.5  # factor of the cell side when memory does not hold the pairs
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return tables of the light that thin parts transmit, by thickness; None for Lambertian skin."""
+    """Return the transmittance of thin parts by thickness, None for skin with Lambertian reflectance."""
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps
@@ -61,7 +61,15 @@ def _level_tables(
     variance_mm2: Floats,
     weight: Floats,
 ) -> ThinParts:
-    """Return the tables as weights of the blurred levels, scaled so that no level loses more than it has."""
+    """Return the transmittance of thin parts by thickness, as weights of the blurred levels.
+
+    The weights are scaled so that no level loses more light than it has.
+
+    colour, eta : (3,) diffuse reflectance [-] and index of refraction of the half-space
+    g : anisotropy [-]
+    total : (3,) sums of the weights of all Gaussians of the profile [-]
+    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
+    """
     reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
     blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT)
@@ -84,11 +92,12 @@ def make_translucency(
 ) -> Translucency:
     """Return the resources of the light through thin parts of a head.
 
-    surface, rest_surface : resources of geometry.wgsl and of the atlas, for the current shape and for the
-        shape in which pairs are searched
+    surface : resources of geometry.wgsl and of the atlas, for the current shape
+    rest_surface : the same resources for the shape in which pairs are searched
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : transmittance by thickness; None to use the Gaussians of the straight distance
-    shares_pairs : whether similar profiles use the same pairs, for skins that change from frame to frame
+    tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
+    shares_pairs : whether skins with similar profiles use the same pairs, as for skins that change between
+        frames
     owner : name of the atlas layout in the memo
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
@@ -99,7 +108,7 @@ def make_translucency(
 
 
 class PairCache:
-    """Cache of the pairs of a surface for the last few widths of Gaussians.
+    """Cache of the translucent pairs of a surface, for the last few widths of the widest Gaussian.
 
     surface : resources of geometry.wgsl and of the atlas, for the search
     """
@@ -109,7 +118,10 @@ class PairCache:
         self._cache: dict[float, PairBuffers] = {}
 
     def for_width(self, widest_mm: float) -> PairBuffers:
-        """Return the pairs within reach of Gaussians up to a standard deviation [mm]."""
+        """Return the pairs that are near enough for the widest Gaussian.
+
+        widest_mm : standard deviation of that Gaussian [mm]
+        """
         pairs = self._cache.pop(widest_mm, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:
@@ -122,14 +134,17 @@ class PairCache:
 
 
 def rounded_width(widest_mm: float) -> float:
-    """Return the nearest power of sqrt(2) [mm], so that skins with similar profiles share their pairs."""
+    """Round a width to the nearest power of sqrt(2) [mm], so that skins with similar profiles share pairs.
+
+    widest_mm : standard deviation of the widest Gaussian [mm]
+    """
     step = round(_STEPS_PER_DOUBLING * float(np.log2(max(widest_mm, _MIN_WIDTH_MM))))
     return float(2.0 ** (step / _STEPS_PER_DOUBLING))
 
 
 @logged_step("finding the thin parts")
 def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Return the pairs of a surface, with coarser cells if a buffer cannot hold the pairs of these cells."""
+    """Find the translucent pairs of a surface, with coarser cells if a buffer cannot hold all pairs."""
     table, times = search_pairs(device, surface, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _COARSENING ** next(times))
@@ -138,7 +153,7 @@ def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) ->
 
 
 def make_pair_buffers(device: Device, cells: Cells, table: PairTable) -> PairBuffers:
-    """Upload the pairs in the form that the passes of a frame read."""
+    """Return the pairs of a search as the buffers that the passes of a frame read."""
     return PairBuffers(
         cells=cells,
         receivers=upload_receivers(device, cells, table.receiver),
@@ -152,10 +167,10 @@ def make_pair_buffers(device: Device, cells: Cells, table: PairTable) -> PairBuf
 
 
 def _receiver_ranges(cells: Cells, table: PairTable) -> NDArray[np.uint32]:
-    """Return (m, 3) rows of packed cell, first pair and end of the pairs; one row of zeros for no receivers.
+    """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
 
-    Receivers with many pairs come first: invocations that run side by side then take about equally long, and
-    the last workgroups are short.
+    Without receivers, the table is one row of zeros. Receivers with many pairs come first: invocations that
+    run side by side then take about equally long, and the last workgroups are short.
     """
     first, end = table.first[:-1], table.first[1:]
     order = np.argsort(first - end, kind="stable")
@@ -164,7 +179,7 @@ def _receiver_ranges(cells: Cells, table: PairTable) -> NDArray[np.uint32]:
 
 
 def _zero_light(device: Device, surface: NDArray[np.bool_]) -> Texture:
-    """Return a texture of no light, with alpha 1 where there is surface."""
+    """Return a black texture with alpha 1 where the mask shows surface, over the coarse atlas."""
     light = np.zeros((*surface.shape, 4), np.float32)
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")
@@ -179,10 +194,10 @@ def with_profile(
     weight: Floats,
     tables: ThinParts | None = None,
 ) -> Translucency:
-    """Return translucency with the weights of a profile.
+    """Return a copy of the translucency resources with the weights of a profile.
 
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : transmittance by thickness; None to use the Gaussians of the straight distance
+    tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT)
     transmitted = weight if tables is None else tables.transmitted
@@ -198,7 +213,10 @@ def with_profile(
 
 
 def make_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
-    """Allocate the buffers of translucency, without the weights of a profile."""
+    """Allocate the buffers of translucency; `with_profile` adds the weights of a profile.
+
+    surface : resources of geometry.wgsl and of the atlas, for the current shape
+    """
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     return Translucency(
         pairs=pairs,

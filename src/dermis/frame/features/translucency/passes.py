@@ -29,7 +29,7 @@ _SMOOTH = 0.45  # least standard deviation of the light that sources sample, ove
 
 
 def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
-    """Allocate a buffer for `count` elements of `size` bytes, and for one where there are none."""
+    """Allocate a buffer for `count` elements of `size` bytes, or for one, as a buffer cannot be empty."""
     return device.storage_buffer(size * max(1, count))
 
 
@@ -42,11 +42,14 @@ def draw_points(
     points: Buffer,
     facets: bool = False,
 ) -> None:
-    """Write the current positions and normals of receivers or sources, and their metric or area.
+    """Declare the pass that writes the current positions and normals of receivers or sources.
+
+    It also writes the area of sources, or the metric of receivers, which maps offsets in the atlas to
+    lengths.
 
     role : "receiver" or "source"
     surface : resources of geometry.wgsl and of the atlas
-    table : buffer of cells, and their number
+    table : buffer of cells, and its number of rows
     points : buffer to write to
     facets : whether to take the metric of receivers from the triangles instead of the stretch map
     """
@@ -60,8 +63,9 @@ def draw_points(
 def draw(
     graph: Recorder, levels: PyramidLevels, blur: Blur, thin: Translucency, constants: Constants = ()
 ) -> Texture:
-    """Sum the light that each receiver gets from its sources, and return the texture of it.
+    """Declare the passes that sum the light from all sources at each receiver; return its texture.
 
+    levels, blur : blurred light over the atlas, which enters at the sources
     constants : pipeline constants that replace the defaults of translucency.wgsl
 
     Source: [JensenBuhler2002; dEonLuebke2007].
@@ -91,7 +95,9 @@ def draw(
 def draw_direction_factors(
     graph: Recorder, layout: LitAtlas, thin: Translucency, constants: Constants
 ) -> None:
-    """Write the factor by which the directions of each source's light change what passes a deep slab.
+    """Declare the pass that computes how incident directions change the light that each source transmits.
+
+    The factors apply to deep slabs.
 
     constants : pipeline constants of the lights
     """
@@ -115,11 +121,12 @@ def sum_pairs(
     constants: Constants = (),
     stage: str = "translucency",
 ) -> None:
-    """Sum the light of the sources at each receiver, weighted by the pairs.
+    """Declare the pass that sums the light of the sources at each receiver, weighted by pair.
 
     source_light : buffer of the light of each source
     target : texture of the coarse atlas
     constants : pipeline constants that replace the defaults of translucency.wgsl
+    stage : name of the stage in timings
     """
     device, pairs = graph.device, thin.pairs
     bindings: Bindings = {
@@ -135,7 +142,10 @@ def sum_pairs(
 
 
 def draw_weights(graph: Recorder, thin: Translucency) -> None:
-    """Compute the weights of all pairs for the current surface, and the fraction of light that is lost."""
+    """Declare the passes that compute the weights of all pairs for the current shape.
+
+    They also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
+    """
     pairs, cells = thin.pairs, thin.pairs.cells
     draw_points(graph, "receiver", thin.surface, cells, pairs.receivers, thin.receiver_points)
     draw_points(graph, "source", thin.surface, cells, pairs.sources, thin.source_points)
@@ -153,7 +163,11 @@ def draw_weights(graph: Recorder, thin: Translucency) -> None:
 
 
 def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:
-    """Return the index of the narrowest blurred level that sources sample without aliasing."""
+    """Return the index of the narrowest blurred level that is smooth enough to sample at the sources.
+
+    spacing_mm : distance between sources [mm]
+    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    """
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
@@ -166,11 +180,11 @@ def weight_bindings(
     tables: ThinParts | None = None,
     transmittance: Floats | None = None,
 ) -> Bindings:
-    """Return the record and the table of a profile that translucency_weights.wgsl reads.
+    """Return the uniform record and the transmittance table of a profile for translucency_weights.wgsl.
 
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : tables by thickness, None without any
-    transmittance : (THICKNESS_ROWS, k, 3) the one of these tables to use, `transmitted` or `lost`
+    tables : tables by thickness, None to weight pairs by Gaussians
+    transmittance : (THICKNESS_ROWS, k, 3) table to use, `transmitted` or `lost` of `tables`
     """
     gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
@@ -188,7 +202,10 @@ def weight_bindings(
 
 
 def _table(gaussians: int, tables: ThinParts | None, transmittance: Floats | None) -> NDArray[np.float32]:
-    """Return (rows k, 4) transmittance by thickness and Gaussian; the first alpha is the directionality."""
+    """Return the (rows k, 4) transmittance by thickness and Gaussian, with the directionality as alpha.
+
+    Only the first Gaussian of each thickness holds the directionality. Without tables, it is a row of zeros.
+    """
     if tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)
     table = np.zeros((THICKNESS_ROWS, gaussians, 4), np.float32)

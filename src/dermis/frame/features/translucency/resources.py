@@ -1,4 +1,4 @@
-"""Resources of translucency: pairs of points on both sides of thin parts, and the light between them."""
+"""Resources of translucency: pairs of cells on both faces of thin parts, and the light between them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from dermis.gpu import Bindings, Buffer, Texture
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Translucent pairs of a surface: a source, where light enters, and a receiver, where it leaves.
+    """Translucent pairs of a surface: source cells, where light enters, and receiver cells, where it leaves.
 
     cells : cells of the coarse atlas
-    receivers, sources : buffers of the cells that have pairs, see translucency_receivers.wgsl and
-        translucency_sources.wgsl, each with its number of rows
+    receivers, sources : buffers of the cells that are in pairs, each with its number of rows, see
+        translucency_receivers.wgsl and translucency_sources.wgsl
     pairs : buffer of source, receiver and offset in the atlas, see translucency_weights.wgsl
     count : number of pairs
-    receiver_ranges : buffer of cells and the range of their pairs, see translucency.wgsl
-    transmitted : texture of the coarse atlas for the transmitted light, and 1 where there is surface
-    lost : texture of the coarse atlas for the fraction of light that is not returned, likewise
+    receiver_ranges : buffer of receiver cells and the range of their pairs, see translucency.wgsl
+    transmitted : texture of the coarse atlas: transmitted light, and alpha 1 where there is surface
+    lost : texture of the coarse atlas: fraction of blurred light that thin tissue does not return, and alpha
+        1 where there is surface
     """
 
     cells: Cells
@@ -34,20 +35,20 @@ class PairBuffers:
 
 @dataclass(frozen=True, eq=False)
 class Translucency:
-    """Resources of the light through thin parts of one atlas layout.
+    """Resources of the light through thin parts, for one atlas layout.
 
     pairs : translucent pairs
     surface : resources of geometry.wgsl and of the atlas, for the current shape
-    receiver_points, source_points : buffers of the current positions of receivers and sources
-    weights : buffer of the fraction of light that passes between each pair
-    source_light : buffer of the light at the sources
+    receiver_points, source_points : buffers of the current positions and normals of receivers and sources
+    weights : buffer of the fraction of light that passes between the cells of each pair
+    source_light : buffer of the light that enters at each source
     unit_light : buffer of light 1 at all sources
     direction_factors : buffer of the factor of each source's light in deep slabs, by its directions
-    weight_bindings, loss_bindings : resources of the profile for translucency_weights.wgsl: for the
-        transmitted light, and for the light that is not returned because of it
-    gaussian_count : number of Gaussians of the profile
+    weight_bindings : resources of the profile for translucency_weights.wgsl, for transmitted light
+    loss_bindings : resources of the profile for translucency_weights.wgsl, for light that is not returned
+    gaussian_count : number of Gaussians that blur light
     uses_tables : whether transmittance is read from tables by thickness
-    source_level : index of the blurred level whose light enters, 0 for the first one
+    source_level : index of the blurred level whose light enters at sources, 0 for the narrowest
     """
 
     pairs: PairBuffers

@@ -43,11 +43,14 @@ _MAX_DEPTH_STEP_MM = 0.1  # at which the depth and the triangle of a sample fit 
 
 @dataclass(eq=False)
 class ViewLayers:
-    """Texture array with a layer for each view, and the resources to fill it.
+    """Texture array with a layer for each view, and the resources that fill it.
 
-    A single view gets two layers: OpenGL does not treat a texture of one layer as an array.
+    A single view gets two layers, because OpenGL does not treat a texture of one layer as an array.
 
-    texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint if `triangles`
+    texture : depth as float (1 near, 0 nothing), or triangle index plus 1 as integer if `triangles`
+    size : (width, height) of each layer [pixels]
+    count : number of layers in use
+    triangles : whether layers store triangle indices instead of depth
     depth : depth attachments of the rasteriser, one per layer, or one for all layers if `triangles`
     targets : colour targets of the rasteriser, one per layer
     nearness, triangle_ids, tiles : buffers of the compute pass; `triangle_ids` is allocated when it is needed
@@ -67,10 +70,10 @@ class ViewLayers:
 def make_layers(
     device: Device, size: tuple[int, int], count: int, *, triangles: bool, compute: bool | None = None
 ) -> ViewLayers:
-    """Allocate `count` views of size (width, height); views that are too large for a buffer are rasterised.
+    """Allocate `count` layers of size (width, height); those too large for a buffer are rasterised.
 
-    triangles : whether the layers store triangles instead of depth
-    compute : whether to use the compute pass; None to choose by the adapter
+    triangles : whether the layers store triangle indices instead of depth
+    compute : whether to use the compute pass instead of the rasteriser; None to choose by the adapter
     """
     compute = device.adapter.kind != "CPU" if compute is None else compute
     fits = 4 * size[0] * size[1] * count <= device.max_storage_bytes
@@ -79,7 +82,10 @@ def make_layers(
 
 
 def draw_layers(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
-    """Fill one layer for each sample of each view; depth 1 is near and 0 far."""
+    """Declare the passes that fill one layer for each sample position of each view.
+
+    stage : name of the stage in timings
+    """
     if layers.nearness is not None:
         _draw_compute(graph, stage, layers, views, head)
     else:
@@ -87,7 +93,7 @@ def draw_layers(graph: Recorder, stage: str, layers: ViewLayers, views: Views, h
 
 
 def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
-    """Find the triangle at each sample of the picture [Burns2013]."""
+    """Declare the passes that find the triangle at each sample of the picture [Burns2013]."""
     draw_layers(graph, "visibility", visibility, views, head)
 
 
@@ -148,7 +154,11 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
 
 
 def _passes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int, ...]:
-    """Return what each pass records: depth and triangle in one word where that is precise enough."""
+    """Return the modes of visibility_buffer.wgsl: one pass if depth and triangle fit in a word, else two.
+
+    triangles : number of triangles
+    clips : (k, 4, 4) matrices from world to clip space
+    """
     if not layers.triangles:
         return (_DEPTH,)
     steps = 2.0 ** (32 - triangles.bit_length())
@@ -182,7 +192,12 @@ def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: Head
 
 
 def _depth_range_mm(clip: Matrix) -> float:
-    """Return the distance from depth 0 to 1 if all steps of depth were as large as the largest one [mm]."""
+    """Return the range of distances of a view if every step of depth were as long as the longest one [mm].
+
+    Divided by the number of steps, it bounds the error of an integer depth.
+
+    clip : (4, 4) matrix from world to clip space
+    """
     rows: list[list[float]] = clip.tolist()
     _, _, (*depth, depth_offset), (*distance, distance_offset) = rows
     scale = sum(d * d for d in distance)
@@ -197,7 +212,10 @@ def _depth_range_mm(clip: Matrix) -> float:
 
 @cache
 def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
-    """Return the pipeline constants, tuned on an H200, and the number of workgroups."""
+    """Return the pipeline constants and the number of workgroups of the compute pass, tuned on an H200.
+
+    triangles, views, samples : number of triangles, of views, and of samples per pixel
+    """
     fewest, most = _GROUP_TRIANGLES
     per_group = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
     many = per_group == most  # many triangles are small ones
@@ -208,5 +226,5 @@ def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, in
 
 
 def _tile_counts(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the number of tiles across and down."""
+    """Return the number of tiles of the compute pass across and down a picture of size (width, height)."""
     return -(-size[0] // _TILE[0]), -(-size[1] // _TILE[1])

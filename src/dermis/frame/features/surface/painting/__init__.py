@@ -1,1 +1,1 @@
-"""Human skin painted by the device: colour, gloss and relief from pigments and noise."""
+"""Human skin that the device paints: maps of colour, gloss and relief from pigments and noise."""

@@ -66,12 +66,12 @@ _FOLDING = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the l
 
 
 def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Return the names of noises, dots, amounts and grounds as lists that shaders number in order."""
+    """Return the names of noises, dot layers, zone amounts and noise regions, in the order of shaders."""
     return {name: _members(names) for name, names in _NAMES.items()}
 
 
 def painting_constants() -> dict[str, float]:
-    """Return the constants of the painting shaders, by their `//#fill` names."""
+    """Return the values that `//#fill` lines insert in the painting shaders, by name."""
     counts = {name: len(names) for name, names in _NAMES.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
@@ -85,7 +85,8 @@ def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
 class PaintInputs(NamedTuple):
     """Inputs of the shader that paints skin.
 
-    paint, tables : records of the shader
+    paint : uniform record of the look: pigments, gloss, age, ...
+    tables : tables of the face: noises, dots, zones, folds and hairline
     colours : (2, n, n, 3) colour tables of the face and of the lips, linear Rec. 709 [-]
     surface : mesh that is painted
     """
@@ -97,7 +98,7 @@ class PaintInputs(NamedTuple):
 
 
 def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInputs:
-    """Return the shader inputs for the maps of a look.
+    """Return the shader inputs with which the maps of a look are painted.
 
     side : side of the maps [texels]
 
@@ -114,7 +115,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInp
 
 
 def cache_key(inputs: PaintInputs, driver: str) -> str:
-    """Return the disk cache key of painted maps, which covers inputs, shaders and the driver."""
+    """Return the disk cache key of painted maps, a hash of inputs, shaders and driver."""
     source = "\n".join((driver, _shader_text(SKIN), _shader_text(OWNER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
     return array_key([*records, inputs.colours, inputs.surface.vertices, inputs.surface.triangles], source)
@@ -126,7 +127,10 @@ def _shader_text(shader: str) -> str:
 
 
 def _face_tables(recession: float) -> bytes:
-    """Return all tables of the face for spot.wgsl: noises, dots, zones, folds and the hairline."""
+    """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
+
+    recession : recession of the hairline [-]
+    """
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), _PADDING)
@@ -138,8 +142,9 @@ def _face_tables(recession: float) -> bytes:
 class RestMaps(NamedTuple):
     """Painted maps at rest; only the finest mip levels are filled.
 
+    colour, specular, roughness : textures with views of their mip levels
     heights : buffer of heights with a border of one texel [mm]
-    deltas : changes by expressions, None unless requested
+    deltas : texture of the changes by expressions, None unless requested
     """
 
     colour: map_mips.MippedTexture
@@ -150,10 +155,10 @@ class RestMaps(NamedTuple):
 
 
 def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: bool = False) -> RestMaps:
-    """Return the maps at rest; software adapters, which paint slowly, cache them on disk.
+    """Return the painted maps at rest; software adapters, which paint slowly, cache them on disk.
 
-    Only the first maps that a device paints are stored: programs that render many people rarely need one
-    again.
+    Only the first maps that a device paints are stored, because programs that render many people rarely need
+    the same person again.
 
     animated : whether to include the changes by expressions
     """
@@ -172,7 +177,10 @@ def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: b
 
 @logged_step("painting the skin")
 def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
-    """Paint the maps at rest."""
+    """Paint the maps of a face without expression.
+
+    side : side of the maps [texels]
+    """
     surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
@@ -191,7 +199,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
 
 
 def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str, Buffer]:
-    """Return the buffers of the surface and of the triangle of each texel, cached for all people."""
+    """Return buffers of the painted mesh and of the triangle that owns each texel, cached for all people."""
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
     sides: dict[int, dict[str, Buffer]] = cache.setdefault(surface, {})
@@ -240,7 +248,7 @@ def _from_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
 
 @dataclass(frozen=True, eq=False)
 class ExpressionMaps:
-    """Maps that expressions change.
+    """Painted maps that change with expressions, with the inputs of the pass that fills them.
 
     bindings : resources of expression.wgsl by their names there
     heights : buffer of heights from which the relief is computed [mm]
@@ -254,9 +262,9 @@ class ExpressionMaps:
 
 
 def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.float32]) -> None:
-    """Declare the passes that compute colour and relief for an expression.
+    """Declare the passes that compute the colour and relief of an expression.
 
-    amounts : (9,) amount of each movement of the face, see `human.skin.face.movement_weights` [-]
+    amounts : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
     folding = amounts[:_FOLDING].reshape(2, 4)
@@ -272,7 +280,7 @@ def _fill_maps(graph: Recorder, maps: ExpressionMaps) -> None:
 
 
 class PaintedTextures(NamedTuple):
-    """Painted textures with all mip levels, for skin.wgsl of the frame."""
+    """Painted textures with all mip levels, as skin.wgsl of the picture reads them."""
 
     colour: Texture
     specular: Texture
@@ -282,12 +290,12 @@ class PaintedTextures(NamedTuple):
 
 
 class RawPaintedArrays(NamedTuple):
-    """Painted texels in the channels that skin.wgsl writes.
+    """Painted texels in the channels that the painting shader skin.wgsl writes.
 
-    colour : (n, n, 4)
-    specular : (n, n, 4) specular factor, amount of pores, and log2 of the mm per unit of uv
+    colour : (n, n, 4) linear Rec. 709 albedo [-], and 1
+    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and 0
     roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
-    height_mm : (n, n) [mm]
+    height_mm : (n, n) heights of the relief [mm]
     """
 
     colour: NDArray[np.float32]
@@ -299,7 +307,7 @@ class RawPaintedArrays(NamedTuple):
 def paint_textures(
     device: Device, surface: PaintedSurface, look: SkinLook, side: int, animated: bool = False
 ) -> PaintedTextures:
-    """Paint the maps of a look.
+    """Paint the maps of a look as textures.
 
     side : side of the maps [texels]
     animated : whether expressions change colour and relief, which `draw_expression` then fills
@@ -322,7 +330,7 @@ def paint_textures(
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> Maps:
-    """Return painted maps as arrays, without the relief that is finer than maps.
+    """Paint the maps of a look as arrays, without the relief that is finer than maps.
 
     Heights fade to 0 outside the charts.
     """
@@ -337,7 +345,7 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: 
 
 
 def paint_raw_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> RawPaintedArrays:
-    """Return all channels of the painted maps as arrays."""
+    """Paint the maps of a look as arrays, with all channels that the shader writes."""
     maps = paint_rest_maps(device, paint_inputs(surface, look, side), side)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)

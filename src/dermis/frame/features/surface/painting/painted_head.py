@@ -1,4 +1,4 @@
-"""Head whose painted maps and eyes are arrays, for files and for programs without these shaders."""
+"""Heads whose painted maps and eyes are arrays, for files and for programs without the painting shaders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ SIDE = 1024
 
 
 def paint_eye(device: Device, look: EyeLook, side: int = SIDE) -> EyeTextures:
-    """Return pictures of an eye as seen along its axis through the cornea."""
+    """Paint pictures of an eye as seen along its axis through the cornea, for programs without its shader.
+
+    side : side of the pictures [pixels]
+    """
     shader = program(device, "surface/painting/eye_pictures.wgsl")
     picture = shader.record("EyePicture", rim=UV_RIM, falling=UV_FALLOFF)
     fill_eye(picture["eye"], look)
@@ -35,7 +38,10 @@ def paint_eye(device: Device, look: EyeLook, side: int = SIDE) -> EyeTextures:
 
 
 def paint_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures | None]:
-    """Return the result of `with_painted_maps`, and pictures of the eyes if they are modelled."""
+    """Return a head with its painted maps as arrays, and pictures of the eyes if they are modelled.
+
+    side : side of the painted maps, a power of two from 256 to 4096 [texels]
+    """
     eyes = None if head.eyes is None else paint_eye(device, head.eyes.look)
     return with_painted_maps(device, head, side), eyes
 

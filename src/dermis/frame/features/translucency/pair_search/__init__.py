@@ -1,1 +1,1 @@
-"""Search for translucent pairs on the device."""
+"""Search for translucent pairs by shaders on the device."""

@@ -1,4 +1,4 @@
-"""Search for translucent pairs: pairs of tiles whose normals oppose, their cells, then pairs of cells."""
+"""Search for translucent pairs of cells, among tiles of cells whose normals are opposed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PAIR_BYTES = 12
 
 
 class SearchPasses:
-    """Passes of a search, which are submitted whenever the next ones depend on their results.
+    """Passes of a search, submitted in batches because the size of later ones depends on earlier results.
 
     commands : command list of the passes that are not yet submitted
     blocks : number of blocks of tiles along a side of the atlas
@@ -47,25 +47,28 @@ class SearchPasses:
         }
 
     def add(self, name: str, count: int, bindings: Bindings, constants: Constants = ()) -> None:
-        """Add a pass with an invocation for each of `count` elements."""
+        """Add a pass with one shader invocation for each of `count` elements.
+
+        name : name of the shader in this folder, without its suffix
+        """
         shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
         record = shader.record("Search", **self._parameters, count=count)
         self.commands.dispatch("pair search", shader, {**bindings, "search": record}, workgroup_grid(count))
 
     def read(self, buffer: Buffer, count: int) -> Index:
-        """Submit the passes so far, and return the first words of a buffer."""
+        """Submit all passes so far, and return the first `count` words of a buffer."""
         self.commands.submit()
         self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:count].astype(np.int64)
 
     def upload(self, *columns: NDArray[np.integer]) -> Buffer:
-        """Upload a table of words, see `upload_words`."""
+        """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
         return upload_words(self.device, *columns)
 
 
 def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
-    """Upload a table of words, given by its columns; a table without rows becomes one row of zeros."""
+    """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
     table = np.zeros((max(1, len(columns[0])), len(columns)), np.uint32)
     for k, column in enumerate(columns):
         table[: len(column), k] = column
@@ -73,18 +76,21 @@ def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
 
 
 def list_offsets(counts: Index) -> Index:
-    """Return (n + 1,) the offset of each of n concatenated lists, and their total length."""
+    """Return (n + 1,) offsets of n lists that are stored one after the other, and their total length.
+
+    counts : (n,) lengths of the lists
+    """
     return np.concatenate([[0], np.cumsum(counts)])
 
 
 @dataclass(frozen=True, eq=False)
 class TilePairs:
-    """Pairs of tiles between which translucent pairs are possible.
+    """Pairs of tiles between which translucent pairs of cells are possible.
 
     bounds : buffer of the bounding box and normal cone of each tile
-    tile : (t,) tiles that are part of any pair
-    first : (t + 1,) range of each in `partners`
-    partners : buffer of the other tiles of the pairs
+    tile : (t,) indices of the tiles that are in at least one pair
+    first : (t + 1,) range of each of these tiles in `partners`
+    partners : buffer of the tiles that each tile is paired with
     """
 
     bounds: Buffer
@@ -94,7 +100,7 @@ class TilePairs:
 
 
 def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> TilePairs:
-    """Return the pairs of tiles between which translucent pairs are possible.
+    """Find the pairs of tiles between which translucent pairs of cells are possible.
 
     surface : resources of geometry.wgsl
     """
@@ -113,9 +119,9 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
 
 
 def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tiles: Buffer) -> Buffer:
-    """Return a buffer of bits: whether translucent pairs are possible between two blocks of tiles.
+    """Return a buffer with one bit for each two blocks of tiles: whether translucent pairs are possible.
 
-    tiles : buffer to fill with the bounds of the tiles
+    tiles : buffer to fill with the bounding box and normal cone of each tile
     """
     blocks = passes.blocks**2
     words = blocks * -(-blocks // 32)
@@ -133,12 +139,12 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
 
 @dataclass(frozen=True, eq=False)
 class CandidateCells:
-    """Cells that may be part of pairs, in the order of their tiles.
+    """Cells that may be in translucent pairs, ordered by their tiles.
 
     receiver : (r,) indices among the cells that receive light
-    source : (s,) cells that emit light
+    source : (s,) indices of cells that emit light, in the coarse atlas
     first, end : (r,) range in `TilePairs.partners` of the tile of each receiver
-    sources_first, sources_end : (t,) range in `source` of each tile of the atlas
+    sources_first, sources_end : (t,) range in `source` of each of the t tiles of the atlas
     """
 
     receiver: Index
@@ -150,7 +156,7 @@ class CandidateCells:
 
 
 def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
-    """Return the cells of all tiles that are part of a pair."""
+    """Return the cells of all tiles that are in a pair of tiles."""
     tile = tile_pairs.tile
     receiver, receiver_tile = _expand_ranges(cells.receiver_first, tile)
     source, _ = _expand_ranges(cells.source_first, tile)
@@ -162,7 +168,10 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
-    """Return all numbers of the chosen ranges first[i] to first[i + 1], and the index in `chosen` of each."""
+    """Return all integers of the ranges first[i] to first[i + 1], for i in `chosen`, one range after another.
+
+    The second result holds, for each integer, the index in `chosen` of its range.
+    """
     count = first[chosen + 1] - first[chosen]
     position = np.repeat(np.arange(len(chosen)), count)
     numbers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
@@ -172,7 +181,7 @@ def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
 def compute_positions(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
-    """Return the buffers of the positions of receivers and sources, by their names in the shaders.
+    """Return buffers of the positions and normals of all candidates, by their names in the shaders.
 
     surface : resources of geometry.wgsl and of the atlas
     """
@@ -188,7 +197,11 @@ def compute_positions(
 
 
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
-    """Upload the ranges that hits.wgsl reads; return the buffers, and the number of words of all hits."""
+    """Upload the ranges of sources that hits.wgsl tests for each receiver.
+
+    The second result is the number of words that hits.wgsl writes: one for each receiver and tile to test,
+    with a bit for each source.
+    """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
     ranges = candidates.sources_first, candidates.sources_end
@@ -200,9 +213,9 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def draw_gutter_copies(passes: SearchPasses, cells: Cells, source: Index, bindings: Bindings) -> Buffer:
-    """Return the buffer of positions in gutters that show sources, see gutter_copies.wgsl.
+    """Return a buffer of the gutter positions at which sources appear again, see gutter_copies.wgsl.
 
-    source : (n,) cells
+    source : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
     """
     side, ranges = cells.side, list[Index]()
@@ -220,7 +233,7 @@ def draw_gutter_copies(passes: SearchPasses, cells: Cells, source: Index, bindin
 
 
 def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buffer, int]:
-    """Upload triangle, weights and cell of receivers; return the buffer and their number.
+    """Upload the surface point and the cell of each receiver; return the buffer and its number of rows.
 
     receiver : (n,) indices among the cells that receive light
     """
@@ -229,7 +242,10 @@ def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buf
 
 
 def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, int]:
-    """Upload the packed (x, y) of cells that emit light; return the buffer and their number."""
+    """Upload the packed (x, y) of cells that emit light; return the buffer and its number of rows.
+
+    cell : (n,) indices of cells in the coarse atlas
+    """
     return upload_words(device, cell % cells.side | (cell // cells.side << 16)), len(cell)
 
 
@@ -237,10 +253,10 @@ def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, i
 class PairTable:
     """Translucent pairs as the search returns them, ordered by receiver.
 
-    receiver : (m,) receivers of any pair, as indices among the cells that receive light
-    first : (m + 1,) range of pairs of each receiver
-    source : (n,) cells that emit light in any pair
-    pairs : buffer of three words for each pair: source, receiver, offset in the atlas
+    receiver : (m,) receivers that are in a pair, as indices among the cells that receive light
+    first : (m + 1,) range of the pairs of each receiver
+    source : (n,) cells that emit light in at least one pair
+    pairs : buffer of three words for each pair: source, receiver, and offset between them in the atlas
     """
 
     receiver: Index
@@ -281,9 +297,9 @@ def _list_pairs(
     hit_bindings: Bindings,
     map_bindings: Bindings,
 ) -> PairTable:
-    """Return the hits as a list of pairs, without the cells that have none.
+    """Convert the hit bits to a table of pairs, and drop the cells that are in no pair.
 
-    pair_count : (r,) pairs of each receiver
+    pair_count : (r,) number of pairs of each receiver
     hit_bindings : resources that hits.wgsl and pairs.wgsl share
     map_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
     """
