@@ -1,1 +1,1 @@
-"""Rendering of data sets: many pictures with ground truth, on one machine or on several."""
+"""Rendering of data sets: pictures of sampled people with ground truth, on one machine or on several."""

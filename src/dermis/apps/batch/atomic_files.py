@@ -1,4 +1,4 @@
-"""Atomic writes of files and folders that several processes may write at the same time."""
+"""Atomic writes of files and folders to which several processes may write at once."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
-    """Return an unused hidden path beside a file or folder, for its content while it is written."""
+    """Return an unused hidden path beside a target, where its content is written before it is renamed."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
 def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
-    """Write a file completely or not at all.
+    """Write a file completely or not at all, through a temporary file that is renamed.
 
-    Another process may remove the temporary file while cleaning up; the file is then written again.
+    Another process may remove the temporary file while it cleans up; the file is then written again.
 
     write : function that writes the content to the path that it receives
 
@@ -49,7 +49,7 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
 
 
 def move_into_place(temporary: Path, target: Path) -> None:
-    """Rename a temporary file or folder to its final path, replacing what exists there.
+    """Rename a temporary file or folder to its final path, replacing a file or folder there.
 
     Raises OSError if this fails.
     """
@@ -75,7 +75,7 @@ def flush_to_disk(path: Path) -> None:
 
 
 def remove_path(path: Path) -> None:
-    """Remove a file, or a folder with its content, if it exists."""
+    """Remove a file, or a folder with its content; do nothing if it does not exist."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -84,7 +84,7 @@ def remove_path(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """Return the temporary files in a folder, each with the name of its target."""
+    """Return the temporary files of interrupted writes in a folder, each with the name of its target."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}

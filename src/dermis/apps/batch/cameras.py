@@ -1,4 +1,4 @@
-"""Camera of an image: sampled, then adjusted as little as necessary to show the complete face."""
+"""Camera of an image: sampled from the spec, then adjusted as little as possible to show the whole face."""
 
 from __future__ import annotations
 
@@ -24,24 +24,31 @@ AimOffset = tuple[float, float]
 
 
 def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
-    """Return the indices (n,) of control points that lie on the convex hull of the face.
+    """Return the indices (n,) of control points on the convex hull of the face.
 
-    count : number of directions in which extreme points are searched
+    The camera keeps these points, and so the face, in the picture.
+
+    count : number of directions in which an extreme point is searched
     """
     positions = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_MM, np.float32)
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
         inside = np.arange(len(positions))
-    return np.unique(inside[(_directions(count) @ positions[inside].T).argmax(axis=1)]).astype(np.int32)
+    return np.unique(inside[(_sphere_directions(count) @ positions[inside].T).argmax(axis=1)]).astype(
+        np.int32
+    )
 
 
 def sampled_camera(
     parameters: Parameters, head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
 ) -> Camera:
-    """Return the camera of an image from its sampled parameters.
+    """Return the camera with an image's sampled parameters, moved so that the whole face is in the picture.
+
+    The frame is enlarged, and the offset of the face reduced, if the face would be cut off.
 
     points : control points of the face, from `face_points`
+    motion : displacement of the control points by the pose
     aspect : width of the picture over its height [-]
     """
     face = head.control.pose_points(points, motion) - np.array(head.centre_mm)
@@ -49,13 +56,13 @@ def sampled_camera(
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]
     centre = 0.5 * (face.min(axis=0) + face.max(axis=0))
-    axes = _axes(values["yaw_deg"], values["pitch_deg"], values["roll_deg"])
+    axes = _camera_axes(values["yaw_deg"], values["pitch_deg"], values["roll_deg"])
     in_view = (face - centre) @ axes.T  # right, up and towards the camera, relative to the face's centre
     offset = values["offset_x"] * aspect, values["offset_y"]
     frame *= max(_max_extent(in_view, distance, (0.0, 0.0), frame, aspect) / _MARGIN, 1.0)
 
     def aim(fraction: float) -> AimOffset:
-        """Return the aim for a fraction of the offset."""
+        """Return the aim offset that moves the face by a fraction of its sampled offset in the picture."""
         return -0.5 * frame * fraction * offset[0], -0.5 * frame * fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
@@ -69,7 +76,9 @@ def sampled_camera(
 def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float, aim: AimOffset) -> Camera:
     """Return a camera that looks at a point beside the centre of the face.
 
-    axes : (3, 3) rows: right, up, and back towards the camera
+    centre : (3,) centre of the face [mm]
+    axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
+    distance : distance of the camera from the centre [mm]
     frame_mm : visible height at the centre if the camera were aimed there [mm]
     aim : offset of the point to the right and upwards [mm]
     """
@@ -83,9 +92,14 @@ def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float
 
 
 def _max_extent(in_view: Doubles, distance: float, aim: AimOffset, frame_mm: float, aspect: float) -> float:
-    """Return the largest distance of points from the picture's centre, where 1 is its edge.
+    """Return the largest distance of projected points from the centre of the picture, where 1 is its edge.
 
-    in_view : (n, 3) positions to the right, upwards and backwards, relative to the face's centre [mm]
+    in_view : (n, 3) positions to the right, upwards and towards the camera, relative to the face's centre
+        [mm]
+    distance : distance of the camera from the face's centre [mm]
+    aim : offset of the camera's target to the right and upwards [mm]
+    frame_mm : visible height at the face's centre [mm]
+    aspect : width of the picture over its height [-]
     """
     x, y, z = in_view.T
     back = np.array([-aim[0], -aim[1], distance])
@@ -99,8 +113,11 @@ def _max_extent(in_view: Doubles, distance: float, aim: AimOffset, frame_mm: flo
     return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance / frame_mm)
 
 
-def _axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
-    """Return the axes (3, 3) of a camera: rows right, up and back, rolled clockwise about the last."""
+def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
+    """Return the axes of a camera as rows (3, 3): right, up, and back, which points from the face to it.
+
+    The roll turns the first two clockwise about the last.
+    """
     back = np.array(direction_from_angles(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
@@ -116,8 +133,8 @@ def _triple(vector: Doubles) -> tuple[float, float, float]:
 
 
 @cache
-def _directions(count: int) -> NDArray[np.float32]:
-    """Return directions (n, 3) on a spiral over the sphere."""
+def _sphere_directions(count: int) -> NDArray[np.float32]:
+    """Return unit vectors (n, 3) evenly distributed over the sphere, on a golden-angle spiral."""
     pitches = np.degrees(np.arcsin(1.0 - 2.0 * (np.arange(count) + 0.5) / count))
     yaws = 137.50776405 * np.arange(count)  # golden angle
     return np.array(list(map(direction_from_angles, yaws.tolist(), pitches.tolist())), np.float32)

@@ -1,4 +1,4 @@
-"""Child processes that are spawned without the parent's state and exit with their parent."""
+"""Child processes that are spawned with a fresh interpreter and exit with their parent."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
 class LostProcessError(DermisError):
-    """Error raised when a process ended before its work was complete; the work can be repeated."""
+    """Error raised when a child process ended before its work was complete; the work can be repeated."""
 
 
 @dataclass(frozen=True)
 class ChildProcess:
-    """Child process with the parent's end of the pipe to it."""
+    """Child process with the parent's end of the pipe between them."""
 
     process: SpawnProcess
     pipe: Connection
@@ -65,7 +65,7 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
 
 
 def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
-    """Return shared memory to pass to `start_process`; no process has to release it."""
+    """Return memory that a process started by `start_process` shares; it is freed with the processes."""
     return _CONTEXT.RawArray(ctypes.c_ubyte, size)
 
 
@@ -88,7 +88,7 @@ def _exit_with_parent(sentinel: int) -> None:
 
 @contextmanager
 def _children_allowed() -> Iterator[None]:
-    """Allow daemon processes, such as dask's workers, to start children, which multiprocessing forbids."""
+    """Allow a daemon process, such as a dask worker, to start children, which multiprocessing forbids."""
     current = multiprocessing.current_process()
     was_daemon = current.daemon
     if was_daemon:
@@ -102,10 +102,10 @@ def _children_allowed() -> Iterator[None]:
 
 @contextmanager
 def _single_threaded_blas() -> Iterator[None]:
-    """Limit linear algebra in child processes to one thread, unless the user has set a number.
+    """Limit BLAS in child processes to one thread, unless the user has set a number of threads.
 
-    By default each process starts a thread per core, and for small systems these threads spend most of the
-    processor time on waiting.
+    By default each process starts a thread per core, and for small linear systems these threads spend most of
+    the processor time on waiting.
     """
     unset = [name for name in _BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
@@ -118,7 +118,7 @@ def _single_threaded_blas() -> Iterator[None]:
 
 @contextmanager
 def _sigint_blocked() -> Iterator[None]:
-    """Block SIGINT in this process, and permanently in processes that are started inside."""
+    """Block SIGINT (Ctrl-C) in this process, and permanently in children that are started inside."""
     if not _CAN_BLOCK_SIGNALS:
         yield
         return

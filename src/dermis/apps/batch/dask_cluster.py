@@ -26,8 +26,8 @@ class DaskCluster:
     """Pool of dask workers, each of which renders one shard at a time.
 
     address : address of the scheduler; None if `file` is given
-    file : file written by the scheduler
-    adapter : as in `SlotRequest`; the workers of a host use the matching adapters in turn
+    file : scheduler file, written by `dask scheduler --scheduler-file`
+    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching ones in turn
     """
 
     address: str | None
@@ -49,7 +49,7 @@ class DaskCluster:
             try:
                 with _shared_marker(options.out) as marker:
                     _check_shared_disk(client, marker)
-                yield from _completions(client, name, shards)
+                yield from _submit_shards(client, name, shards)
             finally:
                 with suppress(OSError, TimeoutError):  # the scheduler is gone
                     client.unregister_worker_plugin(name)
@@ -76,7 +76,7 @@ class DaskCluster:
 
 @contextmanager
 def _shared_marker(out: Path) -> Iterator[Path]:
-    """Create a file in the output folder for the duration of the block, to find out which workers see it."""
+    """Create a marker file in the output folder during the block, which shows what workers share the disk."""
     marker = out.resolve() / f".dermis-{secrets.token_hex(6)}"
     marker.touch()
     try:
@@ -86,7 +86,7 @@ def _shared_marker(out: Path) -> Iterator[Path]:
 
 
 def _check_shared_disk(client: Client, marker: Path) -> None:
-    """Refuse an output folder that some workers do not see."""
+    """Refuse an output folder if some dask workers do not see the marker file in it."""
     from dermis.apps.batch.dask_worker import path_exists
 
     failing = [address for address, found in client.run(path_exists, str(marker)).items() if not found]
@@ -95,8 +95,11 @@ def _check_shared_disk(client: Client, marker: Path) -> None:
         refuse(marker.parent, "a folder on a disk that all workers share", actual, "Choose another one")
 
 
-def _completions(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """Yield the completion event of each shard."""
+def _submit_shards(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    """Submit the shards as dask tasks, and yield the completion event of each one.
+
+    name : name of the `ShardPlugin` that renders them
+    """
     from distributed import as_completed
 
     from dermis.apps.batch.dask_worker import render_shard

@@ -1,4 +1,4 @@
-"""Code that runs inside a worker of dask.distributed."""
+"""Rendering of shards inside a worker of dask.distributed."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _TRIM = "MALLOC_TRIM_THRESHOLD_"
 
 
 @dataclass
-class _State:
-    """State of a plugin in its dask worker.
+class _PluginState:
+    """State of a `ShardPlugin` in its dask worker.
 
     child : worker process, started for the first shard
     cleanup : context managers and callbacks that are released together with the process
@@ -49,14 +49,14 @@ class _State:
 
 @dataclass
 class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
-    """Plugin that runs a worker process beside a dask worker, from its first shard to the end of the run.
+    """Plugin that runs a rendering process beside a dask worker, from its first shard to the end of the run.
 
     The process renders as it does without dask; the dask worker only waits for it.
 
     spec_toml : spec as TOML, with the hashes of the files that it names
-    folder : folder of the spec's files
-    out, encoders, keep_going : as in `RunOptions`
-    adapter : as in `DaskCluster`
+    folder : folder to which file names in the spec are relative
+    out, encoders, keep_going : output folder and options of the run, as in `RunOptions`
+    adapter : adapters to use, as in `DaskCluster`
     """
 
     spec_toml: str
@@ -68,14 +68,14 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
 
     @classmethod
     def for_run(cls, options: RunOptions, adapter: str) -> Self:
-        """Return the plugin for the options of a run."""
+        """Return the plugin for the options of a run and a choice of adapters."""
         folder, out = options.spec.folder.resolve(), options.out.resolve()
         return cls(options.spec.to_toml(), folder, out, options.encoders, options.keep_going, adapter)
 
     def setup(self, worker: object) -> None:
-        """Initialise the state; dask calls this when the plugin arrives at a worker."""
+        """Initialise the state; dask calls this when the plugin is registered with a worker."""
         os.environ.pop(_TRIM, None)
-        self._state = _State()
+        self._state = _PluginState()
 
     def teardown(self, worker: object) -> None:
         """Stop rendering and release the process; dask calls this at the end of the run or of the worker."""
@@ -85,7 +85,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.lock.release()
 
     def render(self, shard: Shard) -> WorkerEvent:
-        """Render a shard and return its completion or refusal event.
+        """Render a shard in the process and return its completion or refusal event.
 
         Raises LostProcessError if the process or its device was lost, after which dask retries the task.
         """
@@ -121,7 +121,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
     def _start(self) -> ChildProcess:
-        """Start the process on the adapter that belongs to this worker's rank."""
+        """Start the rendering process on the adapter that belongs to this dask worker's rank on its host."""
         cleanup = self._state.cleanup
         rank = cleanup.enter_context(local_rank())
         adapters = similar_adapters(self.adapter)
@@ -148,8 +148,8 @@ def path_exists(path: str) -> bool:
 def local_rank() -> Iterator[int]:
     """Yield the smallest rank, from 0, that no other process of this user holds on this host.
 
-    A rank is held by a lock on a file, which the system releases when the process exits. Where such locks are
-    not available, the rank is 0.
+    Dask workers use it to choose different adapters. A rank is held by a lock on a file, which the system
+    releases when the process exits. Where such locks are not available, the rank is 0.
     """
     folder = cache_folder() / "ranks"
     try:

@@ -1,4 +1,4 @@
-"""Datasheet of a data set: README.md for people, dataset.json for programs."""
+"""Datasheet of a data set: README.md for people and dataset.json for programs."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _MAX_LISTED = 50
 _LABEL_OUTPUTS = "label", "label_face_synthetics"
 _BUILT_IN = {"none", "uniform", "human"}
 
-Rows = Iterable[Sequence[object]]
+TableRows = Iterable[Sequence[object]]
 
 
 def write_datasheet(out: Path, spec: Spec) -> None:
-    """Write the datasheet of a data set from its spec, index and shards.
+    """Write README.md and dataset.json of a data set from its spec, index and shards.
 
     Equal shards give equal bytes. Raises DermisError if the index is missing or nothing can be written.
     """
@@ -68,18 +68,18 @@ def _readme(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
     template = resources.files(__package__).joinpath("datasheet.md").read_text("utf-8").removesuffix("\n")
     return Template(template).substitute(
         facts=_table(("", ""), facts),
-        files=_files(spec),
-        landmarks=_landmarks(spec),
-        labels=_labels(spec),
+        files=_files_table(spec),
+        landmarks=_landmarks_section(spec),
+        labels=_labels_section(spec),
         parameters=_table(("parameter", "images", "values"), parameter_summaries(out)),
-        tests=_tests(fit_tests(out, spec)),
+        tests=_tests_table(fit_tests(out, spec)),
         licences=_table(("part", "by", "licence"), licences(spec)),
         made_with=_software_table(manifests),
         left_out=failed + _table(("image", "reason"), left_out[:_MAX_LISTED]) if left_out else "",
     )
 
 
-def _files(spec: Spec) -> str:
+def _files_table(spec: Spec) -> str:
     alpha = ", with alpha" if "none" in spec.background.kind.support else ""
     outputs = [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
@@ -93,7 +93,7 @@ def _files(spec: Spec) -> str:
     return _table(("file", "content", "unit", "stored as", "background value"), rows)
 
 
-def _tests(tests: Iterable[FitTest]) -> str:
+def _tests_table(tests: Iterable[FitTest]) -> str:
     rows = [
         (*one[:4], *(f"{number:.2g}" for number in one[4:]), "" if one.passes else "differs from the spec")
         for one in tests
@@ -102,7 +102,7 @@ def _tests(tests: Iterable[FitTest]) -> str:
     return _table(columns, rows)
 
 
-def _landmarks(spec: Spec) -> str:
+def _landmarks_section(spec: Spec) -> str:
     if not spec.landmarks:
         return ""
     rows = [(name, len(landmark_names(name, spec))) for name in spec.landmarks]
@@ -110,7 +110,7 @@ def _landmarks(spec: Spec) -> str:
     return title + _table(("set", "points"), rows)
 
 
-def _labels(spec: Spec) -> str:
+def _labels_section(spec: Spec) -> str:
     return "\n".join(
         f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}"
         for name, names in label_names(spec).items()
@@ -126,14 +126,17 @@ def _software_table(manifests: Sequence[ShardManifest]) -> str:
     return _table(("shards", "rendered with"), rows)
 
 
-def _table(columns: Sequence[str], rows: Rows) -> str:
+def _table(columns: Sequence[str], rows: TableRows) -> str:
     lines = [columns, ["---"] * len(columns), *rows]
     cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 
 
 class OutputFacts(TypedDict):
-    """File format of an output; value = (level - zero) * step, and (1, 0) means unscaled numbers."""
+    """File format of an output array, for programs that read the data set.
+
+    A value is (level - zero) * step; a step of 1 and a zero of 0 mean that values are stored unscaled.
+    """
 
     file: str
     stored: str
@@ -163,7 +166,7 @@ def output_facts(spec: Spec) -> dict[str, OutputFacts]:
 
 
 def label_names(spec: Spec) -> dict[str, dict[int, str]]:
-    """Return the names of the classes by level, for each label output of the spec."""
+    """Return the class names of each label output of the spec, by pixel value."""
     by_output: dict[str, dict[int, str]] = {}
     for one in label_classes():
         for output, level in zip(_LABEL_OUTPUTS, (one.number, one.face_synthetics), strict=True):
@@ -174,14 +177,14 @@ def label_names(spec: Spec) -> dict[str, dict[int, str]]:
 
 
 def landmark_names(name: str, spec: Spec) -> list[str]:
-    """Return the names of the landmarks of a set, or of a table of the spec, in order."""
+    """Return the ordered names of the landmarks of a preset set or of a landmark table of the spec."""
     if name in SETS:
         return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[name])]
 
 
 def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
-    """Yield part, author and licence of everything that the spec can render."""
+    """Yield asset, author and licence of every head, person and environment that the spec can render."""
     author, _, licence = CREDIT.rpartition(", ")
     yield "people: the parametric human", author, licence
     for parameter in ("person.head", "environment.name"):

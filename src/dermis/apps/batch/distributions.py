@@ -1,4 +1,4 @@
-"""Probability distributions of a spec: a constant, or a table such as {uniform = [0, 1]}."""
+"""Probability distributions of a spec: a constant, or a TOML table such as {uniform = [0, 1]}."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TypeGuard
 
 from scipy.special import ndtr, ndtri
 
-Value = float | str
+SampleValue = float | str
 SpecValue = float | str | dict[str, object]
 """Distribution as a TOML value."""
 _MAX_DEVIATIONS = 6.0  # limit of normal samples in standard deviations
@@ -21,41 +21,41 @@ _MAX_CHOICES = 100_000
 
 
 def require(holds: bool, expected: str) -> None:
-    """Raise ValueError with a text of what was expected, unless a condition holds."""
+    """Raise ValueError with a description of what was expected, unless a condition holds."""
     if not holds:
         raise ValueError(expected)
 
 
 class Distribution(ABC):
-    """Distribution from which a parameter is sampled."""
+    """Base class of the distributions from which a parameter is sampled."""
 
     @property
     @abstractmethod
-    def support(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[SampleValue, ...]:
         """Return the smallest and the largest number, or all texts, that can be sampled."""
 
     @abstractmethod
-    def quantile(self, probability: float) -> Value:
+    def quantile(self, probability: float) -> SampleValue:
         """Return the value at a cumulative probability between 0 and 1."""
 
     @abstractmethod
     def spec_value(self) -> SpecValue:
-        """Return the TOML value that `parse_distribution` reads as this distribution."""
+        """Return the TOML value that `parse_distribution` converts to this distribution."""
 
 
 @dataclass(frozen=True)
 class Constant(Distribution):
-    """Constant number or text."""
+    """Distribution with a single number or text."""
 
-    value: Value
+    value: SampleValue
 
     @property
-    def support(self) -> tuple[Value, ...]:
-        """Return the constant."""
+    def support(self) -> tuple[SampleValue, ...]:
+        """Return the constant as the only sample."""
         return (self.value,)
 
-    def quantile(self, probability: float) -> Value:
-        """Return the constant."""
+    def quantile(self, probability: float) -> SampleValue:
+        """Return the constant, whatever the probability."""
         return self.value
 
     def spec_value(self) -> SpecValue:
@@ -65,19 +65,19 @@ class Constant(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Uniform distribution between two numbers, optionally of the logarithm."""
+    """Uniform distribution of a number, or of its logarithm, between two limits."""
 
     low: float
     high: float
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Check the limits."""
+        """Check that the limits are ordered, and positive for logarithms."""
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         require(self.low > 0 or not self.logarithmic, "limits above 0 for log_uniform")
 
     @property
-    def support(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[SampleValue, ...]:
         """Return the two limits."""
         return self.low, self.high
 
@@ -89,8 +89,8 @@ class Uniform(Distribution):
         return min(max(exp(low + probability * (high - low)), self.low), self.high)
 
     def spec_value(self) -> SpecValue:
-        """Return a table of `uniform` or `log_uniform`."""
-        return {"log_uniform" if self.logarithmic else "uniform": _floats(self.low, self.high)}
+        """Return the TOML table with the key `uniform` or `log_uniform`."""
+        return {"log_uniform" if self.logarithmic else "uniform": _float_list(self.low, self.high)}
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Normal(Distribution):
         require(self.sd > 0, "a standard deviation above 0")
 
     @property
-    def support(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[SampleValue, ...]:
         """Return the numbers six standard deviations below and above the mean."""
         return self.mean - _MAX_DEVIATIONS * self.sd, self.mean + _MAX_DEVIATIONS * self.sd
 
@@ -114,13 +114,13 @@ class Normal(Distribution):
         return self.mean + self.sd * min(max(float(ndtri(probability)), -_MAX_DEVIATIONS), _MAX_DEVIATIONS)
 
     def spec_value(self) -> SpecValue:
-        """Return a table of `normal`."""
-        return {"normal": _floats(self.mean, self.sd)}
+        """Return the TOML table with the key `normal`."""
+        return {"normal": _float_list(self.mean, self.sd)}
 
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Normal distribution conditioned on an interval: numbers outside have probability 0."""
+    """Normal distribution restricted to an interval and rescaled: numbers outside have probability 0."""
 
     mean: float
     sd: float
@@ -139,12 +139,15 @@ class TruncatedNormal(Distribution):
 
     @property
     def _tail_probabilities(self) -> tuple[float, float]:
-        """Return the normal's cumulative probabilities at the limits, mirrored if both exceed the mean."""
+        """Return the cumulative probabilities of the untruncated normal at both limits.
+
+        They are mirrored about the mean if both limits exceed it, as they would cancel near 1.
+        """
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))
 
     @property
-    def support(self) -> tuple[Value, ...]:
+    def support(self) -> tuple[SampleValue, ...]:
         """Return the two limits."""
         return self.low, self.high
 
@@ -159,12 +162,12 @@ class TruncatedNormal(Distribution):
 
     def spec_value(self) -> SpecValue:
         """Return a table of `truncated`."""
-        return {"truncated": _floats(self.mean, self.sd, self.low, self.high)}
+        return {"truncated": _float_list(self.mean, self.sd, self.low, self.high)}
 
 
 @dataclass(frozen=True)
 class Choice(Distribution):
-    """Mixture of distributions, usually constants; the weights need not sum to 1."""
+    """Weighted choice among distributions, usually constants; the weights need not sum to 1."""
 
     values: tuple[Distribution, ...]
     weights: tuple[float, ...]
@@ -180,14 +183,14 @@ class Choice(Distribution):
         )
 
     @property
-    def support(self) -> tuple[Value, ...]:
-        """Return the smallest and the largest number, or all texts."""
+    def support(self) -> tuple[SampleValue, ...]:
+        """Return the smallest and the largest number, or all texts, of the alternatives."""
         bounds = [bound for value in self.values for bound in value.support]
         if isinstance(bounds[0], str):
             return tuple(dict.fromkeys(bounds))
         return min(bounds), max(bounds)
 
-    def quantile(self, probability: float) -> Value:
+    def quantile(self, probability: float) -> SampleValue:
         """Return the value at a cumulative probability between 0 and 1."""
         cumulative = list(accumulate(self.weights))
         position = probability * cumulative[-1]
@@ -198,14 +201,15 @@ class Choice(Distribution):
         return self.values[index].quantile(min(max(fraction, 2.0**-53), 1.0 - 2.0**-53))
 
     def spec_value(self) -> SpecValue:
-        """Return a table of `choice` and `weights`."""
-        return {"choice": [one.spec_value() for one in self.values], "weights": _floats(*self.weights)}
+        """Return the TOML table with the keys `choice` and `weights`."""
+        return {"choice": [one.spec_value() for one in self.values], "weights": _float_list(*self.weights)}
 
 
 @dataclass(frozen=True, repr=False)
 class FileChoice(Distribution):
     """Choice among the files that match a pattern, with equal probability.
 
+    pattern : file name pattern with wildcards, relative to the spec's folder
     names : sorted paths relative to the spec's folder; empty until the pattern is resolved
     """
 
@@ -213,8 +217,8 @@ class FileChoice(Distribution):
     names: tuple[str, ...] = ()
 
     @property
-    def support(self) -> tuple[Value, ...]:
-        """Return the paths."""
+    def support(self) -> tuple[SampleValue, ...]:
+        """Return the paths of all matching files."""
         return self.names
 
     def quantile(self, probability: float) -> str:
@@ -222,15 +226,15 @@ class FileChoice(Distribution):
         return self.names[min(int(probability * len(self.names)), len(self.names) - 1)]
 
     def spec_value(self) -> SpecValue:
-        """Return a table of `files`."""
+        """Return the TOML table with the key `files`."""
         return {"files": self.pattern}
 
     def __repr__(self) -> str:
-        """Return the table as text, without the paths."""
+        """Return the TOML table as text, with the pattern but not the paths."""
         return repr(self.spec_value())
 
 
-def _floats(*values: float) -> list[float]:
+def _float_list(*values: float) -> list[float]:
     return list(map(float, values))
 
 
@@ -249,11 +253,11 @@ _NUMBERS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
 
 
 def parse_distribution(value: object, nested: bool = False) -> Distribution:
-    """Return the distribution that a value of a spec describes.
+    """Return the distribution that a TOML value of a spec describes.
 
-    nested : whether it is a value of a choice, which must not be a choice or files itself
+    nested : whether the value is an alternative of a choice, which must not be a choice or files itself
 
-    Raises ValueError with a text of what was expected.
+    Raises ValueError with a description of what was expected.
     """
     if isinstance(value, Distribution):
         return value
@@ -265,7 +269,7 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
     kind = next(iter(table), "")
     if kind in _NUMBERS and len(table) == 1:
         count, make = _NUMBERS[kind]
-        return make(*_numbers(table[kind], f"{count} numbers in {kind}", count))
+        return make(*_number_list(table[kind], f"{count} numbers in {kind}", count))
     if nested:
         raise ValueError(_EXPECTED_FORMS)
     if kind == "files" and len(table) == 1 and isinstance(table[kind], str):
@@ -274,13 +278,16 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
         values = table["choice"]
         if not isinstance(values, list | tuple):
             raise ValueError("a list in choice")
-        weights = _numbers(table.get("weights", [1.0] * len(values)), "a list of numbers in weights")
+        weights = _number_list(table.get("weights", [1.0] * len(values)), "a list of numbers in weights")
         return Choice(tuple(parse_distribution(one, True) for one in values), tuple(weights))
     raise ValueError(_EXPECTED_FORMS)
 
 
-def _numbers(values: object, expected: str, count: int | None = None) -> list[float]:
-    """Return a list of numbers as floats; raise ValueError with the expected form otherwise."""
+def _number_list(values: object, expected: str, count: int | None = None) -> list[float]:
+    """Return a list of numbers as floats; raise ValueError with `expected` for other values.
+
+    count : required length of the list; None for any
+    """
     if not isinstance(values, list | tuple) or count not in (None, len(values)):
         raise ValueError(expected)
     numbers = [float(one) for one in values if _is_number(one)]

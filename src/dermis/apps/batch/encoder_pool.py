@@ -1,4 +1,4 @@
-"""Pool of processes that encode the images of a worker in order."""
+"""Pool of processes that encode the images of a worker as files, in order."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from dermis.apps.batch.child_processes import ChildProcess, LostProcessError, sh
 from dermis.base.errors import DermisError
 
 EncodedImage = tuple[int, dict[str, bytes]]
-Job = tuple[object, ...]
+EncoderJob = tuple[object, ...]
 _JOBS_IN_FLIGHT = 2  # per process
 _PAGE_BYTES = 4096
 _SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not restart the processes
 
 
 class EncoderPool:
-    """Pool of processes that call `encode(*job)` in turn.
+    """Pool of processes to which images are assigned in turn, to be encoded as files.
 
-    count : number of processes; with 0, this process encodes
-    encode : function that can be pickled
+    count : number of processes; with 0, the calling process encodes
+    encode : function, called with the arguments in a job, that returns an image's number and files; picklable
     """
 
     def __init__(self, count: int, encode: Callable[..., EncodedImage]) -> None:
         self._count, self._encode, self._size = count, encode, 0
         self._processes: list[_EncoderProcess] = []
 
-    def encode_all(self, jobs: Iterable[Job]) -> Iterator[EncodedImage]:
-        """Yield the results of `encode` in the order of the jobs; a few jobs are taken in advance.
+    def encode_all(self, jobs: Iterable[EncoderJob]) -> Iterator[EncodedImage]:
+        """Yield the encoded images in the order of the jobs, reading a few jobs ahead.
+
+        jobs : arguments of `encode` for each image
 
         Raises LostProcessError if one of the processes dies, and DermisError if `encode` does.
         """
@@ -40,7 +42,7 @@ class EncoderPool:
         pending: deque[_EncoderProcess] = deque()
         try:
             for number, job in enumerate(jobs):
-                parts = _serialised(job)
+                parts = _job_buffers(job)
                 size = sum(_page_aligned(part.nbytes) for part in parts)
                 if size > self._size or not self._processes:
                     while pending:
@@ -63,7 +65,7 @@ class EncoderPool:
             self._processes.pop().child.kill()
 
     def _start_processes(self, size: int) -> None:
-        """Start the processes for jobs of up to `size` bytes."""
+        """Start the processes with shared memory for jobs of up to `size` bytes."""
         self.close()
         self._size = size
         for _ in range(self._count):
@@ -71,10 +73,12 @@ class EncoderPool:
 
 
 class _EncoderProcess:
-    """Encoder process with shared memory for its jobs.
+    """Encoder process with shared memory through which it receives its jobs.
 
-    The pipe carries the offsets of the jobs in that memory only. If it carried the jobs, both ends could
-    block while waiting for each other to read.
+    The pipe only carries the offsets of the jobs in that memory. If it carried the jobs, parent and child
+    could block while waiting for each other to read.
+
+    size : largest size of a job [bytes]
     """
 
     def __init__(self, size: int, encode: Callable[..., EncodedImage]) -> None:
@@ -107,8 +111,8 @@ class _EncoderProcess:
         return LostProcessError(f"an encoder process: {self.child.exit_reason()}")
 
 
-def _serialised(job: Job) -> list[memoryview]:
-    """Return the pickle of a job without its arrays, followed by the bytes of the arrays."""
+def _job_buffers(job: EncoderJob) -> list[memoryview]:
+    """Return a job as buffers for shared memory: its pickle without arrays, then the bytes of each array."""
     arrays: list[pickle.PickleBuffer] = []
     pickled = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
     return [memoryview(pickled), *(array.raw() for array in arrays)]
@@ -121,7 +125,10 @@ def _page_aligned(size: int) -> int:
 def _run_encoder(
     pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
 ) -> None:
-    """Encode the jobs that the pipe announces, in a process of the pool."""
+    """Encode the jobs whose offsets arrive through the pipe; this runs in an encoder process.
+
+    memory : shared memory that holds the jobs
+    """
     view = memoryview(memory).cast("B")
     while True:
         try:

@@ -1,4 +1,4 @@
-"""Goodness-of-fit tests of a data set's sampled parameters against the distributions of its spec."""
+"""Goodness-of-fit tests of the sampled parameters in a data set against the distributions of its spec."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.apps.batch.distributions import Choice, Constant, Distribution
 from dermis.apps.batch.index import open_index
 from dermis.apps.batch.sampling import round_significant
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.spec_tables import NONE
+from dermis.apps.batch.spec_tables import NO_ENVIRONMENT
 from dermis.human.expressions import expand_targets
 
 MIN_P_VALUE = 1e-6
@@ -29,16 +29,18 @@ _MAX_LISTED = 12  # texts
 _MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
-Values = Sequence[float | str]
+Samples = Sequence[float | str]
 
 
 class FitTest(NamedTuple):
-    """Test of the sampled values of a parameter against its distribution.
+    """Result of testing the samples of a parameter against its distribution.
 
-    sample_count : number of samples: images or people
-    expected, observed : mean and standard deviation of numbers, or probabilities of texts
+    parameter : name of the parameter
+    sample_count : number of samples: images, or people for a parameter of a person
+    expected, observed : mean and standard deviation of numbers, or probabilities of texts, in the
+        distribution and in the samples
     distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
-    expected_distance : mean distance of so many samples of the distribution; 0 if there is none [-]
+    expected_distance : mean distance for correct samples of this number; 0 if there is none [-]
     p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 
@@ -52,12 +54,12 @@ class FitTest(NamedTuple):
 
     @property
     def passes(self) -> bool:
-        """Return whether the p-value is large enough."""
+        """Return whether the p-value is at least `MIN_P_VALUE`."""
         return self.p_value >= MIN_P_VALUE
 
 
 def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
-    """Yield a test of each parameter that varies, from the index of a data set.
+    """Yield a goodness-of-fit test of each parameter with a varying distribution, from a data set's index.
 
     A person counts once, regardless of the number of images. Raises DermisError if there is no index.
     """
@@ -68,7 +70,7 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
             people = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
             first = np.unique(people, return_index=True)[1]
         for name, distribution in spec.distributions.items():
-            column = _column(name)
+            column = _index_column(name)
             if isinstance(distribution, Constant) or column not in names:
                 continue
             values = np.array(file.read(columns=[column]).column(0).to_pylist(), object)
@@ -77,15 +79,18 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
                 yield _parameter_test(name, distribution, present, spec)
 
 
-def fit_test(name: str, distribution: Distribution, values: Values) -> FitTest:
-    """Return the test of values against a distribution."""
+def fit_test(name: str, distribution: Distribution, values: Samples) -> FitTest:
+    """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for texts."""
     if any(isinstance(bound, str) for bound in distribution.support):
         return _text_test(name, text_probabilities(distribution), [str(value) for value in values])
     return _number_test(name, distribution, np.sort(np.array(values, np.float64)))
 
 
-def cdf(distribution: Distribution, x: Array, *, closed: bool) -> Array:
-    """Return the probability of values below `x`, or of values up to and including `x` if closed."""
+def cumulative_probability(distribution: Distribution, x: Array, *, closed: bool) -> Array:
+    """Return the cumulative probability of a numeric distribution at each x.
+
+    closed : whether to include x itself, which matters at constants: P(X <= x) instead of P(X < x)
+    """
     match distribution:
         case Constant(value):
             return ((x >= float(value)) if closed else (x > float(value))).astype(np.float64)
@@ -101,13 +106,16 @@ def cdf(distribution: Distribution, x: Array, *, closed: bool) -> Array:
                 return np.asarray((ndtr(-first) - ndtr(-z)) / (ndtr(-first) - ndtr(-last)))
             return np.asarray((ndtr(z) - ndtr(first)) / (ndtr(last) - ndtr(first)))
         case Choice(parts, weights):
-            terms = (w * cdf(part, x, closed=closed) for part, w in zip(parts, weights, strict=True))
+            terms = (
+                w * cumulative_probability(part, x, closed=closed)
+                for part, w in zip(parts, weights, strict=True)
+            )
             return np.asarray(sum(terms) / sum(weights))
     raise TypeError(f"{distribution} is not numeric")
 
 
 def text_probabilities(distribution: Distribution) -> dict[str, float]:
-    """Return the probability of each text of a distribution."""
+    """Return the probability of each text that a distribution can give."""
     if isinstance(distribution, distributions.FileChoice):
         return dict.fromkeys(distribution.names, 1.0 / len(distribution.names))
     if isinstance(distribution, Constant):
@@ -121,8 +129,8 @@ def text_probabilities(distribution: Distribution) -> dict[str, float]:
     return {text: weight / total for text, weight in weights.items() if weight}
 
 
-def _parameter_test(name: str, distribution: Distribution, values: Values, spec: Spec) -> FitTest:
-    if name != "background.kind" or NONE not in spec.distributions["environment.name"].support:
+def _parameter_test(name: str, distribution: Distribution, values: Samples, spec: Spec) -> FitTest:
+    if name != "background.kind" or NO_ENVIRONMENT not in spec.distributions["environment.name"].support:
         return fit_test(name, distribution, values)
     replacement = {"environment": "gradient"}  # in images without an environment, see `Sampler.parameters`
     expected = defaultdict[str, float](float)
@@ -132,12 +140,12 @@ def _parameter_test(name: str, distribution: Distribution, values: Values, spec:
 
 
 def _number_test(name: str, distribution: Distribution, values: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted values that were rounded to six digits."""
+    """Return the Kolmogorov-Smirnov test of sorted samples, allowing for their rounding to six digits."""
     count, error = len(values), _ROUNDING_ERROR * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
     below = np.searchsorted(values, values, "left") / count
-    above = up_to - cdf(distribution, values + error, closed=True)
-    under = cdf(distribution, values - error, closed=False) - below
+    above = up_to - cumulative_probability(distribution, values + error, closed=True)
+    under = cumulative_probability(distribution, values - error, closed=False) - below
     distance = float(max(above.max(), under.max(), 0.0))
     probabilities = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     quantiles: Array = np.array([distribution.quantile(p) for p in probabilities.tolist()], np.float64)
@@ -147,7 +155,11 @@ def _number_test(name: str, distribution: Distribution, values: Array) -> FitTes
 
 
 def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
-    """Return the chi-square test of texts against their probabilities."""
+    """Return the chi-square test of sampled texts.
+
+    expected : probability of each text
+    values : sampled texts
+    """
     count, counts = len(values), Counter(values)
     distance = max(abs(counts[text] / count - expected.get(text, 0.0)) for text in {*expected, *counts})
     expected_distance = max(sqrt(2 / np.pi * p * (1 - p) / count) for p in expected.values())
@@ -162,7 +174,12 @@ def _format_probabilities(probabilities: Mapping[str, float]) -> str:
 
 
 def _chi_square(expected: Mapping[str, float], observed: Counter[str], count: int) -> float:
-    """Return the p-value of counts against their probabilities; rare texts are pooled."""
+    """Return the p-value of a chi-square test of counts; texts with few expected samples are pooled.
+
+    expected : probability of each text
+    observed : number of samples of each text
+    count : number of all samples
+    """
     cells = [(observed[text], count * p) for text, p in expected.items() if count * p >= _MIN_EXPECTED_COUNT]
     pooled = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
     if pooled[1] > _MIN_EXPECTED_COUNT or pooled[0]:
@@ -177,7 +194,10 @@ def _format_moments(values: Array) -> str:
     return f"{round_significant(float(values.mean())):.5g}, {round_significant(float(values.std())):.5g}"
 
 
-def _column(name: str) -> str:
-    """Return the index column of a parameter; a left and right pair of targets has two equal columns."""
+def _index_column(name: str) -> str:
+    """Return the column of the index with a parameter's samples.
+
+    A parameter that sets a left and a right morph target has two equal columns, of which this is the first.
+    """
     start, _, target = name.partition(".")
     return f"pose.{expand_targets([target])[0]}" if start == "pose" else name

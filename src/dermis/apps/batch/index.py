@@ -1,4 +1,4 @@
-"""Index of a data set: a table of the sampled parameters of each image, and statistics of its columns."""
+"""Index of a data set: a Parquet table of the sampled parameters of each image, and column statistics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, 
 _IDENTIFIERS = "number", "key", "shard"
 _MAX_LISTED = 12
 
-Row = dict[str, object]
+IndexRow = dict[str, object]
 
 
 def write_index(out: Path, spec: Spec) -> Path:
@@ -51,9 +51,9 @@ def write_index(out: Path, spec: Spec) -> Path:
 
 
 def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
-    """Return the index of a data set, opened for reading by columns.
+    """Return the Parquet file of a data set's index, opened for reading by columns.
 
-    purpose : what pyarrow is needed for, named if it is missing
+    purpose : what pyarrow is needed for, for the message if it is missing
 
     Raises DermisError if there is no index.
     """
@@ -64,7 +64,7 @@ def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
 
 
 def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield name, number of images and a summary of the values of each parameter in the index.
+    """Yield name, number of images and a summary of the samples of each parameter in the index.
 
     Raises DermisError if there is no index.
     """
@@ -72,11 +72,11 @@ def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
         for name in file.schema_arrow.names:
             if name not in (*_IDENTIFIERS, *MATRIX_COLUMNS):
                 column = file.read(columns=[name]).column(0)
-                yield name, len(column) - column.null_count, _summary(column)
+                yield name, len(column) - column.null_count, _column_summary(column)
 
 
-def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
-    """Yield the rows of each existing shard that contains images, one shard at a time."""
+def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[IndexRow]]:
+    """Yield the index rows of each existing shard that contains images, one shard at a time."""
     for shard in list_shards(spec):
         path = shard_path(out, shard, spec)
         if not shard_exists(out, shard, spec):
@@ -91,21 +91,21 @@ def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:
             yield rows
 
 
-def _row(key: str, shard: str, record: Record) -> Row:
+def _row(key: str, shard: str, record: Record) -> IndexRow:
     matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
     matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
-    flat = {name: _flat(value) for name, value in matrices.items()}
+    flat = {name: _flatten_matrix(value) for name, value in matrices.items()}
     return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **flat}
 
 
-def _flat(value: object) -> object:
+def _flatten_matrix(value: object) -> object:
     if not isinstance(value, list) or not value or not isinstance(value[0], list):
         return value
     return [one for row in value for one in row]
 
 
 def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
-    """Return the types of all columns; the columns of parameters are sorted by name."""
+    """Return names and types of the index columns; those of parameters are sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):
@@ -131,7 +131,7 @@ def _column_type(kinds: set[type]) -> pyarrow.DataType:
     return arrow.list_(arrow.float64()) if kinds <= {list} else arrow.string()
 
 
-def _table(rows: list[Row], schema: pyarrow.Schema) -> pyarrow.Table:
+def _table(rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
     arrow = import_extra("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
@@ -142,7 +142,7 @@ def _table(rows: list[Row], schema: pyarrow.Schema) -> pyarrow.Table:
     return arrow.Table.from_arrays(columns, schema=schema)
 
 
-def _summary(column: pyarrow.ChunkedArray) -> str:
+def _column_summary(column: pyarrow.ChunkedArray) -> str:
     arrow = import_extra("pyarrow", "the statistics of a data set")
     compute = import_extra("pyarrow.compute", "the statistics of a data set")
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
@@ -156,10 +156,11 @@ def _summary(column: pyarrow.ChunkedArray) -> str:
         return "lists of numbers"
     minimum, maximum = compute.min_max(column).as_py().values()
     if minimum == maximum:
-        return _number(minimum)
+        return _format_number(minimum)
     mean, deviation = compute.mean(column).as_py(), compute.stddev(column).as_py()
-    return f"{_number(minimum)} to {_number(maximum)}, mean {mean:.4g}, standard deviation {deviation:.4g}"
+    limits = f"{_format_number(minimum)} to {_format_number(maximum)}"
+    return f"{limits}, mean {mean:.4g}, standard deviation {deviation:.4g}"
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return str(value) if isinstance(value, int) else f"{value:.6g}"

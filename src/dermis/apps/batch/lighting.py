@@ -9,7 +9,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 
 from dermis.apps.batch.sampling import Parameters, table_numbers
-from dermis.apps.batch.spec_tables import RIG
+from dermis.apps.batch.spec_tables import LAMP_RIG
 from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
@@ -27,30 +27,38 @@ def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     strength, turn_deg = light["strength"], light["turn_deg"]
     if not strength:
         return ()
-    if parameters["light.kind"] == RIG:
+    if parameters["light.kind"] == LAMP_RIG:
         lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMPS)
-        return tuple(_lamp(lamp, turn_deg, strength) for lamp in lamps)
+        return tuple(_area_lamp(lamp, turn_deg, strength) for lamp in lamps)
     presets = _preset_lights(str(parameters["light.kind"]))
-    return tuple(_rotated(light, turn_deg, strength) for light in presets)
+    return tuple(_rotate_light(light, turn_deg, strength) for light in presets)
 
 
 def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
-    """Return the unit vector at a yaw from the head's front to its left, and a pitch upwards [degrees]."""
+    """Return the unit vector at a yaw from the head's front towards its left, and a pitch upwards."""
     yaw, pitch = radians(yaw_deg), radians(pitch_deg)
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 
 
 @lru_cache(maxsize=64)
 def blackbody_colour(kelvin: float) -> tuple[float, float, float]:
-    """Return the colour of a black body by Planck's law, linear Rec. 709 of luminance 1, white at 6500 K."""
+    """Return the colour of a black body by Planck's law: linear Rec. 709 of luminance 1, white at 6500 K.
+
+    kelvin : temperature [K]
+    """
     white, body = (np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_K, kelvin))
     colour = np.maximum(_rgb_weights() @ (white / body), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
     return red, green, blue
 
 
-def _lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
-    """Return a lamp of the rig, which faces the centre of the head."""
+def _area_lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
+    """Return a square area light of a sampled rig, which faces the centre of the head.
+
+    lamp : sampled parameters of the lamp, by key of `LampTable`
+    turn_deg : rotation of the rig about the upward axis [degrees]
+    strength : factor of the irradiance of all lamps [-]
+    """
     x, y, z = direction_from_angles(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
     distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]
     red, green, blue = (irradiance * one for one in blackbody_colour(lamp["kelvin"]))
@@ -63,8 +71,8 @@ def _preset_lights(kind: str) -> tuple[Light, ...]:
     return preset_lights(kind)
 
 
-def _rotated(light: Light, degrees: float, strength: float) -> Light:
-    """Return a light scaled by a strength and rotated about the upward axis."""
+def _rotate_light(light: Light, degrees: float, strength: float) -> Light:
+    """Return a light of a preset rig, rotated about the upward axis and scaled by a strength."""
     sine, cosine = sin(radians(degrees)), cos(radians(degrees))
     values: dict[str, object] = {"irradiance": tuple(strength * one for one in light.irradiance)}
     for name in _VECTOR_FIELDS:

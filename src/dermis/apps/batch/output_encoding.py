@@ -1,4 +1,4 @@
-"""Encoding of outputs as PNG, OpenEXR and NumPy files."""
+"""Encoding of output arrays as PNG, OpenEXR and NumPy files, and their decoding."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _MAX_HALF = 65504.0
 
 
 def file_format(name: str, encoding: Encoding) -> str:
-    """Return the file format of an output: png, exr or npy.
+    """Return the file format in which an output is stored: png, exr or npy.
 
-    encoding : requested format; png gives exr for outputs that do not fit into 16-bit integers
+    encoding : requested format; for png, outputs that do not fit into 16-bit integers become exr
     """
     output = OUTPUTS[name]
     if encoding == "npy" or not output.channels:
@@ -34,7 +34,7 @@ def file_format(name: str, encoding: Encoding) -> str:
 
 
 def storage_description(name: str, encoding: Encoding) -> str:
-    """Return a description of how the numbers of an output are stored."""
+    """Return a text that says how an output is stored, such as "16-bit PNG, level x 1/64"."""
     output, kind = OUTPUTS[name], file_format(name, encoding)
     if kind == "png" and output.quantisation is not None:
         step, zero = output.quantisation
@@ -47,7 +47,7 @@ def storage_description(name: str, encoding: Encoding) -> str:
 
 
 def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
-    """Return the file of an output, (h, w) or (h, w, c), in the format given by `file_format`.
+    """Return the file of an output array (h, w) or (h, w, c), in the format given by `file_format`.
 
     Raises DermisError for numbers that are not finite.
     """
@@ -67,9 +67,9 @@ def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
 
 
 def decode_output(name: str, kind: str, data: bytes) -> Array:
-    """Return the values of an output, (h, w) or (h, w, c), from the bytes of its file.
+    """Return an output array (h, w) or (h, w, c) from the bytes of its file.
 
-    kind : png, exr or npy
+    kind : file format: png, exr or npy
 
     Raises ValueError and other exceptions for data that are damaged, too large, or of another format.
     """
@@ -100,13 +100,13 @@ def decode_png(data: bytes) -> Array:
 
 
 def _stored_dtype(output: Output, encoding: Encoding) -> np.dtype[Any]:
-    """Return the type of an output's numbers in its file, little-endian on every machine."""
+    """Return the number type of an output in its file, little-endian on every machine."""
     half = encoding == "png" and output.kind == "float32" and output.quantisation is None
     return np.dtype(np.float16 if half else output.kind).newbyteorder("<")
 
 
 def _decode_npy(data: bytes) -> Array:
-    """Return the array of a NumPy file; its shape is checked before memory is allocated."""
+    """Return the array in a NumPy file, whose shape is checked before memory is allocated."""
     if not data.startswith(_NPY_MAGIC):
         raise ValueError("it is not a NumPy array file of version 1.0")
     file = io.BytesIO(data[len(_NPY_MAGIC) :])

@@ -1,4 +1,4 @@
-"""Preview of a data set: a table of its sampled parameters, and a contact sheet of its first images."""
+"""Preview of a data set before it is rendered: a table of sampled parameters, and a contact sheet."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _PERSON_IDS = "person.number", "person.seed"
 _MAX_VALUES = 12  # listed values of a text
 
 
-class Row(TypedDict):
-    """Row of the parameter table.
+class ParameterRow(TypedDict):
+    """Row of the parameter table: a parameter with its distribution and statistics of its samples.
 
     drawn : distribution as TOML
-    first : values of the first 16 images, None where an image has none
+    first : samples for the first 16 images; None for images without this parameter
     images : number of images with this parameter, among the first 20,000
-    min, mean, max : statistics of numbers
+    min, mean, max : statistics of numeric samples
     counts : number of images with each text
     """
 
@@ -47,7 +47,7 @@ class Row(TypedDict):
     counts: NotRequired[dict[str, int]]
 
 
-def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.uint8]]:
+def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDArray[np.uint8]]:
     """Return the parameter table of a data set, and an sRGB contact sheet (h, w, 3) of its first 16 images.
 
     Raises DermisError as `SceneBuilder.build` and `Renderer.draw` do.
@@ -55,16 +55,16 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[Row], NDArray[np.ui
     return parameter_rows(spec), contact_sheet(spec, adapter)
 
 
-def parameter_rows(spec: Spec) -> list[Row]:
-    """Return a row for each parameter that varies."""
+def parameter_rows(spec: Spec) -> list[ParameterRow]:
+    """Return a row of the parameter table for each parameter that varies."""
     samples = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED))]
     names = dict.fromkeys(name for sample in samples for name in sample)
     varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
     return [_row(spec, name, samples) for name in varying if name not in _PERSON_IDS]
 
 
-def table_lines(rows: Sequence[Row]) -> list[str]:
-    """Return the rows as aligned lines of text."""
+def table_lines(rows: Sequence[ParameterRow]) -> list[str]:
+    """Return the parameter table as aligned lines of text."""
     cells = [("parameter", "distribution", "images", "min", "mean", "max"), *map(_cells, rows)]
     widths = [max(len(row[k]) for row in cells if len(row) > 4 or k < 3) for k in range(3)]
     lines = []
@@ -76,7 +76,7 @@ def table_lines(rows: Sequence[Row]) -> list[str]:
 
 
 def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
-    """Return an sRGB picture (h, w, 3) of the first 16 images with their numbers."""
+    """Return an sRGB picture (h, w, 3) with the first 16 images at reduced quality, labelled by number."""
     from PIL import Image, ImageDraw
 
     width, height = (max(_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
@@ -97,19 +97,19 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     return np.array(sheet)
 
 
-def _row(spec: Spec, name: str, samples: Sequence[Parameters]) -> Row:
+def _row(spec: Spec, name: str, samples: Sequence[Parameters]) -> ParameterRow:
     values = [sample[name] for sample in samples if name in sample]
     distribution = spec.distributions.get(name)
     text = "" if distribution is None else value_text(distribution.spec_value())
     first = [sample.get(name) for sample in samples[:SHEET_IMAGES]]
-    row: Row = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
+    row: ParameterRow = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:
         return {**row, "counts": dict(Counter(map(str, values)).most_common())}
     return {**row, "min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def _cells(row: ParameterRow) -> tuple[str, ...]:
     text = row["drawn"]
     if len(text) > _MAX_COLUMN_WIDTH:
         text = f"{text[: _MAX_COLUMN_WIDTH - 4]} ..."

@@ -1,4 +1,4 @@
-"""Reader of data sets; files are treated as untrusted."""
+"""Reader of data sets; their files are treated as untrusted."""
 
 from __future__ import annotations
 
@@ -105,11 +105,11 @@ def read_dataset(
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image from its files, which are bytes by suffix as the library webdataset provides them.
+    """Return an image of a data set from its files, which the library webdataset provides as bytes by suffix.
 
-    culprit : name of the image in messages; by default its key
+    The returned keys are those of `read_dataset`. Raises DermisError for damaged files.
 
-    The keys are those of `read_dataset`. Raises DermisError for damaged files.
+    culprit : name of the image in error messages; by default its key
     """
     source = culprit or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
@@ -131,7 +131,9 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
 
 
 def read_record(data: bytes, culprit: object) -> Record:
-    """Return the record of an image; its landmarks are not checked.
+    """Return the record of an image from the bytes of its JSON file; its landmarks are not checked.
+
+    culprit : name of the file in error messages
 
     Raises DermisError if the record is damaged.
     """
@@ -151,9 +153,9 @@ def read_record(data: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Yield the files of each image of a shard by its key, in order; they can be read inside the context.
+    """Yield a reader for each file of a shard, grouped by image key and by suffix.
 
-    Raises DermisError if the file is not a shard or is truncated.
+    The files can be read inside the context. Raises DermisError if the shard is truncated or not a shard.
     """
     if path.is_dir():
         names = sorted(one.name for one in path.iterdir())
@@ -197,7 +199,10 @@ def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
 
 
 def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
-    """Return the paths of the shards to read."""
+    """Return the paths of the shards with given numbers in a data set, or the path if it is a shard.
+
+    shards : shard numbers; all shards of the data set if None
+    """
     if shard_index(path) is not None or path.suffix == ".tar":
         return [path]
     try:
@@ -250,7 +255,7 @@ def _decode_record(data: bytes, culprit: object) -> Image:
 
 
 def _decode_pose(record: Record) -> Image:
-    """Return the arrays of camera, head pose and gaze."""
+    """Return the arrays of camera, head pose and gaze in a record."""
     camera, gaze = record["camera"], record["gaze"]
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
     return {

@@ -1,4 +1,4 @@
-"""Encoding of the files of one image."""
+"""Encoding of an image of a data set: its picture, its output arrays and its JSON record."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UNIT_DIGITS = 8  # rotations and directions
 
 
 class CameraRecord(TypedDict):
-    """Camera in OpenCV's convention: pixels are K (R X + t)."""
+    """Camera in OpenCV's convention: K (R X + t) is the homogeneous pixel of a point X [mm]."""
 
     K: NestedNumbers
     R: NestedNumbers
@@ -32,7 +32,7 @@ class CameraRecord(TypedDict):
 
 
 class LandmarksRecord(TypedDict):
-    """Landmarks of an image, see `reader.LandmarkPoints`."""
+    """Landmarks of an image as JSON lists; `reader.LandmarkPoints` describes the fields."""
 
     pixels: NestedNumbers
     positions_mm: NestedNumbers
@@ -40,7 +40,7 @@ class LandmarksRecord(TypedDict):
 
 
 class Record(TypedDict):
-    """Content of the JSON file of an image."""
+    """Description of one image as stored in its JSON file: parameters, camera, pose and landmarks."""
 
     number: int
     parameters: Parameters
@@ -55,7 +55,8 @@ def encode_record(
 ) -> dict[str, bytes]:
     """Return the files of image `number` by suffix; equal arguments give equal bytes.
 
-    observation : outputs of the spec and an sRGB picture
+    observation : sRGB picture and output arrays of the image
+    parameters : sampled parameters of the image
 
     The suffixes are "png" for the picture, with alpha if it has no background; "NAME.png", "NAME.exr" or
     "NAME.npy" for each output, see `output_encoding.storage_description`; and "json" for the `Record`.

@@ -23,7 +23,7 @@ SPEC_FILE = "spec.toml"
 
 
 class WorkerPool(Protocol):
-    """Pool of workers: `ProcessPool` on this machine, or `DaskCluster`."""
+    """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
     def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render the shards, each completely or not at all, and yield events as they happen."""
@@ -32,7 +32,7 @@ class WorkerPool(Protocol):
 
 @dataclass
 class Progress:
-    """Progress of a run.
+    """Progress of a run, reported to `on_progress`.
 
     images : number of images rendered so far
     total : number of images in the shards that were missing at the start
@@ -46,11 +46,11 @@ class Progress:
 class RunReport:
     """Result of a run.
 
-    images : number of images in the written shards, without those that were left out
-    seconds : duration [s]
+    images : number of images in the written shards, without those that could not be rendered
+    seconds : duration of the run [s]
     shards : number of written shards
     skipped : number of shards that were complete before the run
-    failed : images that were left out
+    failed : images that could not be rendered, with the reasons
     is_complete : whether all shards of the data set, its index and its datasheet exist
     """
 
@@ -68,10 +68,11 @@ def run(
     part: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
-    """Render the missing shards of a data set, or of a part of it.
+    """Render the missing shards of a data set, or of a part of it; then write index and datasheet.
 
+    pool : workers that render the shards
     part : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
-    on_progress : function called after images were rendered
+    on_progress : function called whenever images were rendered
 
     Raises DermisError for errors of the spec, the disk or the machine; complete shards are kept.
     """
@@ -82,7 +83,7 @@ def run(
     missing = [shard for shard in selected if not is_intact(options.out, shard, options.spec)]
     remove_unfinished(options.out, selected)
     try:
-        images, failed = _render(pool, options, missing, on_progress)
+        images, failed = _render_missing(pool, options, missing, on_progress)
     finally:
         remove_unfinished(options.out, selected)
     complete = all(shard_exists(options.out, shard, options.spec) for shard in all_shards)
@@ -94,7 +95,7 @@ def run(
 
 
 def claim_folder(out: Path, spec: Spec) -> None:
-    """Create the folder of a data set, or check that an existing one belongs to the same spec.
+    """Create the folder of a data set, or check that an existing folder holds the data set of this spec.
 
     Raises DermisError if the folder belongs to another data set or cannot be written.
     """
@@ -111,10 +112,10 @@ def claim_folder(out: Path, spec: Spec) -> None:
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
 
 
-def _render(
+def _render_missing(
     pool: WorkerPool, options: RunOptions, missing: Sequence[Shard], on_progress: Callable[[Progress], None]
 ) -> tuple[int, tuple[Failure, ...]]:
-    """Return the number of images in the rendered shards, and the images that were left out."""
+    """Render the missing shards; return the number of images in them, and the images that failed."""
     progress = Progress(0, sum(shard.stop - shard.first for shard in missing))
     failed: list[Failure] = []
     notes = set[str]()

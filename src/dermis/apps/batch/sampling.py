@@ -1,4 +1,4 @@
-"""Sampling of the parameters of each image by hashing, independent of machine and order."""
+"""Sampling of each image's parameters by hashing, so that they do not depend on machine and order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from math import exp
 from scipy.special import ndtr, ndtri
 
 from dermis.apps.batch.distributions import Constant, Distribution
-from dermis.apps.batch.spec_tables import ANGLES, MIXTURE, NONE, RIG, table_values
+from dermis.apps.batch.spec_tables import (
+    GAZE_ANGLES,
+    LAMP_RIG,
+    NO_ENVIRONMENT,
+    RANDOM_EXPRESSION,
+    table_values,
+)
 from dermis.base.tables import read_rows
 from dermis.human.expressions import SIDES, Weights, expand_sides, expand_targets
 
@@ -25,9 +31,9 @@ _VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _COLOUR = "background.red", "background.green", "background.blue"
 _CONDITIONAL: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
-    (_LAMPS, lambda found: found["light.kind"] == RIG),
-    (("gaze.yaw_deg", "gaze.pitch_deg"), lambda found: found["gaze.at"] == ANGLES),
-    (("environment.turn", "environment.strength"), lambda found: found["environment.name"] != NONE),
+    (_LAMPS, lambda found: found["light.kind"] == LAMP_RIG),
+    (("gaze.yaw_deg", "gaze.pitch_deg"), lambda found: found["gaze.at"] == GAZE_ANGLES),
+    (("environment.turn", "environment.strength"), lambda found: found["environment.name"] != NO_ENVIRONMENT),
     (_COLOUR, lambda found: found["background.kind"] == "colour"),
     ("background.blur", lambda found: found["background.kind"] == "environment"),
     ("camera.frame_mm", lambda found: "camera.focal_mm" not in found),
@@ -36,16 +42,20 @@ _CONDITIONAL: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], 
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> dict[str, float]:
-    """Return the numeric parameters of a table, by their names within the table."""
+    """Return the numeric parameters of a spec table by key, without the table's name.
+
+    table : dotted name of the table, such as "light.key"
+    """
     return {name: one for name, one in table_values(parameters, table).items() if not isinstance(one, str)}
 
 
 def hashed_uniform(seed: int, number: int, name: str) -> float:
-    """Return a uniform random number in (0, 1) that depends on a seed, a number and a name only.
+    """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
 
-    It is a BLAKE2b hash of the three as text, so that numbers do not depend on each other.
+    It is a BLAKE2b hash of the three arguments as text, so that no random number depends on another.
 
-    number : number of an image or a person
+    number : number of the image, or of the person for parameters of people
+    name : name of the parameter
     """
     digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
     step = int.from_bytes(digest, "little") >> (64 - _BITS)
@@ -53,18 +63,21 @@ def hashed_uniform(seed: int, number: int, name: str) -> float:
 
 
 def round_significant(value: float) -> float:
-    """Round to six significant digits, as the last digits of logarithms and roots differ between machines."""
+    """Return a number with six significant digits.
+
+    Later digits of logarithms and roots differ between machines.
+    """
     return float(f"{value:.6g}") + 0.0  # no -0.0
 
 
 @dataclass(frozen=True)
 class Movement:
-    """Movement of a part of the face: a row of mixture.csv.
+    """Movement of a part of the face in random expressions: a row of mixture.csv.
 
-    probability : probability of this movement within its part [-]
+    probability : probability of this movement within its part of the face [-]
     max_weight : largest weight of its morph targets [-]
-    target_weights : relative weights of the morph targets
-    jaw_closing : fraction by which it reduces the opening of the jaw [-]
+    target_weights : weights of the morph targets relative to each other
+    jaw_closing : fraction by which the movement, at full strength, reduces the opening of the jaw [-]
     """
 
     probability: float
@@ -75,7 +88,7 @@ class Movement:
 
 @cache
 def load_movements() -> Mapping[str, tuple[Movement, ...]]:
-    """Return the movements of mixture.csv by part of the face."""
+    """Return the facial movements of mixture.csv by part of the face."""
     by_part: dict[str, tuple[Movement, ...]] = {}
     for row in read_rows(str(__package__), "mixture"):
         words = row["moves"].split()
@@ -108,11 +121,13 @@ def random_expression(uniform: Callable[[str], float]) -> dict[str, float]:
 def expression_weights(
     weights: Weights, intensity: float, asymmetry: float, variation: float, normal: Callable[[str], float]
 ) -> dict[str, float]:
-    """Return the weights of morph targets (0 to 1) of an expression, varied for one face.
+    """Return the morph target weights (0 to 1) of a named expression, varied at random for one image.
 
-    `ExpressionTable` describes the parameters.
-
-    normal : function that returns a standard normal random number for a name
+    weights : weights of the expression, where a name without a side moves both sides
+    intensity : factor of all weights [-]
+    asymmetry : relative increase of weights on the left and decrease on the right [-]
+    variation : standard deviation of the logarithm of each weight [-]
+    normal : function that returns a standard normal random number for a target name
     """
     varied = {}
     for name, weight in weights.items():
@@ -124,17 +139,22 @@ def expression_weights(
 
 
 def _is_one_sided(name: str) -> bool:
-    """Return whether a target has a mirrored counterpart, unlike mouthLeft and jawRight."""
+    """Return whether a morph target acts on one side of the face and has a mirrored counterpart.
+
+    Targets such as mouthLeft and jawRight move the middle of the face sideways.
+    """
     return name.endswith(SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
 
 
 @dataclass(frozen=True)
 class Sampler:
-    """Sampler of the parameters of each image.
+    """Sampler of the parameters of each image of a data set.
 
+    seed : seed of the data set
     images_per_person : number of consecutive images that show the same person
-    distributions : distributions by name of their parameter
-    cholesky_rows : weights of independent normal numbers by parameter, see `CorrelationGroup.cholesky_rows`
+    distributions : distribution of each parameter by its dotted name
+    cholesky_rows : weights of independent normal numbers for each correlated parameter, see
+        `CorrelationGroup.cholesky_rows`
     expressions : weights of morph targets by name of the expression
     """
 
@@ -145,7 +165,7 @@ class Sampler:
     expressions: Mapping[str, Weights]
 
     def parameters(self, k: int) -> Parameters:
-        """Return the parameters of image k, which do not depend on other images."""
+        """Return the sampled parameters of image k by dotted name; they do not depend on other images."""
         person = k // self.images_per_person
         found: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
@@ -153,7 +173,7 @@ class Sampler:
         for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
                 found[name] = self._sample(k, name, distribution)
-        if found["background.kind"] == "environment" and found["environment.name"] == NONE:
+        if found["background.kind"] == "environment" and found["environment.name"] == NO_ENVIRONMENT:
             found["background.kind"] = "gradient"
         for prefixes, applies in _CONDITIONAL:
             if not applies(found):
@@ -166,7 +186,7 @@ class Sampler:
         return value if isinstance(value, str) else round_significant(value)
 
     def _probability(self, k: int, name: str) -> float:
-        """Return the cumulative probability at which a parameter's distribution is evaluated."""
+        """Return the random cumulative probability in (0, 1) at which image k samples a parameter."""
         weights = self.cholesky_rows.get(name)
         if weights is None:
             return self._uniform(k, name)
@@ -180,9 +200,12 @@ class Sampler:
         return float(ndtri(self._uniform(k, name)))
 
     def _target_weights(self, k: int, found: Parameters) -> dict[str, float]:
-        """Return the weights of all morph targets that the spec can move."""
+        """Return the weights of all morph targets that the spec can move, for image k.
+
+        found : parameters of the image that have been sampled so far
+        """
         name = str(found["expression.name"])
-        if name == MIXTURE:
+        if name == RANDOM_EXPRESSION:
             weights: Weights = random_expression(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
@@ -205,7 +228,7 @@ class Sampler:
         """Return the sorted names of all morph targets that the spec can move."""
         names = set(table_values(self.distributions, "pose"))
         for name in map(str, self.distributions["expression.name"].support):
-            if name == MIXTURE:
+            if name == RANDOM_EXPRESSION:
                 for movements in load_movements().values():
                     names.update(*(movement.target_weights for movement in movements))
             else:

@@ -16,7 +16,7 @@ from dermis.apps.batch.cameras import face_points, sampled_camera
 from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.spec_tables import ANGLES, NONE, table_values
+from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
 from dermis.base.reading import is_file
 from dermis.formats.motion.captures import find_rotation_bones
 from dermis.human.person import Human
@@ -43,10 +43,10 @@ _NOT_FIELDS = "number", "seed", "head"  # parameters that are not fields of `Hum
 
 @dataclass(frozen=True)
 class _Person:
-    """Head with everything that is the same in all of its images.
+    """Head and skin of a person, with all data that does not change between the person's images.
 
-    points : control points of the face, see `face_points`
-    bones : fraction of the head's rotation that each bone performs, by name
+    points : control points that must stay in the picture, see `face_points`
+    bones : fraction of the head's rotation that each bone performs, by bone name
     skin : skin of the person, before the spec's [skin] is applied
     """
 
@@ -57,27 +57,29 @@ class _Person:
 
 
 class SceneBuilder:
-    """Builder of the scenes of a data set, with a cache of people that does not affect the results."""
+    """Builder of the scenes of a data set, which caches people between images."""
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
-        """Return the scene of an image and its settings, which depend on the parameters only.
+        """Return the scene and render settings of an image, which depend on its parameters only.
 
-        parameters : see `Spec.parameters`
+        parameters : sampled parameters of the image, from `Spec.parameters`
 
         Raises DermisError for heads and environments that cannot be read.
         """
         person = self._person(parameters)
         head, (width, height) = person.head, self.spec.size
-        pose = Pose(self._weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones))
+        pose = Pose(
+            self._pose_weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones)
+        )
         motion = pose.motion(head.control)
         camera = sampled_camera(parameters, head, person.points, motion, width / height)
         skin_values = table_values(parameters, "skin")
         if "profile" in skin_values:
-            skin_values["profile"] = self._path(skin_values["profile"])
+            skin_values["profile"] = self._resolve_file(skin_values["profile"])
         scene = Scene(
             head,
             lights=sampled_lights(parameters),
@@ -86,7 +88,7 @@ class SceneBuilder:
             environment=self._environment(parameters),
             pose=_with_gaze(parameters, head, pose, camera.position),
         )
-        return scene, self.spec.render.replace(**_background(parameters))
+        return scene, self.spec.render.replace(**_background_settings(parameters))
 
     def _person(self, parameters: Parameters) -> _Person:
         values = table_values(parameters, "person")
@@ -104,20 +106,20 @@ class SceneBuilder:
             human = sampled_person(parameters)
             head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_fraction(size))
             skin = skin_of(human)
-        elif Path(name := self._path(parameters[_HEAD])).suffix.lower() == ".toml":
+        elif Path(name := self._resolve_file(parameters[_HEAD])).suffix.lower() == ".toml":
             scene, _ = load_scene(name, size=size)
             head, skin = scene.head, scene.skin
         else:
             head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
         return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
-    def _path(self, name: float | str) -> str:
-        """Return the path of a file in the spec's folder, or the name unchanged if there is no such file."""
+    def _resolve_file(self, name: float | str) -> str:
+        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
         file = self.spec.folder / str(name)
         return str(file) if is_file(file) else str(name)
 
-    def _weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return the weights of the morph targets that the head has or that the spec's [pose] names."""
+    def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
+        """Return the sampled weights of morph targets that the head has or that the spec's [pose] names."""
         posed = self.spec.pose_targets
         return {
             name: weight
@@ -126,15 +128,15 @@ class SceneBuilder:
         }
 
     def _environment(self, parameters: Parameters) -> Environment | None:
-        if parameters["environment.name"] == NONE:
+        if parameters["environment.name"] == NO_ENVIRONMENT:
             return None
         numbers = table_numbers(parameters, "environment")
-        name = self._path(parameters["environment.name"])
+        name = self._resolve_file(parameters["environment.name"])
         return Environment(name=name, rotation_degrees=numbers["turn_deg"], exposure=numbers["strength"])
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the person of a seed, with sampled fields replaced by those of the parameters."""
+    """Return the random person of the sampled seed, with sampled fields in place of random ones."""
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():
@@ -148,17 +150,20 @@ def sampled_person(parameters: Parameters) -> Human:
 
 @cache
 def _subdivision_levels(size: tuple[int, int]) -> int:
-    """Return the subdivision levels, equal for all sampled people so that they share one topology."""
+    """Return the number of subdivisions that suits a picture size [pixel].
+
+    It is equal for all sampled people, so that their heads share one topology.
+    """
     return max(MIN_HUMAN_LEVELS, SmoothIn(size=size)(Human().head(subdivide=0)))
 
 
 def _hair_fraction(size: tuple[int, int]) -> float:
-    """Return the fraction of the hairs to generate: as many as a picture of this size can resolve."""
+    """Return the fraction of all hairs to generate: those that a picture of this size [pixel] can resolve."""
     return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _ALL_HAIRS_PIXELS))
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) of the head."""
+    """Return the rotation matrix (3, 3) of the head by its sampled pitch, yaw and roll."""
     head = table_numbers(parameters, "head")
     return np.array(angles_matrix((head["pitch_deg"], head["yaw_deg"], head["roll_deg"])))
 
@@ -166,10 +171,10 @@ def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
 def _bone_angles(
     rotation: NDArray[np.float64], bones: Mapping[str, float]
 ) -> dict[str, tuple[float, float, float]]:
-    """Return the angles of the bones that rotate the head together.
+    """Return the rotation angles of the bones that together rotate the head, by bone name [degrees].
 
-    rotation : (3, 3) rotation of the head
-    bones : fraction of it that each bone performs, by name
+    rotation : (3, 3) rotation matrix of the head
+    bones : fraction of the rotation that each bone performs, by bone name
     """
     vector = Rotation.from_matrix(rotation).as_rotvec()
     angles = {
@@ -180,19 +185,22 @@ def _bone_angles(
 
 
 def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[float, float, float]) -> Pose:
-    """Return the pose with rotated eyes, if the head has eyes that can rotate."""
+    """Return the pose with eyes rotated towards the sampled gaze, if the head has eyes that can rotate.
+
+    camera_mm : position of the camera, the default gaze target [mm]
+    """
     if head.eyes is None or head.control.skeleton is None:
         return pose
     target = np.array(camera_mm)
-    if parameters["gaze.at"] == ANGLES:
+    if parameters["gaze.at"] == GAZE_ANGLES:
         gaze = table_numbers(parameters, "gaze")
         direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
         target = _head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM
     return looking_at(head, target, pose)
 
 
-def _background(parameters: Parameters) -> dict[str, object]:
-    """Return the settings of the background."""
+def _background_settings(parameters: Parameters) -> dict[str, object]:
+    """Return the render settings of the sampled background."""
     kind = parameters["background.kind"]
     if kind == "colour":
         return {"background": tuple(parameters[f"background.{one}"] for one in ("red", "green", "blue"))}

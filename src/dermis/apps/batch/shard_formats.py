@@ -1,4 +1,4 @@
-"""File formats of shards: tar files and folders whose last file is a manifest."""
+"""File formats of shards: tar files, and folders, each of which ends with a manifest."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _MANIFEST_DESCRIPTION = "the manifest of a complete shard"
 
 @dataclass(frozen=True)
 class ShardManifest:
-    """Manifest at the end of a shard, which proves that the shard is complete.
+    """Manifest that is written last into a shard, and so proves that the shard is complete.
 
     spec : SHA-256 of the spec
-    first, stop : range of the images, excluding `stop`
+    first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
-    sha256 : hash of all bytes before the manifest
-    made_with : adapter and versions of the software
+    sha256 : SHA-256 of all bytes before the manifest
+    made_with : adapter, and versions of the software that rendered
     """
 
     spec: str
@@ -45,16 +45,18 @@ class ShardManifest:
     made_with: dict[str, str] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
-        """Return the manifest as JSON that ends with a hash of its other values."""
+        """Return the manifest as JSON, with a hash of its other entries at the end."""
         values = asdict(self)
         check = hashlib.sha256(json.dumps(values).encode()).hexdigest()
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
 
 
 def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
-    """Return the manifest stored in some bytes.
+    """Return the manifest in the bytes of a manifest file.
 
-    Raises DermisError for bytes of another form.
+    culprit : name of the shard in error messages
+
+    Raises DermisError if the bytes are not a manifest, or differ from the hash in it.
     """
     values = parse_json(data, culprit, _MANIFEST_DESCRIPTION)
     with parsing(culprit, _MANIFEST_DESCRIPTION, KeyError, TypeError, AttributeError):
@@ -74,7 +76,7 @@ def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
 
 @cache
 def software_versions(adapter: str) -> dict[str, str]:
-    """Return the adapter's name and the versions of the software that renders."""
+    """Return the adapter's name and the versions of the software used for rendering, for the manifest."""
     versions = {"dermis": version(), "wgpu": metadata.version("wgpu"), "python": platform.python_version()}
     return {"adapter": adapter, **versions}
 
@@ -85,14 +87,14 @@ _CHUNK = 1 << 20
 
 
 class TarWriter:
-    """Writer of a tar file of regular files with constant time, owner and mode."""
+    """Writer of a tar file whose entries have a constant time, owner and mode, for reproducible bytes."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("xb")
         self._hash = hashlib.sha256()
 
     def add(self, name: str, data: bytes) -> None:
-        """Write a file; raises OSError if the disk is full."""
+        """Append a file to the archive; raises OSError if the disk is full."""
         for piece in _tar_entry(name, data):
             self._file.write(piece)
             self._hash.update(piece)
@@ -102,7 +104,7 @@ class TarWriter:
         return self._hash.hexdigest()
 
     def finish(self, manifest: bytes) -> None:
-        """Write the manifest, flush the file to the disk and close it."""
+        """Append the manifest, flush the archive to the disk and close it."""
         self.add(MANIFEST_NAME, manifest)
         self._file.write(_END)
         self._file.flush()
@@ -110,7 +112,7 @@ class TarWriter:
         self._file.close()
 
     def close(self) -> None:
-        """Close the file without a manifest."""
+        """Close the archive without a manifest, as after an error."""
         self._file.close()
 
 
@@ -123,7 +125,7 @@ class TarMember(NamedTuple):
 
 
 def tar_members(file: BinaryIO) -> Iterator[TarMember]:
-    """Yield the files of a tar archive.
+    """Yield the entries of a tar archive, without reading their content.
 
     Raises ValueError if it is damaged or truncated, or contains anything but regular files.
     """
@@ -141,9 +143,9 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
 
 
 def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
-    """Return the offset and the bytes of the manifest of a tar file, which is searched from the end.
+    """Return the offset and the bytes of the manifest, which is searched from the end of a tar file.
 
-    Raises ValueError if there is none, or if other bytes follow it.
+    Raises ValueError if there is no manifest, or if other bytes follow it.
     """
     length = file.seek(0, os.SEEK_END)
     start = max(0, length - MAX_MANIFEST_BYTES - 3 * _BLOCK)
@@ -160,7 +162,7 @@ def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
 
 
 def tar_sha256(file: BinaryIO, stop: int) -> str:
-    """Return the SHA-256 of the bytes of a tar file before an offset."""
+    """Return the SHA-256 of a tar file up to an offset, where its manifest starts."""
     digest = hashlib.sha256()
     file.seek(0)
     while stop > 0 and (piece := file.read(min(_CHUNK, stop))):
@@ -170,7 +172,7 @@ def tar_sha256(file: BinaryIO, stop: int) -> str:
 
 
 def _tar_entry(name: str, data: bytes) -> tuple[bytes, bytes, bytes]:
-    """Return the parts of a tar entry: header, content, and padding to the block size."""
+    """Return header, content, and padding to the block size, of a file in a tar archive."""
     head = tarfile.TarInfo(name)
     head.size = len(data)
     return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _BLOCK)
@@ -187,14 +189,14 @@ def _parse_header(block: bytes, offset: int) -> TarMember:
 
 
 class FolderWriter:
-    """Writer of a folder of files."""
+    """Writer of the files of a shard into a folder, with the methods of `TarWriter`."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir()
         self._path, self._hash = path, hashlib.sha256()
 
     def add(self, name: str, data: bytes) -> None:
-        """Write a file; raises OSError if the disk is full."""
+        """Write a file into the folder; raises OSError if the disk is full."""
         with (self._path / name).open("xb") as file:
             file.write(data)
         self._hash.update(_hash_input(name, data))
@@ -204,7 +206,7 @@ class FolderWriter:
         return self._hash.hexdigest()
 
     def finish(self, manifest: bytes) -> None:
-        """Write the manifest; files lost in a power failure are detected by its hash."""
+        """Write the manifest; its hash reveals files that are lost in a power failure."""
         self.add(MANIFEST_NAME, manifest)
         flush_to_disk(self._path / MANIFEST_NAME)
         flush_to_disk(self._path)
@@ -214,7 +216,7 @@ class FolderWriter:
 
 
 def folder_sha256(path: Path, names: Iterable[str]) -> str:
-    """Return the SHA-256 of files in a folder, equal to `FolderWriter.sha256`.
+    """Return the SHA-256 of the named files in a folder, computed as by `FolderWriter.sha256`.
 
     Raises DermisError if a file cannot be read.
     """
@@ -225,5 +227,5 @@ def folder_sha256(path: Path, names: Iterable[str]) -> str:
 
 
 def _hash_input(name: str, data: bytes) -> bytes:
-    """Return the bytes by which a file enters the hash of its folder."""
+    """Return the bytes with which a file contributes to the SHA-256 of its folder."""
     return f"{name} {len(data)}\n".encode() + data

@@ -24,7 +24,7 @@ _MAX_REASON_LENGTH = 200  # characters
 
 @dataclass(frozen=True, order=True)
 class Shard:
-    """Shard number and its range of images, from `first` up to but excluding `stop`."""
+    """Number of a shard, and its range of image numbers, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
@@ -32,7 +32,7 @@ class Shard:
 
 
 def list_shards(spec: Spec) -> list[Shard]:
-    """Return all shards of a data set; the last one has the remaining images."""
+    """Return all shards of a data set in order; the last one may have fewer images."""
     starts = range(0, spec.count, spec.shard_size)
     return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
 
@@ -43,22 +43,22 @@ def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
 
 
 def shard_index(path: Path) -> int | None:
-    """Return the number of a shard from its file name; None for other names."""
+    """Return the shard number in a file name such as shard-00012.tar; None for other names."""
     found = _SHARD_NAME.fullmatch(path.name)
     return int(found[1]) if found else None
 
 
 def image_key(number: int) -> str:
-    """Return the common prefix of the names of an image's files."""
+    """Return the image number as 9 digits, with which the names of all files of the image begin."""
     return f"{number:09d}"
 
 
 class ShardWriter:
-    """Context manager that writes a shard; the shard is renamed to its final path on a normal exit.
+    """Context manager that writes a shard, which is renamed to its final path on a normal exit.
 
-    adapter : name of the adapter that renders it, for the datasheet
+    adapter : name of the adapter that renders the shard, for its manifest
 
-    Raises DermisError if it cannot be written; nothing of it is then left on the disk.
+    Raises DermisError if the shard cannot be written; nothing of it is then left on the disk.
     """
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
@@ -68,7 +68,7 @@ class ShardWriter:
         self._written, self._left_out = 0, dict[int, str]()
 
     def __enter__(self) -> Self:
-        """Create the temporary file or folder."""
+        """Create the temporary file or folder to which the shard is written."""
         writer = TarWriter if self._spec.format == "webdataset" else FolderWriter
         try:
             self._files: TarWriter | FolderWriter = writer(self._temporary)
@@ -77,7 +77,7 @@ class ShardWriter:
         return self
 
     def add(self, number: int, entries: Mapping[str, bytes]) -> None:
-        """Write the files of an image by suffix; images must come in the order of their numbers."""
+        """Write the files of an image, given by suffix; images must come in the order of their numbers."""
         if not self._next_number <= number < self._shard.stop:
             raise ValueError(f"image {number} was added after {self._next_number - 1}, in {self._shard}")
         self._next_number, self._written = number + 1, self._written + 1
@@ -88,7 +88,7 @@ class ShardWriter:
             refuse_output(self._target, fault)
 
     def leave_out(self, number: int, reason: str) -> None:
-        """Record an image that could not be rendered."""
+        """Record in the manifest that an image could not be rendered."""
         self._left_out[number] = shorten(reason, _MAX_REASON_LENGTH)
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -148,7 +148,7 @@ def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard exists and its content matches its SHA-256; all of it is read.
+    """Return whether a shard exists and matches its SHA-256, by reading all of it.
 
     Raises DermisError for a shard of another data set.
     """
@@ -156,12 +156,12 @@ def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
         return False
     path = shard_path(out, shard, spec)
     with suppress(DermisError):
-        return _sha256(path) == read_manifest(path).sha256
+        return _shard_sha256(path) == read_manifest(path).sha256
     return False
 
 
 def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> None:
-    """Remove temporary files of interrupted runs.
+    """Remove the temporary files that interrupted runs have left in a data set.
 
     shards : shards that no other run is writing; all if None
     """
@@ -172,8 +172,8 @@ def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> Non
             remove_path(path)
 
 
-def _sha256(path: Path) -> str:
-    """Return the SHA-256 of all files of a shard before its manifest."""
+def _shard_sha256(path: Path) -> str:
+    """Return the SHA-256 of a shard without its manifest."""
     if path.is_dir():
         names = {one.name for one in path.iterdir()} - {formats.MANIFEST_NAME}
         return formats.folder_sha256(path, sorted(names))

@@ -1,4 +1,4 @@
-"""Spec of a data set: distributions of people, faces, light and cameras, with one seed."""
+"""Specification ("spec") of a data set: distributions of people, faces, lights and cameras, with one seed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ P = TypeVar("P", bound=FrozenModel)
 
 
 class Spec(FrozenModel):
-    """Specification of a data set."""
+    """Specification of a data set, read from a TOML file."""
 
     count: Annotated[int, Field(ge=1, le=MAX_IMAGES), Reason("a billion images")] = 1000
     """Number of images."""
@@ -95,8 +95,8 @@ class Spec(FrozenModel):
     _sampler: Sampler = PrivateAttr()
 
     def model_post_init(self, context: object) -> None:
-        """Check the values across tables and prepare the sampler."""
-        distributions = _distributions("", self)
+        """Check the distributions across tables and create the sampler."""
+        distributions = _table_distributions("", self)
         expressions = {**EXPRESSIONS, **self.expressions}
         with error_context("outputs"):
             check_outputs(self.outputs)
@@ -113,12 +113,12 @@ class Spec(FrozenModel):
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
-        """Return the distributions by the dotted names of their parameters."""
+        """Return the distribution of each parameter by its dotted name, such as "light.key.size_mm"."""
         return self._sampler.distributions
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return the landmark sets by name: the name of a preset set, or the path of a table."""
+        """Return each landmark set by name: the name of a preset set, or the path of a landmark table."""
         return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
@@ -137,7 +137,7 @@ class Spec(FrozenModel):
         return self._sampler.parameters(checked_integer("image", k, 0, self.count - 1))
 
     def to_toml(self) -> str:
-        """Return the canonical TOML with all values, which `parse_spec` reads as the same spec."""
+        """Return the canonical TOML with all values, which `parse_spec` converts to an equal spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(OUTSIDE_RENDER), exclude_none=True)
@@ -149,8 +149,11 @@ class Spec(FrozenModel):
         return hashlib.sha256(self.to_toml().encode()).hexdigest()
 
 
-def _distributions(name: str, value: object) -> dict[str, Distribution]:
-    """Return the distributions in a table and its subtables by dotted names."""
+def _table_distributions(name: str, value: object) -> dict[str, Distribution]:
+    """Return the distributions in a TOML table and its subtables, by dotted name.
+
+    name : name of the table
+    """
     if isinstance(value, Distribution):
         return {name: value}
     parts = plain_values(value) if isinstance(value, FrozenModel) else value
@@ -158,12 +161,12 @@ def _distributions(name: str, value: object) -> dict[str, Distribution]:
         return {}
     found: dict[str, Distribution] = {}
     for key, part in parts.items():
-        found |= _distributions(f"{name}.{key}" if name else key, part)
+        found |= _table_distributions(f"{name}.{key}" if name else key, part)
     return found
 
 
 def load_spec(path: str | Path, **values: object) -> Spec:
-    """Return the spec of a TOML file; paths in it are relative to its folder.
+    """Return the spec in a TOML file; paths in it are relative to its folder.
 
     values : `count`, `seed`, `size` or `format` that replace those of the file
 
@@ -176,9 +179,9 @@ def load_spec(path: str | Path, **values: object) -> Spec:
 
 
 def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
-    """Return the spec of parsed TOML.
+    """Return the spec for parsed TOML.
 
-    folder : folder of the files that it names
+    folder : folder to which file names in the spec are relative
 
     Raises DermisError as `load_spec` does.
     """
@@ -213,7 +216,11 @@ def _parse_render(size: object, table: object) -> Settings:
 
 
 def _build_model(kind: type[P], title: str, table: object) -> P:
-    """Return the model of a table and of its subtables; errors name the table."""
+    """Return the model of a spec table, including its subtables.
+
+    kind : pydantic class of the table
+    title : name of the table in error messages
+    """
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):
@@ -230,13 +237,16 @@ def _build_model(kind: type[P], title: str, table: object) -> P:
 
 
 def plain_values(table: FrozenModel) -> dict[str, object]:
-    """Return the fields that are not None, by name."""
+    """Return the fields of a spec table that are not None, by name."""
     values = {name: getattr(table, name) for name in type(table).model_fields}
     return {name: value for name, value in values.items() if value is not None}
 
 
 def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
-    """Return the TOML of a table and its subtables."""
+    """Return a table and its subtables as lines of TOML.
+
+    title : dotted name of the table
+    """
     own, below = dict[str, object](), list[str]()
     for name, value in values.items():
         path = f"{title}.{key_text(name)}" if title else key_text(name)
@@ -250,7 +260,9 @@ def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
 
 
 def _expand_patterns(value: object, folder: Path, key: str) -> object:
-    """Return a value of a spec in which each {files = PATTERN} is replaced by its sorted files.
+    """Return a spec value with each {files = PATTERN} in it replaced by a `FileChoice` of sorted files.
+
+    key : dotted name of the value in error messages
 
     Raises DermisError for a pattern that matches no file.
     """
@@ -279,7 +291,7 @@ def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
 
 
 def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of those names that are files, sorted by name."""
+    """Return the SHA-256 of each name that is a file in the spec's folder, sorted by name."""
     found = {}
     for name in sorted(set(names)):
         if is_file(folder / name):
@@ -289,7 +301,11 @@ def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
 
 
 def _check_hashes(expected: Mapping[str, str], actual: Mapping[str, str]) -> None:
-    """Refuse files whose content differs from that for which the spec was written."""
+    """Refuse files that have changed since the spec was written.
+
+    expected : SHA-256 by file name, as stored in the spec
+    actual : SHA-256 by file name now
+    """
     for name in sorted(expected.keys() | actual.keys()):
         if expected.get(name) != actual.get(name):
             refuse(

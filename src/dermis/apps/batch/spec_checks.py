@@ -1,4 +1,4 @@
-"""Checks of a spec across its tables, and of names and values that other models define."""
+"""Checks of a spec across its tables, and of names and values against the models that they refer to."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from dermis.apps.batch.distributions import Distribution
-from dermis.apps.batch.spec_tables import MIXTURE, NONE, CorrelationGroup, table_values
+from dermis.apps.batch.spec_tables import NO_ENVIRONMENT, RANDOM_EXPRESSION, CorrelationGroup, table_values
 from dermis.base.errors import DermisError, refuse, shorten
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM
@@ -41,8 +41,10 @@ def check_spec(
 ) -> None:
     """Refuse distributions that cannot be rendered; errors name table and key.
 
-    sampled : distributions by the dotted names of their parameters
-    folder : folder of the files that they name
+    sampled : distribution of each parameter by its dotted name
+    expressions : weights of morph targets by name of the expression
+    groups : groups of correlated parameters
+    folder : folder to which file names in the spec are relative
     """
     _check_looks(sampled)
     _check_person(sampled)
@@ -53,7 +55,7 @@ def check_spec(
 
 
 def check_landmarks(names: Sequence[str], folder: Path) -> None:
-    """Refuse names that are neither a landmark set nor a readable table."""
+    """Refuse names that are neither a preset landmark set nor a readable landmark table."""
     for name in names:
         if name in SETS:
             continue
@@ -75,7 +77,7 @@ def _check_person(sampled: Mapping[str, Distribution]) -> None:
 
 
 def _check_expression(name: Distribution, expressions: Mapping[str, Weights]) -> None:
-    known = [*expressions, MIXTURE]
+    known = [*expressions, RANDOM_EXPRESSION]
     for value in name.support:
         if value not in known:
             advice = f"Add [expressions.{value}], or correct it"
@@ -101,15 +103,19 @@ def _check_correlations(groups: Sequence[CorrelationGroup], sampled: Mapping[str
 def _check_light(sampled: Mapping[str, Distribution]) -> None:
     lamps = NO_LIGHTS not in sampled["light.kind"].support and 0.0 not in sampled["light.strength"].support
     name, strength = sampled["environment.name"].support, sampled["environment.strength"].support
-    if not lamps and (NONE in name or 0.0 in strength):
+    if not lamps and (NO_ENVIRONMENT in name or 0.0 in strength):
         actual = "an image can have neither lamps nor an environment"
         refuse("light", "light in each image", actual, 'Exclude "none" and 0 from lights or environment')
 
 
 def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
-    """Refuse heads and environments that are neither in the package nor files."""
+    """Refuse heads and environments that are neither part of the package nor files in the folder."""
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
-    maps = [NONE, UNIFORM, *(name for name, sample in SAMPLES.items() if sample.kind == "environment")]
+    maps = [
+        NO_ENVIRONMENT,
+        UNIFORM,
+        *(name for name, sample in SAMPLES.items() if sample.kind == "environment"),
+    ]
     for parameter, known in ((HEAD_NAME, heads), ("environment.name", maps)):
         for name in map(str, sampled[parameter].support if parameter in sampled else ()):
             is_person = parameter == HEAD_NAME and name.startswith(f"{HUMAN}:")
@@ -119,7 +125,7 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
 
 
 def _check_looks(sampled: Mapping[str, Distribution]) -> None:
-    """Refuse names and values that people, skins and poses do not support."""
+    """Refuse parameters of people, skins and morph targets with unknown names or invalid values."""
     for part, kind in _LOOKS.items():
         known = [one.name for one in fields(kind) if one.name != _SEED]
         _check_table(f"person.{part}", sampled, known, kind)
@@ -138,7 +144,11 @@ def _check_table(
     known: Sequence[str],
     make: Callable[..., object],
 ) -> None:
-    """Refuse unknown names of a table, and distributions whose limits `make` refuses."""
+    """Refuse unknown keys of a spec table, and distributions whose limits a model rejects.
+
+    known : allowed keys of the table
+    make : class of the model, called with the limits of a distribution
+    """
     for name, distribution in table_values(sampled, table).items():
         if name not in known:
             listed = ", ".join(known) if len(known) < 40 else "those of dermis head --list-targets"

@@ -1,4 +1,4 @@
-"""Tables of a spec: their fields with bounds, and correlations between parameters."""
+"""Tables of a spec: their keys with bounds, and correlations between parameters."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from dermis.human.makehuman import OLD, YOUNG
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.lights import light_presets
 
-RIG = "rig"
-MIXTURE = "mixture"
-NONE = "none"
-CAMERA, ANGLES = "camera", "angles"
+LAMP_RIG = "rig"
+RANDOM_EXPRESSION = "mixture"
+NO_ENVIRONMENT = "none"
+GAZE_CAMERA, GAZE_ANGLES = "camera", "angles"
 BACKGROUNDS = "none", "gradient", "environment", "colour"
 _SUPPORT_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
 
 
 class DistributionField:
-    """Annotation by which pydantic parses a field as a distribution."""
+    """Annotation with which pydantic parses a field of a spec table as a distribution."""
 
     def check(self, value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
@@ -38,12 +38,12 @@ class DistributionField:
         return distribution
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError for values that the field does not allow."""
+        """Raise ValueError if the distribution can give samples that the field does not allow."""
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        """Return the schema that parses and serialises a distribution."""
+        """Return the pydantic schema that parses and serialises a distribution."""
         serialise = core_schema.plain_serializer_function_ser_schema(
             lambda value: value and value.spec_value()
         )
@@ -51,16 +51,17 @@ class DistributionField:
 
 
 class NumberField(DistributionField):
-    """Field of numbers between two bounds.
+    """Annotation of a field whose samples are numbers between two bounds.
 
-    reason : reason of the bounds, shown in messages
+    low, high : bounds of the samples
+    reason : unit or reason of the bounds, shown in messages
     """
 
     def __init__(self, low: float, high: float, reason: str = "") -> None:
         self.ge, self.le, self.reason = low, high, reason
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError for texts and for numbers out of bounds."""
+        """Raise ValueError if the distribution can give texts or numbers out of bounds."""
         if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
             reason = f" ({self.reason})" if self.reason else ""
             note = "" if isinstance(distribution, Constant) else _SUPPORT_NOTE
@@ -68,13 +69,13 @@ class NumberField(DistributionField):
 
 
 class NameField(DistributionField):
-    """Field of names from a list; without a list, any name or file."""
+    """Annotation of a field whose samples are names from a list, or any names or files without a list."""
 
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError for numbers and for unknown names."""
+        """Raise ValueError if the distribution can give numbers or unknown names."""
         names = list(self.known()) if self.known else []
         for value in distribution.support:
             if not isinstance(value, str) or (names and value not in names):
@@ -90,7 +91,8 @@ _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 class CorrelationGroup(FrozenModel):
     """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
 
-    A larger normal number gives a larger value, or a later value of a choice.
+    Parameters are sampled at the probabilities of correlated normal numbers; a larger normal number gives a
+    larger sample, or a later alternative of a choice.
     """
 
     of: tuple[str, ...]
@@ -114,14 +116,18 @@ class CorrelationGroup(FrozenModel):
 
     @property
     def matrix(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-        """Return the correlation matrix (n, n)."""
+        """Return the correlation matrix (n, n) of the parameters."""
         if isinstance(self.correlation, tuple):
             return np.array(self.correlation, np.float64)
         count = len(self.of)
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
-        """Return the rows of the Cholesky factor: for each name, weights of independent normal numbers."""
+        """Return the rows of the Cholesky factor of the correlation matrix by parameter.
+
+        A row has the weights with which independent normal numbers, by name, are summed to the correlated
+        one.
+        """
         lower = np.linalg.cholesky(self.matrix)
         return {
             name: {other: float(lower[k, j]) for j, other in enumerate(self.of[: k + 1])}
@@ -133,7 +139,10 @@ T = TypeVar("T")
 
 
 def table_values(values: Mapping[str, T], table: str) -> dict[str, T]:
-    """Return the values of a table from values by dotted name, by their names within the table."""
+    """Return the entries of a spec table by key, from entries by dotted name.
+
+    table : dotted name of the table, such as "light.key"
+    """
     start = f"{table}."
     return {name.removeprefix(start): one for name, one in values.items() if name.startswith(start)}
 
@@ -150,7 +159,7 @@ _Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(FrozenModel):
-    """People: sampled by a seed, or heads by name; the seed determines all omitted keys."""
+    """Spec table of people: random ones, or heads by name; random seeds determine all omitted keys."""
 
     head: Annotated[Distribution | None, NameField()] = None
     """Heads in place of sampled people: names as in `dermis render`, or files of people (.json), meshes
@@ -184,7 +193,7 @@ class PersonTable(FrozenModel):
 
 
 class ExpressionTable(FrozenModel):
-    """Facial expression: a named one, or random movements."""
+    """Spec table of the facial expression: a named one, or random movements."""
 
     name: Annotated[Distribution, NameField()] = Constant("neutral")
     """Name of an expression of the package or of [expressions.NAME], or "mixture": at most one random
@@ -198,7 +207,7 @@ class ExpressionTable(FrozenModel):
 
 
 class HeadRotationTable(FrozenModel):
-    """Rotation of the head by the neck."""
+    """Spec table of the head's rotation by the neck."""
 
     yaw_deg: Annotated[Distribution, NumberField(-60, 60, "degrees: range of the neck")] = Constant(0.0)
     """Rotation to the head's left [degrees]."""
@@ -209,9 +218,9 @@ class HeadRotationTable(FrozenModel):
 
 
 class GazeTable(FrozenModel):
-    """Gaze direction of the eyes."""
+    """Spec table of the gaze direction of the eyes."""
 
-    at: Annotated[Distribution, NameField(lambda: (CAMERA, ANGLES))] = Constant(CAMERA)
+    at: Annotated[Distribution, NameField(lambda: (GAZE_CAMERA, GAZE_ANGLES))] = Constant(GAZE_CAMERA)
     """Gaze target: the camera, or the direction given by the two angles."""
     yaw_deg: Annotated[Distribution, NumberField(-36, 36, "degrees: range of the eyes")] = Constant(0.0)
     """Angle to the head's left, relative to the direction of the face [degrees]."""
@@ -220,7 +229,7 @@ class GazeTable(FrozenModel):
 
 
 class CameraTable(FrozenModel):
-    """Camera position; the complete face is always in the picture."""
+    """Spec table of the camera; the complete face is always in the picture."""
 
     distance_mm: Annotated[Distribution, _DISTANCE] = Constant(1100.0)
     """Distance to the centre of the face [mm]."""
@@ -241,7 +250,7 @@ class CameraTable(FrozenModel):
 
 
 class LampTable(FrozenModel):
-    """Lamp of the rig: a uniform square light that faces the head."""
+    """Spec table of a lamp of the rig: a uniform square area light that faces the head."""
 
     yaw_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
     """Angle around the head, from its front to its left [degrees]."""
@@ -258,9 +267,9 @@ class LampTable(FrozenModel):
 
 
 class LightTable(FrozenModel):
-    """Lamps: a preset rig, or key, fill and rim lamps."""
+    """Spec table of the lamps: a preset rig, or sampled key, fill and rim lamps."""
 
-    kind: Annotated[Distribution, NameField(lambda: [RIG, *light_presets()])] = Constant("studio")
+    kind: Annotated[Distribution, NameField(lambda: [LAMP_RIG, *light_presets()])] = Constant("studio")
     """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""
     turn_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
     """Rotation of all lamps about the upward axis, to the head's left [degrees]."""
@@ -275,9 +284,9 @@ class LightTable(FrozenModel):
 
 
 class EnvironmentTable(FrozenModel):
-    """Environment light."""
+    """Spec table of the environment light."""
 
-    name: Annotated[Distribution, NameField()] = Constant(NONE)
+    name: Annotated[Distribution, NameField()] = Constant(NO_ENVIRONMENT)
     """Environment: "none", "uniform", a sample (royal_esplanade, lebombo; downloaded once), or files (.hdr,
     .exr)."""
     turn_deg: Annotated[Distribution, _ANY_ANGLE] = Uniform(-180, 180)
@@ -287,7 +296,7 @@ class EnvironmentTable(FrozenModel):
 
 
 class BackgroundTable(FrozenModel):
-    """Background of the picture, which emits no light."""
+    """Spec table of the picture's background, which emits no light."""
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUNDS)] = Constant("gradient")
     """"none" for alpha, "gradient", "colour", or "environment", which is a gradient in images without one."""

@@ -33,7 +33,7 @@ _CACHE_FRAMES = 16  # occlusion stays cached for this many images without an env
 
 
 class Failure(NamedTuple):
-    """Image that was left out, with the reason."""
+    """Image that could not be rendered, with the reason."""
 
     number: int
     reason: str
@@ -43,9 +43,10 @@ class Failure(NamedTuple):
 class RunOptions:
     """Options of a run, shared by all of its workers.
 
+    spec : spec of the data set
     out : folder of the data set
-    encoders : encoder processes per worker; with 0, the worker encodes
-    keep_going : leave out images that cannot be rendered, and record them
+    encoders : number of encoder processes per worker; with 0, the worker encodes itself
+    keep_going : whether images that cannot be rendered are omitted and recorded, instead of ending the run
     """
 
     spec: Spec
@@ -56,10 +57,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class WorkerSlot:
-    """Adapter and thread count of one worker.
+    """Adapter and thread count with which one worker renders.
 
-    adapter : as for `Renderer`
-    threads : threads of a software adapter; 0 keeps its default
+    adapter : name or number of the adapter, as for `Renderer`
+    threads : threads of a software adapter; 0 for its default
     """
 
     adapter: str
@@ -68,11 +69,11 @@ class WorkerSlot:
 
 @dataclass(frozen=True)
 class WorkerEvent:
-    """Progress event sent by a worker; one of its fields is set.
+    """Progress event sent by a worker; only one of the fields is set, and `failed` comes with `shard`.
 
     images : number of images rendered since the last event
     shard : shard that was completed
-    failed : images that were left out of that shard
+    failed : images of that shard that could not be rendered
     note : warning for the user
     retry : reason for which the worker exits and another one must render its shard
     refusal : reason for which the run ends
@@ -87,7 +88,10 @@ class WorkerEvent:
 
 
 class _PlannedImage(NamedTuple):
-    """Image to render; its motion is computed relative to the scene `previous`."""
+    """Image to render, with the scene of the preceding image of the same person, if there is one.
+
+    previous : scene relative to which motion vectors are computed; None if there is none
+    """
 
     number: int
     parameters: Parameters
@@ -97,9 +101,9 @@ class _PlannedImage(NamedTuple):
 
 
 class Worker:
-    """Renderer of shards on one device; the result of an image depends on its number only.
+    """Renderer of shards on one device; each image depends on the spec and its number only.
 
-    adapter : as for `Renderer`
+    adapter : name or number of the adapter, as for `Renderer`
     """
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
@@ -110,9 +114,9 @@ class Worker:
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
 
     def render_shard(self, shard: Shard, on_image: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
-        """Write a shard unless it is intact, and return the images that were left out.
+        """Render and write a shard unless it is intact, and return the images that failed.
 
-        No image is left out without `keep_going`.
+        Without the option `keep_going`, a failed image raises DermisError.
 
         on_image : function called after each image
 
@@ -125,7 +129,7 @@ class Worker:
         failed: list[Failure] = []
         adapter = self._renderer.device.adapter.name
         with ShardWriter(options.out, shard, options.spec, adapter) as writer:
-            for number, files in self._encoders.encode_all(self._jobs(shard, failed)):
+            for number, files in self._encoders.encode_all(self._encoder_jobs(shard, failed)):
                 writer.add(number, files)
                 on_image()
             for failure in sorted(failed):
@@ -136,13 +140,18 @@ class Worker:
         """Kill the encoder processes."""
         self._encoders.close()
 
-    def _jobs(self, shard: Shard, failed: list[Failure]) -> Iterator[tuple[int, Observation, Parameters]]:
-        """Yield number, observation and parameters of each image that can be rendered, in order."""
+    def _encoder_jobs(
+        self, shard: Shard, failed: list[Failure]
+    ) -> Iterator[tuple[int, Observation, Parameters]]:
+        """Yield number, observation and parameters of each image that can be rendered, in order.
+
+        failed : list to which images that cannot be rendered are appended
+        """
         groups = deque([deque(range(shard.first, shard.stop))])
         while groups:
             numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
-                for observation in self._observations(self._plans(numbers, in_flight, failed)):
+                for observation in self._render_images(self._plan_images(numbers, in_flight, failed)):
                     done = in_flight.popleft()
                     yield done.number, observation, done.parameters
             except DeviceError:
@@ -157,10 +166,14 @@ class Worker:
                     single = [deque([plan.number]) for plan in in_flight]
                 groups.extendleft(reversed([*single, numbers]))
 
-    def _plans(
+    def _plan_images(
         self, numbers: deque[int], in_flight: deque[_PlannedImage], failed: list[Failure]
     ) -> Iterator[_PlannedImage]:
-        """Yield the next image to render for each number, and append it to `in_flight`."""
+        """Yield the next image that can be rendered, and append it to `in_flight`.
+
+        numbers : numbers of the images still to plan, which are removed
+        failed : list to which images that cannot be rendered are appended
+        """
         while numbers:
             number = numbers.popleft()
             parameters = self._options.spec.parameters(number)
@@ -175,8 +188,11 @@ class Worker:
             in_flight.append(plan)
             yield plan
 
-    def _observations(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
-        """Yield the observation of each planned image, with an alpha channel if it has no background."""
+    def _render_images(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
+        """Render the planned images and yield their pictures with outputs.
+
+        Images without a background get an alpha channel.
+        """
         spec = self._options.spec
         for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
             each = itertools.tee(group, 3)
@@ -190,7 +206,7 @@ class Worker:
             )
 
     def _previous_scene(self, number: int) -> Scene | None:
-        """Return the scene of the preceding image of the same person, the reference of motion vectors."""
+        """Return the scene of the image before, if it shows the same person, for motion vectors; or None."""
         spec = self._options.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None
@@ -201,7 +217,7 @@ class Worker:
 
 
 def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
-    """Render the shards received from a pipe and send events back, in a worker process."""
+    """Render the shards that arrive through a pipe and send events back; this runs in a worker process."""
     if slot.threads:
         os.environ["LP_NUM_THREADS"] = str(slot.threads)  # read when the driver is loaded
     with warnings.catch_warnings():
@@ -219,7 +235,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
 
 
 def _forward_notes(forward: Callable[[str], None]) -> None:
-    """Pass the package's warnings to a function; other warnings are shown as usual."""
+    """Redirect the package's warnings to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:

@@ -24,11 +24,12 @@ _MAX_ENCODERS = 8  # per worker: more would wait for the renderer
 class SlotRequest:
     """Requested number and adapters of the workers; None selects a default for this machine.
 
-    adapter : "auto", "cpu", part of a name (all adapters of the same kind are used), or a number as in "#1"
+    adapter : "auto", "cpu", a number such as "#1", or a part of a name, which selects all adapters of the
+        same kind
     numbers : numbers of the adapters, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
-    encoders : encoder processes per worker
+    encoders : number of encoder processes per worker
     """
 
     adapter: str = "auto"
@@ -38,7 +39,7 @@ class SlotRequest:
     encoders: int | None = None
 
     def adapters(self) -> list[Adapter]:
-        """Return the requested adapters.
+        """Return the adapters that match the request.
 
         Raises DermisError if one of them does not exist.
         """
@@ -47,7 +48,7 @@ class SlotRequest:
         return [similar_adapters(f"#{number}")[0] for number in self.numbers]
 
     def slots(self) -> tuple[list[WorkerSlot], int]:
-        """Return one slot per worker, alternating between the adapters, and the encoder processes per worker.
+        """Return one slot per worker, with adapters in turn, and the number of encoder processes per worker.
 
         A software adapter shares the processor cores with Python and the encoders: by default it has one
         worker per two cores, with as many threads, and the worker encodes its images itself.
@@ -76,7 +77,7 @@ class ProcessPool:
     slots: Sequence[WorkerSlot]
 
     def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render the shards and yield events as they happen.
+        """Render the shards on all slots and yield events as they happen.
 
         Raises DermisError for errors that another attempt cannot solve, after all workers have been stopped.
         """
@@ -95,7 +96,7 @@ class ProcessPool:
 
 @dataclass
 class _WorkerProcess:
-    """Worker process with its slot and the shard that it renders."""
+    """Worker process with its slot and the shard that it is rendering."""
 
     slot: WorkerSlot
     child: ChildProcess
@@ -103,14 +104,14 @@ class _WorkerProcess:
 
 
 class _PoolState:
-    """State of a run: its worker processes and the queue of shards."""
+    """State of a run on this machine: its worker processes, and the queue of shards still to render."""
 
     def __init__(self, options: RunOptions, shards: Sequence[Shard]) -> None:
         self._options, self._queue, self._attempts = options, deque(shards), Counter[int]()
         self.workers: list[_WorkerProcess] = []
 
     def start_worker(self, slot: WorkerSlot) -> None:
-        """Start a worker if a shard is left in the queue."""
+        """Start a worker on a slot if the queue still has a shard."""
         if self._queue:
             child = start_process(run_worker, slot, self._options)
             worker = _WorkerProcess(slot, child, self._queue.popleft())
