@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import DermisError
 from dermis.formats.load import is_eye_name
 from dermis.mesh.fitted_eyes.balls import Sphere, corneal_axis, fit_sphere
-from dermis.mesh.fitted_eyes.lids import lids_before
+from dermis.mesh.fitted_eyes.lids import lids_in_front
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix
@@ -213,16 +213,16 @@ def test_an_iris_lies_between_the_lids() -> None:
     sphere = Sphere(np.zeros(3), 12.0, 0.0)
     canthi = [np.array([[x, -40, 13.0], [s * 40, -40, 13.0], [x, 40, 13.0]]) for s, x in ((1, 8), (-1, -8))]
     walls = np.concatenate([lid(2.0, 40.0, 13.0), lid(-40.0, -6.0, 13.0)])
-    low = lids_before(np.concatenate([walls, np.array(canthi)]), sphere, AHEAD)
+    low = lids_in_front(np.concatenate([walls, np.array(canthi)]), sphere, AHEAD)
     across, up = low.iris
     assert abs(np.degrees(across)) < 1 and np.degrees(up) == pytest.approx(-7, abs=1.5)
-    assert lids_before(walls[:2], sphere, AHEAD).iris == (0.0, 0.0)
+    assert lids_in_front(walls[:2], sphere, AHEAD).iris == (0.0, 0.0)
 
 
 def test_corneas_stay_behind_lids() -> None:
     sphere, near = Sphere(np.zeros(3), 16.0, 0.0), lid(3.0, 40.0, 16.1)
-    assert lids_before(lid(3.0, 40.0, 18.5), sphere, AHEAD).sunk_mm(AHEAD, 1.0) == 0.0
-    assert 0.2 < lids_before(near, sphere, AHEAD).sunk_mm(AHEAD, 1.0) < 1.2
+    assert lids_in_front(lid(3.0, 40.0, 18.5), sphere, AHEAD).cornea_recess_mm(AHEAD, 1.0) == 0.0
+    assert 0.2 < lids_in_front(near, sphere, AHEAD).cornea_recess_mm(AHEAD, 1.0) < 1.2
 
 
 def test_looks_can_be_told(tmp_path: Path) -> None:

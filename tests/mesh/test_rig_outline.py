@@ -22,7 +22,7 @@ def _pose(rig: Rig, rng: np.random.Generator) -> Motion:
         return rig.rest._replace(weights=weights)
     bones = [k for k in range(4) if rng.random() < 0.6]
     turns = [rig.skeleton.bone_rotation(bone, rng.uniform(-45, 45, 3).tolist()) for bone in bones]
-    matrices = rig.skeleton.moved_matrices(bones, np.array(turns).reshape(-1, 4, 4))
+    matrices = rig.skeleton.pose_matrices(bones, np.array(turns).reshape(-1, 4, 4))
     return Motion(weights, matrices, rig.positions_mm)
 
 

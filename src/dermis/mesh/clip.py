@@ -1,4 +1,4 @@
-"""Motion of a head over time."""
+"""Clips: poses of a head as a function of time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ROUNDING = 1e-6  # fraction of a frame by which rounding may put the last frame
 
 
 def check_rate(culprit: object, rate: object) -> float:
-    """Return a frame rate [1/s]; raise DermisError if it is not one."""
+    """Return a frame rate [1/s] after checking that it is a positive number; raise DermisError if not."""
     return checked_number(culprit, rate, _MIN_RATE, _MAX_RATE, "frames a second")
 
 
@@ -104,13 +104,13 @@ class Clip(ShortRepr):
         return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING) + 1
 
     def __post_init__(self) -> None:
-        """Check the duration."""
+        """Refuse an invalid duration."""
         unit = "s: no motion is longer than a day"
         checked_number(f"{self.name}: duration", self.duration_s, 0.0, MAX_DURATION_S, unit)
 
     @property
     def note(self) -> str:
-        """Return a sentence about the names that are left out, empty if all are used."""
+        """Return a sentence about names of the file that the head lacks; empty if it has all of them."""
         if not self.left_out:
             return ""
         names = ", ".join(self.left_out[:_MAX_NAMES])

@@ -1,4 +1,4 @@
-"""Appearance of the eyes."""
+"""Appearance of the eyes: iris colour, pupil, redness."""
 
 from __future__ import annotations
 

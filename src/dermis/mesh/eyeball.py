@@ -1,6 +1,7 @@
-"""The standard eyeball: its shape, mesh and uv, and lids that slide over it.
+"""The standard eyeball: its shape, mesh and uv, and contact with the lids.
 
-Lengths are in mm of an adult eye, with the origin at the centre of the ball.
+The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are those of
+an adult eye [mm], and the origin is the centre of the ball.
 """
 
 from __future__ import annotations
@@ -27,27 +28,33 @@ UV_FALLOFF = 0.9
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
-    """Return the distance of the plane of the limbus from the centre of a ball of this radius [mm]."""
+    """Return the distance from a sphere's centre to the plane of the limbus, a circle on the sphere [mm].
+
+    radius_mm : radius of the sphere, such as the ball or the cornea
+    """
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
 
 def cornea_centre_mm() -> float:
-    """Return the position of the centre of the cornea's front on the axis [mm]."""
+    """Return the distance from the ball's centre to the centre of the corneal sphere, along the axis [mm]."""
     return limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(CORNEA_MM)
 
 
 def apex_mm() -> float:
-    """Return the position of the cornea's apex on the axis [mm]."""
+    """Return the distance from the ball's centre to the apex of the cornea, along the axis [mm]."""
     return cornea_centre_mm() + CORNEA_MM
 
 
 def iris_mm() -> float:
-    """Return the position of the plane of the iris on the axis [mm]."""
+    """Return the distance from the ball's centre to the plane of the iris, along the axis [mm]."""
     return apex_mm() - IRIS_BEHIND_MM
 
 
 def profile_mm(angle: Doubles) -> Doubles:
-    """Return the distance of the surface from the ball's centre at an angle from the axis [rad] [mm]."""
+    """Return the distance from the ball's centre to the surface of ball and cornea [mm].
+
+    angle : between the direction and the eye's axis [rad]
+    """
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
     edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
@@ -55,8 +62,9 @@ def profile_mm(angle: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the distances of points (..., 3) from the centre, and of the surface in their directions [mm].
+    """Return distances (...) of points from the ball's centre, and of the surface in these directions [mm].
 
+    points : (..., 3) relative to the ball's centre [mm]
     axis : (..., 3) unit vectors of the eyes' axes
     """
     distance = np.linalg.norm(points, axis=-1)
@@ -66,13 +74,13 @@ def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Double
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LidContact(ShortRepr):
-    """Control points of the lids that stay outside the eyeballs, cornea included, in any pose.
+    """Collision of eyelids with eyeballs: control points of the lids are kept outside in any pose.
 
-    point : (n,) control points of lids
-    ball : (n,) eyeball over which each of them slides
-    min_clearance_mm : (n,) smallest distance from its surface, in mm of an adult eye
-    apex, back : (k,) control points of each eyeball: apex of the cornea and the point opposite to it
-    edge : (k, r) control points along the edges of the lids, once around each opening
+    point : (n,) control points of the lids
+    ball : (n,) index of the eyeball over which each of them slides
+    min_clearance_mm : (n,) smallest distance from the eyeball's surface, for an eye of adult size [mm]
+    apex, back : (k,) control points of each eyeball: apex of the cornea, and the opposite point of the ball
+    edge : (k, r) control points along the lid edges, once around each opening
     """
 
     point: Ints
@@ -83,7 +91,10 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """Return the control points (p, 3) of a posed head, with lids pushed out of the eyes [mm]."""
+        """Return control points (p, 3) with those of the lids moved out of the eyeballs [mm].
+
+        points_mm : (p, 3) control points of a posed head
+        """
         apex, back = points_mm[self.apex], points_mm[self.back]
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
         scale, axis = length / (apex_mm() + SCLERA_MM), (apex - back) / length
@@ -100,8 +111,8 @@ class LidContact(ShortRepr):
 def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]:
     """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
-    side : quads along each edge of the cube that becomes the ball
-    scale : factor of the points, for control points outside the smooth surface that they produce
+    side : number of quads along each edge of the cube that is projected to the ball
+    scale : factor of the points; above 1 for control points, as their subdivision surface shrinks
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # even in angle
@@ -123,7 +134,10 @@ def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]
 
 @cache
 def eyeball_uv(side: int = SIDE) -> Doubles:
-    """Return the uv (n, 2) of an eyeball's points: a polar map about its axis, with the back at the rim."""
+    """Return the uv (n, 2) of an eyeball's points: polar coordinates about its axis, the back at the rim.
+
+    side : number of quads along a cube edge, see `build_eyeball`
+    """
     x, y, z = _directions(side).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
     radius = UV_RIM * angle / np.pi
@@ -131,7 +145,10 @@ def eyeball_uv(side: int = SIDE) -> Doubles:
 
 
 def axis_points(side: int = SIDE) -> tuple[int, int, int]:
-    """Return the indices of the cornea's apex, the point opposite, and the point on the equator at +X."""
+    """Return three point indices: the cornea's apex, the back of the ball, and its equator towards +X.
+
+    side : number of quads along a cube edge, see `build_eyeball`
+    """
     directions, axes = _directions(side), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
     apex, back, right = (int(np.argmax(directions @ np.array(axis))) for axis in axes)
     return apex, back, right
@@ -144,10 +161,10 @@ def _directions(side: int) -> Doubles:
 
 @dataclass(frozen=True, eq=False)
 class EyeTextures:
-    """Textures of an eyeball as seen along its axis, in the layout of `eye_uv`, with row 0 at v = 0.
+    """Textures of an eyeball as seen along its axis, in the uv layout of `eye_uv`, with row 0 at v = 0.
 
     colour : (n, n, 3) linear [-]
-    normal : (n, n, 3) unit normals of the surface below the tear film, in the axes of the layout, green up
+    normal : (n, n, 3) unit normals of the surface below the tear film, x along u, y against v (green up)
     """
 
     colour: Floats
@@ -155,7 +172,10 @@ class EyeTextures:
 
 
 def eye_uv(points: Doubles) -> Floats:
-    """Return the texture uv (n, 2) of points (n, 3) around an eyeball's centre, with z along its axis."""
+    """Return the uv (n, 2) of surface points in the layout of `EyeTextures`.
+
+    points : (n, 3) relative to the eyeball's centre, with z along its axis
+    """
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])
     radius = UV_RIM * np.expm1(-angle / UV_FALLOFF) / np.expm1(-np.pi / UV_FALLOFF)

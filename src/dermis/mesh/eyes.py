@@ -1,4 +1,4 @@
-"""Eyeballs of realistic shape in a head, given by control points."""
+"""Eyeballs of a head: their control points, shapes and appearance."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from dermis.mesh.rig import Motion, Rig
 
 @dataclass(frozen=True, repr=False)
 class Eyes(ShortRepr):
-    """The eyeballs of a head: balls with a cornea, see mesh/eyeball.py.
+    """The k eyeballs of a head: spheres with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each eyeball: apex of the cornea, the point opposite to it, and
         the point of the equator towards +X when the head looks along +Z
     material : (k,) index of the material
     look : appearance of both eyes
-    radius_mm : (k,) radius of the ball, relative to an eye with a cornea of adult size
-    centre_offset_mm : (k,) position of the ball's centre on the axis, 0 for a ball of adult size
-    gaze : (k, 3) direction of gaze in the eye's own coordinates: the axis, or another one that the lids
-        suggest
+    radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
+    centre_offset_mm : (k,) position of the ball's centre on the axis, relative to that of an adult eye [mm]
+    gaze : (k, 3) unit direction of gaze in eye coordinates: the axis, or a direction inferred from the lids
     """
 
     apex: Ints
@@ -37,10 +36,10 @@ class Eyes(ShortRepr):
     gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
-        """Return the matrices (k, 4, 4) from the head's coordinates [mm] to those of each eye.
+        """Return the matrices (k, 4, 4) from head coordinates [mm] to the coordinates of each eye.
 
-        An eye's coordinates are in mm of an eye with a cornea of adult size, with z along its axis. The
-        cornea is at the same position in all of them, whatever the size of the ball.
+        Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along its axis. In them
+        the cornea has the same position for every size of the ball.
         """
         count = len(self.apex)
         points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), motion)
@@ -59,5 +58,5 @@ class Eyes(ShortRepr):
         return frames
 
     def with_look(self, look: EyeLook) -> Eyes:
-        """Return the eyes with another appearance."""
+        """Return these eyes with another appearance."""
         return replace(self, look=look)

@@ -1,4 +1,4 @@
-"""Geometry of triangles as plain arrays: welding, edges, areas, normals and tangents."""
+"""Geometry of triangle meshes in plain arrays: welding, edges, areas, normals and tangents."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(rows: ArrayLike) -> Ints:
-    """Return the index of the unique row for each row; rows are equal if all their float32 numbers are.
+    """Return for each row (v, k) the index of its unique row, (v,); rows are compared in float32.
 
-    rows : (v, k) positions [mm], or positions and uv side by side
+    rows : positions [mm], or positions and uv side by side
     """
     table = np.asarray(rows, dtype=np.float32)
     order = np.lexsort(table.T)
@@ -30,22 +30,24 @@ def weld(rows: ArrayLike) -> Ints:
 
 
 def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Return the vertices (n,) that triangles (f, 3) use, and the triangles as indices into them."""
+    """Return the indices (n,) of vertices that triangles use, and the triangles (f, 3) with new indices."""
     used = np.zeros(int(triangles.max()) + 1, bool)
     used[triangles] = True
     return np.flatnonzero(used).astype(np.int64), (np.cumsum(used) - 1)[triangles]
 
 
 def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2), the edge of each side (3f,) and the number of sides on each edge (e,).
+    """Return the unique edges (e, 2) of triangles, the edge of each side (3f,) and the sides per edge (e,).
 
-    triangles : (f, 3) point indices; sides are ordered as all 0-1, then all 1-2, then all 2-0
+    triangles : (f, 3) point indices
+
+    Sides are ordered as all 0-1, then all 1-2, then all 2-0.
     """
     return unique_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
 
 
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2), the edge of each side (n,) and the number of sides on each edge (e,).
+    """Return the unique edges (e, 2), the edge of each side (n,) and the number of sides per edge (e,).
 
     sides : (n, 2) point indices, in either order
     """
@@ -58,14 +60,14 @@ def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 
 
 def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
-    """Return unit normals (v, 3): face normals weighted by the angle at the corner, summed over points.
+    """Return unit normals (v, 3): face normals weighted by the corner angle and summed at each point.
 
-    There is no crease at a uv seam. The normal is +Z at points whose faces cancel or have no area. Weights by
-    angle, unlike those by area, do not depend on how the surface is triangulated.
+    Vertices of one point share a normal, so that there is no crease at a uv seam. The normal is +Z where the
+    sum is 0. Weights by angle, unlike those by area, do not depend on how the surface is triangulated.
 
     positions : (v, 3) [mm]
-    point : (v,) unique point of each vertex
-    triangles : (f, 3)
+    point : (v,) index of the point of each vertex
+    triangles : (f, 3) vertex indices
     """
     columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
     a, b, c = (columns.take(one, axis=1) for one in corner)  # (3, f) each
@@ -84,15 +86,15 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
 
 def sum_by_index(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
-    """Return the sums (count, k) of those rows of `values` (n, k) that have the same `index` (n,)."""
+    """Sum the rows of `values` (n, k) by `index` (n,): row i of the result (count, k) is for index i."""
     columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
     return np.column_stack(columns)
 
 
 def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
-    """Return the area of each triangle (f,) [mm2].
+    """Return the area of each triangle (f,) [mm²].
 
-    corners : (f, 3, 3) [mm]
+    corners : (f, 3, 3) corner positions [mm]
     """
     p = np.asarray(corners, dtype=np.float64)
     cross = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -100,35 +102,35 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
 
 
 def cross_2d(a: Doubles, b: Doubles) -> Doubles:
-    """Return the z component of the cross product of (..., 2) vectors."""
+    """Return the cross products a × b (...) of 2D vectors (..., 2), which are scalars."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def uv_cross(corners: NDArray[np.floating]) -> Doubles:
-    """Return twice the signed uv area of each triangle (f,).
+    """Return twice the signed area of each triangle in uv space, (f,).
 
-    corners : (f, 3, 2)
+    corners : (f, 3, 2) uv of the corners
     """
     p = np.asarray(corners, dtype=np.float64)
     return cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
-    """Return vectors (n, 3) normalised to unit length, or `fallback` (n, 3) where they have no length."""
+    """Normalise vectors (n, 3); those of length 0 are replaced by `fallback` (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
     return np.where(usable, vectors / np.where(usable, length, 1), fallback)
 
 
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
-    """Return the derivatives of the position by u and by v, each (v, 3) [mm per unit of uv].
+    """Return the derivatives of the position by u and by v at each vertex, (v, 3) each [mm per unit of uv].
 
-    They are area-weighted means over the triangles of each vertex that have uv area; a vertex without any
-    gets two orthogonal directions of 1 mm, so that nothing divides by 0.
+    They are means over the triangles of a vertex, weighted by area, without triangles that have no uv area. A
+    vertex without any other gets two orthogonal vectors of length 1, so that nothing divides by 0.
 
-    positions, normals : (v, 3) [mm], unit vectors
+    positions, normals : (v, 3) [mm], and unit vectors
     uv : (v, 2)
-    triangles : (f, 3)
+    triangles : (f, 3) vertex indices
     """
     p, q = positions[triangles].astype(np.float64), uv[triangles].astype(np.float64)
     cross, weight = uv_cross(q), triangle_areas(p)
@@ -145,7 +147,10 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
 
 
 def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
-    """Return both derivatives; where one has no length, two directions of 1 mm orthogonal to the normal."""
+    """Return tangents without zero vectors, (v, 3) each.
+
+    Where `dpdu` or `dpdv` is 0, both are replaced by orthogonal vectors of length 1 in the tangent plane.
+    """
     # the axis that is least parallel to the normal
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
     across = unit(np.cross(axis, normals), axis)
@@ -156,21 +161,18 @@ def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[F
 
 
 def split_quads(quads: NDArray[np.integer]) -> Index:
-    """Return the triangles (a, b, c) and (c, d, a) of each quad (2q, 3), one pair after the other.
-
-    quads : (q, 4)
-    """
+    """Split quads (q, 4) with corners a, b, c, d into triangles (a, b, c) and (c, d, a), (2q, 3)."""
     return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
 
 
 def dot_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
-    """Return the dot products (..., n) of column vectors (..., 3, n)."""
+    """Return the dot products (..., n) of vectors stored as columns (..., 3, n)."""
     x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
     return np.asarray(x + y + z)
 
 
 def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
-    """Return the cross products (..., 3, n) of column vectors (3, n) and (..., 3, n)."""
+    """Return the cross products (..., 3, n) of vectors stored as columns: a (3, n) and b (..., 3, n)."""
     result: NDArray[T] = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for c in range(3):  # in place, as stacking three new arrays takes ten times as long
         one, other, into = (c + 1) % 3, (c + 2) % 3, result[..., c, :]
@@ -180,10 +182,10 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 
 
 def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node (n,), numbered from 0 in the order of first nodes.
+    """Return the connected component of each node of a graph, (n,), numbered in the order of first nodes.
 
-    count : number of nodes
-    a, b : (l,) pairs of connected nodes
+    count : n, number of nodes
+    a, b : (l,) nodes at the two ends of each link
     """
     label = np.arange(count)
     while True:
@@ -197,9 +199,9 @@ def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> In
 
 
 def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
-    """Expand runs of consecutive integers: return the run that each integer belongs to, and the integers.
+    """Expand runs of consecutive integers; return the run index of each integer, and the integers.
 
-    first, count : first integer of each run and its length
+    first, count : (r,) first integer and length of each run
     """
     which = np.repeat(np.arange(len(count)), count)
     start = np.repeat(np.cumsum(count) - count, count)
@@ -207,7 +209,7 @@ def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
 
 
 def fibonacci_sphere(count: int) -> Doubles:
-    """Return (count, 3) unit vectors on a golden spiral about +Y, each for an equal part of the sphere.
+    """Return unit vectors (count, 3) distributed evenly over the sphere, on a golden-angle spiral about +Y.
 
     Source: [Keinert2015].
     """

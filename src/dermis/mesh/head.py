@@ -78,14 +78,14 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig, or for a head without one a rig of its points only."""
+        """Return the rig; for a head without one, a rig with its points only."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
 
     @cached_property
     def bare(self) -> Head:
-        """Return the head without maps and eye colours, which is equal for looks of one shape."""
+        """Return the head without maps and with default eyes, for caches that depend on shape only."""
         if self.rig is None:
             return self
         eyes = self.eyes and self.eyes.with_look(EyeLook())
@@ -93,7 +93,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and tables serve this one: its template, or itself without a look."""
+        """Return the head whose atlas and derived tables this head uses: its template, else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare
@@ -101,9 +101,9 @@ class Head:
 
     @property
     def positions_mm(self) -> Floats:
-        """Return the unique points (n, 3) of the mesh as loaded, before any subdivision [mm].
+        """Return the points (n, 3) of the mesh as loaded, before any subdivision [mm].
 
-        Points of eyeballs that are not in the file are left out, see `Rig.rigid_followers`.
+        Points of fitted eyeballs, which are not in the file, are left out, see `Rig.rigid_followers`.
         """
         positions = self.control.positions_mm
         return positions[: self.control.file_point_count] if self.control.rigid_followers else positions
@@ -121,11 +121,14 @@ class Head:
 
     @property
     def centre_mm(self) -> tuple[float, float, float]:
-        """Return the centre of the head without neck and shoulders, around which scenes are built [mm]."""
+        """Return the centre of the skull, without neck and shoulders, at which cameras look [mm]."""
         return self.mesh.skull_centre_mm
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
-        """Return the frontmost point of the surface at (x, y), both relative to the centre [mm]."""
+        """Return the frontmost vertex near a position across and up, relative to the head's centre [mm].
+
+        x_mm, y_mm : position relative to the centre
+        """
         p = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
         near = distance <= max(6.0, float(distance.min()) + 1.0)

@@ -1,4 +1,4 @@
-"""Maps of the skin, in the units of the renderer."""
+"""Texture maps of the skin, in the units of the renderer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # for means: samples along each side, and l
 
 @dataclass(frozen=True, repr=False)
 class Maps(ShortRepr):
-    """Maps of the skin; None for a map that a head does not have.
+    """Texture maps of the skin; None for a map that a head does not have.
 
     Row 0 is the top of the map; sizes may differ from map to map.
 
@@ -25,7 +25,7 @@ class Maps(ShortRepr):
     height : (H, W) outwards, from an arbitrary zero [mm]
     specular : (H, W) grey 0..1, which the renderer scales to a mean over the skin [-]
     roughness : (H, W) grey 0..1 [-]
-    region : (H, W) uint8 index of the facial region in the head's list
+    region : (H, W) uint8 index of the facial region
     """
 
     colour: Floats | None = None
@@ -44,7 +44,7 @@ class Maps(ShortRepr):
 
     @cached_property
     def mean_colour(self) -> Doubles | None:
-        """Return the mean (3,) of the colour map without its black, unused texels [-]; None without a map."""
+        """Return the mean (3,) of the colour map without unused, black texels; None without a map."""
         if self.colour is None:
             return None
         stride = int(np.clip(min(self.colour.shape[:2]) // _MEAN_SAMPLES, 1, _MAX_STRIDE))

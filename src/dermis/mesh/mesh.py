@@ -1,4 +1,4 @@
-"""The mesh type of the package: triangles with uv, in millimetres."""
+"""The triangle mesh of a head, with uv and materials, in millimetres."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Material:
     name : name of the group in the file
     kind : "skin" is rendered with subsurface scattering, "opaque" with a diffuse and a specular lobe
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
-    part : part of the mouth, where the uv layout tells teeth and tongue apart, see mouth.wgsl
+    part : which teeth, or the tongue, for the colours of mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
     """
 
@@ -43,15 +43,14 @@ class Material:
 class Mesh(ShortRepr):
     """Triangles with attributes at vertices.
 
-    Y is up and the face looks towards +Z; the outside of a triangle is where its corners are
-    counter-clockwise. A point on a uv seam has one vertex for each of its uvs; `point` is the same for all of
-    them.
+    Y is up and the face looks towards +Z; seen from outside, the corners of a triangle are counter-clockwise.
+    A point on a uv seam has several vertices, one for each uv; all of them have the same `point`.
 
     positions : (v, 3) [mm]
     normals : (v, 3) unit vectors
     uv : (v, 2) u to the right, v DOWN: (0, 0) is the top-left corner of every map, in [0, 1]
     point : (v,) index of the unique position
-    triangles : (f, 3) vertices
+    triangles : (f, 3) vertex indices
     material : (f,) index into `materials`
     quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that are a quad abcd; no rows for none
     """
@@ -67,24 +66,24 @@ class Mesh(ShortRepr):
 
     @property
     def points_mm(self) -> Doubles:
-        """Return the unique positions (p, 3) [mm]."""
+        """Return the unique positions (p, 3), one for each point [mm]."""
         points = np.zeros((int(self.point.max()) + 1, 3))
         points[self.point] = self.positions
         return points
 
     @property
     def size_mm(self) -> Floats:
-        """Return the extent along x, y and z [mm]."""
+        """Return the size (3,) of the bounding box along x, y and z [mm]."""
         return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
     def outline(self) -> Outline:
-        """Return the corners of the convex hull."""
+        """Return the corners of the convex hull, which bound the mesh in every direction."""
         return convex_hull(self.positions)
 
     @cached_property
     def skull_centre_mm(self) -> tuple[float, float, float]:
-        """Return the centre of a head without neck and shoulders [mm]."""
+        """Return the centre of the skull, without neck and shoulders [mm]."""
         x, y, z = self.positions.T
         top = float(y.max())
         skull = y > top - 2 * _CROWN_TO_CENTRE_MM
@@ -101,12 +100,12 @@ class Mesh(ShortRepr):
 
     @property
     def dpdu(self) -> Floats:
-        """Return the derivative of the position by u (v, 3), a mean over adjacent faces [mm per unit]."""
+        """Return the derivative of the position by u, (v, 3), averaged over adjacent faces [mm]."""
         return self._tangents[0]
 
     @property
     def dpdv(self) -> Floats:
-        """Return the derivative of the position by v (v, 3), a mean over adjacent faces [mm per unit]."""
+        """Return the derivative of the position by v, (v, 3), averaged over adjacent faces [mm]."""
         return self._tangents[1]
 
     @cached_property
@@ -116,7 +115,7 @@ class Mesh(ShortRepr):
 
 
 def _valid_normals(normals: Floats, computed: Floats) -> Floats:
-    """Return the normals where they are finite and nearly unit vectors, else the computed ones."""
+    """Return given normals where they are finite and nearly unit vectors, else computed ones, (v, 3)."""
     finite = np.isfinite(normals)
     length = np.linalg.norm(np.where(finite, normals, 0).astype(np.float64), axis=1, keepdims=True)
     valid = finite.all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
@@ -133,15 +132,15 @@ def build_mesh(
     point: ArrayLike | None = None,
     quads: ArrayLike = (),
 ) -> Mesh:
-    """Build a `Mesh`; points are welded and normals computed if they are not given.
+    """Build a `Mesh` from arrays; points are welded and normals computed unless they are given.
 
     positions : (v, 3) finite [mm]
     uv : (v, 2) v down
-    triangles : (f, 3) vertices, at least one triangle
+    triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
     normals : (v, 3) used where they are finite and of unit length, computed elsewhere
     point : (v,) index of the unique position; if None, equal positions are welded
-    quads : (q, 2) pairs of triangles, see `Mesh`
+    quads : (q, 2) pairs of triangles that are a quad, see `Mesh`
     """
     positions = np.ascontiguousarray(positions, dtype=np.float32)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Morph targets: named displacements of points."""
+"""Morph targets: named displacements of the points of a mesh."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from dermis.base.summary import ShortRepr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MorphTargets(ShortRepr):
-    """Displacements of some of the points, target after target.
+    """Sparse displacements of points by t morph targets, stored target after target.
 
     names : (t,)
-    first : (t + 1,) index of the first displacement of each target
+    first : (t + 1,) index of the first displacement of each target, and the number of displacements
     point : (n,) point of each displacement
     delta_mm : (n, 3) displacement at weight 1
     rest : (t,) weights in the rest pose; None if all are 0
@@ -35,17 +35,18 @@ class MorphTargets(ShortRepr):
 
     @cached_property
     def point_order(self) -> Intp:
-        """Return the order (n,) of the displacements by point, and by target for each point."""
+        """Return the permutation (n,) that sorts the displacements by point, then by target."""
         return np.argsort(self.point, kind="stable")
 
     def rows(self, target: int) -> slice:
-        """Return the slice of a target's displacements."""
+        """Return the slice of `point` and `delta_mm` that belongs to a target."""
         return slice(int(self.first[target]), int(self.first[target + 1]))
 
     def dense(self, points: Intp, count: int) -> Floats:
-        """Return the displacements (t, n, 3) of some points by all targets.
+        """Return the displacements (t, n, 3) of n points by all targets at weight 1 [mm].
 
-        count : number of all points
+        points : (n,) indices of the points
+        count : number of points of the mesh
         """
         column_of = np.full(count, -1, np.int64)
         column_of[points] = np.arange(len(points))

@@ -1,7 +1,7 @@
-"""Outlines: the few points of a shape that bound it in every direction.
+"""Outlines: a few points of a shape that bound it in every direction.
 
-Shadow maps and depth ranges are fitted to these points. For a rig they are found once, from the rest pose,
-each morph target and random poses, so that its bounds in any pose follow from few points.
+Shadow maps and depth ranges are fitted to them. For a rig they are selected once, from the rest pose, every
+morph target and random poses; posing them gives the bounds of the head in any pose.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
 _REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
 _CLOSE_MM = 0.5
 _MAX_CORNERS = 512
-_BLOCK = 80_000  # numbers that are computed at a time
-_LAYERS = 16  # candidates per direction, of which a pose may bring another one outermost
-_POSES, _SEED = 128, 0
+_BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
+_CANDIDATES_PER_DIRECTION = 16  # candidates per direction, of which a pose may bring another one outermost
+_RANDOM_POSES, _SEED = 128, 0
 _MAX_DEGREES = 60.0
 _MAX_BONES = 4  # that are rotated in one pose
 _ACTIVE_TARGETS = 0.3  # fraction of the targets in one pose
@@ -37,7 +37,7 @@ class Outline(ShortRepr):
     """Points that bound a shape in every direction.
 
     points_mm : (n, 3)
-    margin_mm : largest distance of the shape beyond the bounds of these points, which depth ranges add
+    margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges add it
     """
 
     points_mm: NDArray[np.floating]
@@ -45,18 +45,18 @@ class Outline(ShortRepr):
 
     @cached_property
     def homogeneous(self) -> Floats:
-        """Return the points as homogeneous columns (4, n), in single precision like meshes [mm]."""
+        """Return the points as homogeneous columns (4, n) in float32, the precision of meshes [mm]."""
         return np.vstack([self.points_mm.T, np.ones(len(self.points_mm))]).astype(np.float32)
 
     @cached_property
     def centre_mm(self) -> tuple[float, float, float]:
-        """Return the centre of the bounding box [mm]."""
+        """Return the centre of the points' bounding box [mm]."""
         x, y, z = 0.5 * (self.points_mm.min(axis=0) + self.points_mm.max(axis=0))
         return float(x), float(y), float(z)
 
 
 def convex_hull(positions: NDArray[np.floating]) -> Outline:
-    """Return the corners of the convex hull of (n, 3) positions [mm]."""
+    """Return an outline with the corners of the convex hull of positions (n, 3) [mm]."""
     points = positions.astype(np.float64)
     return Outline(points[hull_vertices(points)])
 
@@ -73,12 +73,12 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """Some points of a rig with dense morph targets and skin weights; points are columns.
+    """Outline points of a rig, s of them stored as columns, with dense morph targets and skin weights.
 
     rest_mm : (4, s) homogeneous points at rest
     delta_mm : (t, 3 s) displacements by each target at weight 1
-    weight : (b, s) weights of the bones that move any of the points; None without bones
-    bones : (b,) indices of these bones
+    weight : (m, s) weights of the m bones that move any of the points; None without bones
+    bones : (m,) indices of these bones in the skeleton
     """
 
     rest_mm: Floats
@@ -87,7 +87,7 @@ class RigOutline(ShortRepr):
     bones: Intp
 
     def pose(self, weights: Floats, matrices: Floats) -> Floats:
-        """Return the points (s, 3) in a pose [mm].
+        """Return the outline points in a pose, (s, 3) [mm].
 
         weights : (t,) of the targets, relative to the rest pose
         matrices : (b, 3, 4) of all bones of the rig
@@ -107,9 +107,10 @@ class RigOutline(ShortRepr):
 def rig_outline(
     positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp
 ) -> RigOutline:
-    """Return some points (s,) of a rig with what moves them.
+    """Return the outline of a rig that consists of the given points, with their targets and weights.
 
-    positions : (p, 3) of all points at rest [mm]
+    positions : (p, 3) of all control points at rest [mm]
+    points : (s,) indices of the outline points
     """
     rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])
     delta = targets.dense(points, len(positions)).transpose(0, 2, 1).reshape(-1, 3 * len(points))
@@ -123,64 +124,78 @@ def rig_outline(
 
 
 def hull_corners(positions: Floats) -> Intp:
-    """Return the indices of corners of the convex hull of points (p, 3), the extreme ones if too many."""
+    """Return indices of convex hull corners of points (p, 3); of more than 512, the most extreme ones."""
     corners = hull_vertices(positions)
     few = len(corners) <= _MAX_CORNERS
     return corners if few else corners[extreme_points(positions[corners], _MAX_CORNERS)]
 
 
 def extreme_points(positions: Floats, count: int = _FEW_DIRECTIONS) -> Intp:
-    """Return the indices of the points (p, 3) that are farthest in any of `count` directions."""
-    return np.unique(np.concatenate([height.argmax(axis=1) for height in _heights(positions, count)]))
+    """Return the indices of the points (p, 3) that are farthest in at least one of `count` directions."""
+    return np.unique(
+        np.concatenate([height.argmax(axis=1) for height in _project_on_directions(positions, count)])
+    )
 
 
 def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Return the indices of a rig's points that are extreme at rest, with one target, or in a random pose."""
-    candidates = _candidates(positions, targets, skeleton)
+    """Return the indices of a rig's points that are outermost in some direction in one of many poses.
+
+    The poses are the rest pose, each morph target alone, and random poses.
+
+    positions : (p, 3) of all control points at rest [mm]
+    """
+    candidates = _outline_candidates(positions, targets, skeleton)
     outline = rig_outline(positions, targets, skeleton, candidates)
     rest = np.zeros((0, 3, 4), np.float32) if skeleton is None else skeleton.rest_matrices
     chosen = np.zeros(len(candidates), bool)
     for count in _REFINED_DIRECTIONS:
-        _add_extreme(chosen, positions[candidates], count)
+        _select_extreme(chosen, positions[candidates], count)
     for weights in np.eye(len(targets.names), dtype=np.float32):
-        _add_extreme(chosen, outline.pose(weights, rest))
+        _select_extreme(chosen, outline.pose(weights, rest))
     rng = np.random.default_rng(_SEED)
-    for _ in range(_POSES if targets.names or skeleton else 0):
+    for _ in range(_RANDOM_POSES if targets.names or skeleton else 0):
         random_weights = rng.random(len(targets.names)) * (rng.random(len(targets.names)) < _ACTIVE_TARGETS)
         matrices = rest if skeleton is None else _random_pose(skeleton, rng)
-        _add_extreme(chosen, outline.pose(random_weights.astype(np.float32), matrices))
+        _select_extreme(chosen, outline.pose(random_weights.astype(np.float32), matrices))
     return candidates[chosen]
 
 
-def _add_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
-    """Mark points as chosen that are farther in one of the directions than those chosen before."""
-    for height in _heights(positions, count):
+def _select_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
+    """Select points that exceed the bounds of the points selected before in one of `count` directions.
+
+    chosen : (p,) mask of the selected points, which this function extends
+    positions : (p, 3)
+    """
+    for height in _project_on_directions(positions, count):
         top = height.argmax(axis=1)
         reached = height[:, chosen].max(axis=1, initial=-np.inf)
         chosen[top[height[np.arange(len(top)), top] - reached > _CLOSE_MM]] = True
 
 
-def _heights(positions: Floats, count: int) -> Iterator[Floats]:
-    """Yield the distances of points (p, 3) along directions, (n, p) for a few of these at a time.
+def _project_on_directions(positions: Floats, count: int) -> Iterator[Floats]:
+    """Yield the projections of points (p, 3) on unit vectors, for blocks of n directions, (n, p) each.
 
-    Products of this size are computed by one thread; larger ones wait for others where all cores are busy.
+    count : number of all directions
+
+    A block is so small that NumPy multiplies it on one thread; several would wait for each other on busy
+    cores.
     """
-    block = max(1, _BLOCK // len(positions))
+    block = max(1, _BLOCK_NUMBERS // len(positions))
     for start in range(0, count, block):
         yield _directions(count)[start : start + block] @ positions.T
 
 
 @lru_cache(maxsize=3)
 def _directions(count: int) -> Floats:
-    """Return (n, 3) unit vectors that are evenly distributed over the sphere, on a golden spiral."""
+    """Return unit vectors (count, 3) distributed evenly over the sphere."""
     return np.ascontiguousarray(fibonacci_sphere(count)[:, [0, 2, 1]], np.float32)
 
 
-def _candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Return the indices of points that may be extreme in some pose."""
-    layers = min(_LAYERS, len(positions))
+def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
+    """Return the indices of points that may be outermost in some pose, to limit the search."""
+    layers = min(_CANDIDATES_PER_DIRECTION, len(positions))
     found: list[Numbers] = [extreme_points(positions, _REFINED_DIRECTIONS[-1])]
-    for height in _heights(positions, _DIRECTIONS):
+    for height in _project_on_directions(positions, _DIRECTIONS):
         found.append(np.argpartition(height, -layers, axis=1)[:, -layers:].ravel())
     for target in range(len(targets.names)):
         rows = targets.rows(target)
@@ -197,10 +212,13 @@ def _candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | N
 
 
 def _random_pose(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
-    """Return the matrices (b, 3, 4) for random rotations of some bones, chosen by their followers."""
+    """Return bone matrices (b, 3, 4) for random rotations of a few bones.
+
+    Bones are chosen with a probability proportional to the number of points that follow them.
+    """
     probability = skeleton.follower_counts / skeleton.follower_counts.sum()
     count = min(int(rng.integers(1, _MAX_BONES + 1)), int((probability > 0).sum()))
     bones = np.sort(rng.choice(len(probability), count, replace=False, p=probability)).tolist()
     angles = rng.uniform(-_MAX_DEGREES, _MAX_DEGREES, (count, 3))
     rows = [skeleton.bone_rotation(*pair) for pair in zip(bones, angles.tolist(), strict=True)]
-    return skeleton.moved_matrices(bones, np.array(rows).reshape(-1, 4, 4))
+    return skeleton.pose_matrices(bones, np.array(rows).reshape(-1, 4, 4))

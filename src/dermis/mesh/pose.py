@@ -1,4 +1,4 @@
-"""Poses of heads."""
+"""Poses of heads: weights of morph targets, rotations of bones, or positions of points."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Pose(ShortRepr):
 
     @classmethod
     def coerce(cls, value: object) -> Pose | None:
-        """Return a pose as it is, a mapping of weights as a pose, and None as None."""
+        """Convert a mapping of morph target weights to a pose; poses and None are returned unchanged."""
         if value is None or isinstance(value, Pose):
             return value
         if not isinstance(value, Mapping):
@@ -76,7 +76,7 @@ class Pose(ShortRepr):
         return cls(weights=value)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
-        """Return the pose as numbers for a rig.
+        """Return the pose as arrays for a rig: weights, bone matrices and positions.
 
         Parameters
         ----------
@@ -124,10 +124,15 @@ class Pose(ShortRepr):
                 _refuse_name(f"{culprit}: bones", name, index, "bone")
         ordered = sorted((index[name], name) for name in bone_values)
         bones = [bone for bone, _ in ordered]
-        return rig.skeleton.moved_matrices(bones, _changes(rig.skeleton, ordered, bone_values, culprit))
+        return rig.skeleton.pose_matrices(
+            bones, _bone_transforms(rig.skeleton, ordered, bone_values, culprit)
+        )
 
     def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones with the rotations that targets make; bones given by a matrix are unchanged."""
+        """Return the bones of the pose, with the bone rotations of active morph targets added to angles.
+
+        A bone that is given by a matrix is not changed.
+        """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
             return self.bones
@@ -161,16 +166,20 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Return a pose that takes what it does not state from another one."""
+    """Return a pose completed from a base: weights, bones and positions that `pose` does not set."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)
 
 
-def _changes(
+def _bone_transforms(
     skeleton: Skeleton, ordered: list[tuple[int, str]], values: Mapping[str, Any], culprit: object
 ) -> Doubles:
-    """Return the head-space changes (n, 4, 4) that angles or matrices of bones make [mm]."""
+    """Return the head-space transforms (n, 4, 4) by which bones leave their rest pose [mm].
+
+    ordered : (n,) index and name of each bone, parents before children
+    values : angles or matrix of each bone by name, see `Pose`
+    """
     changes = np.empty((len(ordered), 4, 4))
     rows: list[list[float]] = []
     by_angles: list[int] = []
@@ -191,12 +200,15 @@ def _changes(
     if by_matrix:
         _check_matrices(changes[by_matrix], [ordered[k][1] for k in by_matrix], culprit)
         bones = [ordered[k][0] for k in by_matrix]
-        changes[by_matrix] = skeleton.head_space_changes(bones, changes[by_matrix])
+        changes[by_matrix] = skeleton.head_space_transforms(bones, changes[by_matrix])
     return changes
 
 
 def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
-    """Raise DermisError for a singular matrix."""
+    """Raise DermisError if one of the matrices (n, 4, 4) is singular.
+
+    names : (n,) of the bones
+    """
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     singular = np.abs(np.linalg.det(linear)) <= _MIN_DETERMINANT * size**3
@@ -211,7 +223,10 @@ def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
 
 
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
-    """Raise DermisError for the first invalid weight."""
+    """Raise DermisError for the first invalid weight or unknown morph target.
+
+    names : of the morph targets of the rig
+    """
     for name, weight in weights.items():
         if name not in names:
             _refuse_name(f"{culprit}: weights", name, names, "morph target")
@@ -220,17 +235,24 @@ def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culpr
 
 
 def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) -> NoReturn:
-    """Raise DermisError for a name that the head does not have, with the most similar names."""
+    """Raise DermisError for an unknown name, and propose similar known names.
+
+    kind : "bone" or "morph target"
+    """
     names = list(known)
     if not names:
         actual = f"got {format_value(name)} and it has none"
         refuse(culprit, f"a {kind} of the head", actual, f"Load a glTF file with {kind}s, or leave it out")
     plain = {one.casefold(): one for one in names}
     similar = difflib.get_close_matches(str(name)[:_MAX_LETTERS].casefold(), plain, _SUGGESTIONS, 0.5)
-    advice = f"Nearest: {', '.join(plain[one] for one in similar)}" if similar else f"It has {_some(names)}"
+    advice = (
+        f"Nearest: {', '.join(plain[one] for one in similar)}"
+        if similar
+        else f"It has {_short_name_list(names)}"
+    )
     refuse(culprit, f"a {kind} of the head", f"there is no {format_value(name)}", advice)
 
 
-def _some(names: list[str]) -> str:
+def _short_name_list(names: list[str]) -> str:
     shown = ", ".join(names[:8])
     return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown

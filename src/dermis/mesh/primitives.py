@@ -1,4 +1,4 @@
-"""Meshes of simple shapes, for tests, material spheres and calibration pictures."""
+"""Meshes of simple shapes for tests, material spheres and calibration pictures."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ _FACES = (
 
 
 def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
-    """Return the upper and lower triangles of the cells of a grid, each (rows * columns, 3), cell by cell.
+    """Return the upper and the lower triangle of each cell of a grid, (rows * columns, 3) each.
 
-    Vertices are numbered along u first, (columns + 1) per row, with rows downwards; seen from outside, u is
-    to the right.
+    Vertices are numbered row by row from the top, columns + 1 in each row.
     """
     row, column = np.mgrid[:rows, :columns].astype(np.int32)
     top_left = (row * (columns + 1) + column).ravel()
@@ -36,11 +35,11 @@ def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
 
 
 def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
-    """Return a square in the XY plane about the origin that faces +Z, with u along +X and v along -Y.
+    """Return a square in the XY plane, centred at the origin, that faces +Z; u is along +X and v along -Y.
 
     size_mm : length of a side [mm]
-    segments : cells along each side
-    uv_scale : uv covers [0, uv_scale] along both sides, at most 1
+    segments : number of cells along each side
+    uv_scale : largest u and v, at most 1; the smallest are 0
     """
     if not (size_mm > 0 and segments >= 1 and 0 < uv_scale <= 1):
         actual = f"got {size_mm} mm, {segments} and {uv_scale}"
@@ -54,13 +53,13 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
 
 
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
-    """Return a sphere about the origin, with u once around +Y from -Z by -X and v from north to south pole.
+    """Return a sphere about the origin with latitude-longitude uv; v is 0 at +Y, the north pole.
 
-    The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an apex vertex of its own, with u at
-    the middle of its base, so that none is degenerate.
+    u goes around +Y from -Z by -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an
+    apex vertex of its own, with u at the middle of its base, so that none is degenerate.
 
     radius_mm : [mm]
-    segments, rings : cells around and from pole to pole, at least 3 and 2
+    segments, rings : number of cells around the axis, and from pole to pole, at least 3 and 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):
         actual = f"got {radius_mm} mm, {segments} and {rings}"
@@ -82,11 +81,11 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
 
 
 def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
-    """Return a closed slab about the origin with its front towards +Z, where each face is a chart.
+    """Return a closed slab of linearly varying thickness about the origin; each of its faces is a chart.
 
     side_mm : length along X and Y [mm]
     thin_mm, thick_mm : thickness along Z at -X and at +X [mm]
-    cells : cells along each side
+    cells : number of cells along each side
     """
     if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
         actual = f"got {side_mm}, {thin_mm} and {thick_mm} mm and {cells}"

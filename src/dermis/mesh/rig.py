@@ -1,4 +1,4 @@
-"""Rigs: morph targets and skinned bones of a head."""
+"""Rigs, which move the control points of a head by morph targets and bones."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _CACHE_VERSION = "outline 6"  # to be changed when other points are found
 
 
 class Motion(NamedTuple):
-    """State of a rig in numbers.
+    """State of a rig as arrays, as the device uses it.
 
     weights : (t,) weights of the targets, relative to the rest pose
-    matrices : (b, 3, 4) matrices that the bones apply to points at rest [mm]
+    matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
     positions_mm : (p, 3) points at rest
     """
 
@@ -47,11 +47,11 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stencils(ShortRepr):
-    """Points of a subdivided mesh as weighted means of control points.
+    """Points of a subdivided mesh as weighted means of control points, in compressed rows.
 
-    first : (q + 1,) index of the first control point of each point
+    first : (q + 1,) index in `point` and `weight` at which each mesh point starts
     point : (n,) control points
-    weight : (n,) weights, which sum to 1 for each point
+    weight : (n,) weights, which sum to 1 for each mesh point
     """
 
     first: Ints
@@ -59,7 +59,7 @@ class Stencils(ShortRepr):
     weight: Floats
 
     def points(self, control_mm: Doubles) -> Doubles:
-        """Return the points (q, 3) for control points (p, 3) [mm]."""
+        """Return the points of the subdivided mesh (q, 3) from control points (p, 3) [mm]."""
         weighted = self.weight[:, None] * control_mm[self.point]
         return np.asarray(np.add.reduceat(weighted, self.first[:-1], axis=0))
 
@@ -67,6 +67,7 @@ class Stencils(ShortRepr):
 class BoneRotation(NamedTuple):
     """Rotation of a bone that a morph target makes in addition to its displacements.
 
+    target, bone : names
     degrees : angles about the head's x, y and z at weight 1
     """
 
@@ -76,7 +77,7 @@ class BoneRotation(NamedTuple):
 
 
 class RigidFollowers(NamedTuple):
-    """Points that follow other points of the file as one rigid body.
+    """Points that follow other points as one rigid body, such as a fitted eyeball that follows the file's.
 
     leaders : (n,) indices of points of the file
     points : (m,) indices of the points that follow them
@@ -90,15 +91,15 @@ class RigidFollowers(NamedTuple):
 class Rig(ShortRepr):
     """Control points of a head, moved by morph targets first and then by bones.
 
-    positions_mm : (p, 3) points at rest, before any subdivision, in head space
-    targets, skeleton : morph targets and bones; None for no bones
-    stencils : stencils from the control points to the points of the mesh; None if they are the same
+    positions_mm : (p, 3) control points at rest, in head space
+    targets, skeleton : morph targets and bones; `skeleton` is None without bones
+    stencils : subdivision from control points to mesh points; None without subdivision
     vertex_point : (v,) control point of each vertex of the file's mesh; None if it is `Mesh.point`
-    bone_rotations : rotations of bones by targets
-    rigid_followers : points that are not in the file, after all of its own
-    contact : points that stay outside the eyes; None for none
-    template : rig of the same topology whose outline points this one shares, in addition to the corners of
-        its own convex hull; None to search them
+    bone_rotations : rotations of bones by morph targets
+    rigid_followers : points that are not in the file, such as fitted eyeballs; they come after its own
+    contact : lids that must stay outside the eyeballs; None to let them intersect
+    template : rig of the same topology whose outline points are reused, in addition to the corners of the
+        convex hull; None to search outline points
     """
 
     positions_mm: Floats
@@ -113,17 +114,20 @@ class Rig(ShortRepr):
 
     @cached_property
     def rest(self) -> Motion:
-        """Return the motion of a rig at rest."""
+        """Return the rest pose as arrays."""
         bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.rest_matrices
         return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
 
     @property
     def file_point_count(self) -> int:
-        """Return the number of points from the file, which come first."""
+        """Return the number of control points that are in the file; they come first."""
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all points (p, 3), given those of the points from the file [mm]."""
+        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+
+        Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
+        """
         positions = np.concatenate([file_positions_mm, self.positions_mm[len(file_positions_mm) :]])
         for leaders, points in self.rigid_followers:
             before, after = self.positions_mm[leaders], file_positions_mm[leaders]
@@ -138,20 +142,24 @@ class Rig(ShortRepr):
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Return the outline of the rig, found once and cached on disk."""
+        """Return the outline of the rig; its points are searched once and cached on disk."""
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
-        """Return points (s, 3) that bound the posed rig in every direction, to about a millimetre [mm].
+        """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If the motion has other rest positions, the corners of their convex hull are among the points.
+        If the rest positions in `motion` differ from those of the rig, the corners of their convex hull are
+        added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
         return self._outline_at(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_at(self, positions: Floats) -> RigOutline:
-        """Return the outline for other rest positions; the last one is cached and compared by its points."""
+        """Return the outline for other rest positions (p, 3) of the control points [mm].
+
+        The last outline is cached and used again if its points did not move.
+        """
         points, outline = self._last_outline
         if not np.array_equal(positions[points].T, outline.rest_mm[:3]):
             points = np.union1d(self._outline_points, hull_corners(positions))
@@ -176,13 +184,16 @@ class Rig(ShortRepr):
         ).astype(np.intp)
 
     def points_mm(self, motion: Motion) -> Doubles:
-        """Return the points of the mesh (q, 3) in a motion, after any subdivision [mm]."""
+        """Return the points of the mesh in a pose, after any subdivision, (q, 3) [mm]."""
         rig = replace(self, positions_mm=motion.positions_mm)
         control = rig.pose(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
     def lid_edges_mm(self, motion: Motion) -> Doubles:
-        """Return the edges of the lids (k, r, 3) around each eye in a motion, on the finer surface [mm]."""
+        """Return points along the lid edges in a pose, on the subdivided surface, (k, r, 3) [mm].
+
+        There are k eyes with r points around each opening, see `LidContact.edge`.
+        """
         assert self.contact is not None
         points, weights, outline = self._lid_edges
         rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
@@ -191,7 +202,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return control points near the edges of the lids, their weights in the edges, and their outline."""
+        """Return control points of the lid edges, their weights in edge points, and their outline."""
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))
@@ -204,10 +215,13 @@ class Rig(ShortRepr):
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
     def pose_points(self, points: Ints, motion: Motion) -> Doubles:
-        """Return some control points (n, 3) in a motion [mm]."""
+        """Return only the given control points in a pose, (n, 3) [mm].
+
+        points : (n,) indices of the control points
+        """
         positions = motion.positions_mm[points].astype(np.float64)
         if self._has_targets[points].any():
-            positions += np.einsum("t,tpk->pk", motion.weights, self._dense(points))
+            positions += np.einsum("t,tpk->pk", motion.weights, self._dense_displacements(points))
         if self.skeleton is None:
             return positions
         homogeneous = np.concatenate([positions, np.ones((len(positions), 1))], axis=1)
@@ -216,13 +230,13 @@ class Rig(ShortRepr):
 
     @cached_property
     def _has_targets(self) -> Mask:
-        """Return the mask (p,) of points that any target moves."""
+        """Return a mask (p,) of the control points that some morph target moves."""
         displaced = np.zeros(len(self.positions_mm), bool)
         displaced[self.targets.point] = True
         return displaced
 
-    def _dense(self, points: Ints) -> Floats:
-        """Return the displacements (t, n, 3) of some points; the last result is cached."""
+    def _dense_displacements(self, points: Ints) -> Floats:
+        """Return the displacements (t, n, 3) of n control points by all targets; cache the last result."""
         last_points, dense = vars(self).get("_last", (None, None))
         if dense is None or not np.array_equal(last_points, points):
             dense = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
@@ -230,10 +244,10 @@ class Rig(ShortRepr):
         return np.asarray(dense)
 
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
-        """Return the control points (p, 3) in a pose, as the device computes them [mm].
+        """Return all control points in a pose, (p, 3) [mm]; the reference for the computation on the device.
 
         weights : (t,) of the targets, relative to the rest pose
-        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; those at rest if None
+        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         row_weights = np.repeat(weights, np.diff(targets.first))

@@ -1,7 +1,7 @@
-"""Rotations as quaternions, angles and matrices.
+"""Rotations as quaternions, Euler angles and matrices.
 
-SciPy's Rotation is over twenty times slower for the few numbers of a pose, and refuses quaternions of length
-0.
+SciPy's Rotation is over twenty times slower for the few rotations of a pose, and refuses quaternions of
+length 0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from dermis.base.arrays import Doubles
 
 
 def quaternion_matrix(q: Doubles) -> Doubles:
-    """Return the (..., 4, 4) matrices of quaternions (..., 4) x, y, z, w of any length; identity for 0."""
+    """Return the matrices (..., 4, 4) of quaternions (..., 4) x, y, z, w.
+
+    Quaternions need not be normalised; those of length 0 give the identity.
+    """
     x, y, z, w = np.moveaxis(np.asarray(q, np.float64), -1, 0)
     squared = x * x + y * y + z * z + w * w
     s = np.where(squared > 0, 2.0 / np.where(squared > 0, squared, 1.0), 0.0)
@@ -29,7 +32,7 @@ def quaternion_matrix(q: Doubles) -> Doubles:
 
 
 def matrix_quaternion(matrix: Doubles) -> Doubles:
-    """Return the unit quaternions (..., 4) x, y, z, w of rotations (..., 3, 3), with w not below 0."""
+    """Return the unit quaternions (..., 4) x, y, z, w of rotation matrices (..., 3, 3), with w >= 0."""
     m = np.asarray(matrix, np.float64)
     d = np.diagonal(m, axis1=-2, axis2=-1)
     trace = d.sum(axis=-1)
@@ -46,9 +49,10 @@ def matrix_quaternion(matrix: Doubles) -> Doubles:
 
 
 def angles_matrix(degrees: Sequence[float]) -> list[list[float]]:
-    """Return the (3, 3) rotation by angles about x, y and z [degrees], applied about z first, then x, then y.
+    """Return the rotation matrix (3, 3) of Euler angles about x, y and z [degrees].
 
-    It uses plain floats, as NumPy is ten times slower for so few numbers.
+    The rotation about z is applied first, then x, then y. Plain floats are used, as NumPy is ten times slower
+    for so few numbers.
     """
     (sx, cx), (sy, cy), (sz, cz) = ((math.sin(r), math.cos(r)) for r in map(math.radians, degrees))
     return [
@@ -59,7 +63,7 @@ def angles_matrix(degrees: Sequence[float]) -> list[list[float]]:
 
 
 def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
-    """Return the angles about x, y and z [degrees] from which `angles_matrix` makes the rotation (3, 3)."""
+    """Return the Euler angles about x, y and z [degrees] of a rotation matrix (3, 3), see `angles_matrix`."""
     m = np.asarray(matrix, np.float64)
     x = math.asin(min(max(-m[1, 2], -1.0), 1.0))
     if abs(m[1, 2]) > 1 - 1e-9:  # gimbal lock: y and z have one axis
@@ -69,9 +73,11 @@ def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
 
 
 def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the rotation (3, 3) and then the shift (3,) that best map points to others, both (n, 3).
+    """Return the rotation (3, 3) and the translation (3,) that best map points `before` to points `after`.
 
-    This is Kabsch's method: least squares by the singular values of the covariance.
+    Kabsch's method: the least squares solution from the singular value decomposition of the covariance.
+
+    before, after : (n, 3)
     """
     centre, new_centre = before.mean(axis=0), after.mean(axis=0)
     u, _, vh = np.linalg.svd((before - centre).T @ (after - new_centre))

@@ -1,4 +1,4 @@
-"""Skeletons: bones, and the transforms of the points that follow them."""
+"""Skeletons: hierarchies of bones, and the matrices by which they transform points."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _MAX_SEQUENTIAL = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Skeleton(ShortRepr):
-    """Bones, parents before children, and the skin weights of points.
+    """Hierarchy of b bones, parents before children, with the skin weights of p points.
 
     names : (b,)
-    parent : (b,) index of the parent, -1 for a root
+    parent : (b,) index of each bone's parent, -1 for a root
     local : (b, 4, 4) from each bone's space to its parent's, at rest
     inverse_bind : (b, 4, 4) from the file's space to the bone's, in the bind pose
     to_head : (4, 4) from the file's space to the head's [mm]
@@ -39,9 +39,9 @@ class Skeleton(ShortRepr):
     weight: Floats
 
     def matrices(self, local: Doubles | None = None) -> Doubles:
-        """Return the matrices (b, 3, 4) that each bone applies to points at rest, in head space [mm].
+        """Return the bone matrices (b, 3, 4), which transform points at rest in head space [mm].
 
-        local : (b, 4, 4) from each bone's space to its parent's; those at rest if None
+        local : (b, 4, 4) from each bone's space to its parent's; None for the rest pose
         """
         world = self._bone_to_file(self.local if local is None else local)
         matrices = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
@@ -54,17 +54,17 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def rest_matrices(self) -> Floats:
-        """Return the matrices (b, 3, 4) at rest."""
+        """Return the bone matrices in the rest pose, (b, 3, 4)."""
         return self.matrices().astype(np.float32)
 
     @cached_property
     def origin_mm(self) -> list[list[float]]:
-        """Return the position of each joint at rest (b, 3), in head space [mm]."""
+        """Return the positions of the joints at rest, (b, 3), in head space [mm]."""
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 
     def bone_rotation(self, bone: int, degrees: Sequence[float]) -> list[float]:
-        """Return the 16 numbers of the head-space matrix that rotates about a bone's joint at rest.
+        """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers by rows.
 
         degrees : angles about x, y and z, see `angles_matrix`
         """
@@ -73,20 +73,24 @@ class Skeleton(ShortRepr):
         p, q, r = x - a * x - b * y - c * z, y - d * x - e * y - f * z, z - g * x - h * y - i * z
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
-    def head_space_changes(self, bones: Sequence[int], local: Doubles) -> Doubles:
-        """Return the head-space changes (n, 4, 4) that other local matrices of some bones make [mm]."""
+    def head_space_transforms(self, bones: Sequence[int], local: Doubles) -> Doubles:
+        """Return head-space transforms (n, 4, 4) that give n bones other transforms than at rest [mm].
+
+        bones : (n,) indices of the bones
+        local : (n, 4, 4) new transforms from the space of each bone to its parent's
+        """
         index = list(bones)
         return np.asarray(self._parent_to_head[index] @ local @ self._head_to_bone[index])
 
-    def moved_matrices(self, bones: Sequence[int], changes: Doubles) -> Floats:
-        """Return the matrices (b, 3, 4) when some bones move, together with their descendants.
+    def pose_matrices(self, bones: Sequence[int], changes: Doubles) -> Floats:
+        """Return the bone matrices (b, 3, 4) of a pose in which n bones and their descendants move.
 
-        The cost for few bones depends on the number of changes, not on the number of bones.
+        For few bones, the cost depends on n and not on the number of all bones.
 
         bones : (n,) indices, parents before children
-        changes : (n, 4, 4) head-space change of each bone at rest [mm]
+        changes : (n, 4, 4) head-space transform of each bone relative to its rest pose [mm]
         """
-        transforms = self._transforms if len(bones) <= _MAX_SEQUENTIAL else self._transforms_by_depth
+        transforms = self._accumulate_in_order if len(bones) <= _MAX_SEQUENTIAL else self._accumulate_by_depth
         transform = transforms(bones, changes)
         if self._is_bound_at_rest:
             return transform[:, :3].astype(np.float32)
@@ -95,8 +99,11 @@ class Skeleton(ShortRepr):
         matrices[:, :, :3] = transform[:, :3, :3] @ self.rest_matrices[:, :, :3]
         return matrices.astype(np.float32)
 
-    def _transforms(self, bones: Sequence[int], changes: Doubles) -> Doubles:
-        """Return the head-space change (b, 4, 4) of each bone, computed one change after the other."""
+    def _accumulate_in_order(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+        """Accumulate transforms of n bones over the hierarchy, one moving bone after the other.
+
+        The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
+        """
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
         transform[0] = _IDENTITY
         for index, bone in enumerate(bones, start=1):
@@ -104,17 +111,20 @@ class Skeleton(ShortRepr):
             nearest[self._descendants[bone]] = index
         return transform[nearest]
 
-    def _transforms_by_depth(self, bones: Sequence[int], changes: Doubles) -> Doubles:
-        """Return the head-space change (b, 4, 4) of each bone, computed level by level of the hierarchy."""
+    def _accumulate_by_depth(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+        """Accumulate transforms of n bones over the hierarchy, level by level, which is faster for large n.
+
+        The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
+        """
         transform = np.tile(_IDENTITY, (len(self.names), 1, 1))
         transform[list(bones)] = changes
-        for bones_of_depth, parents in self._depths[1:]:
+        for bones_of_depth, parents in self._bones_by_depth[1:]:
             transform[bones_of_depth] = transform[parents] @ transform[bones_of_depth]
         return transform
 
     @cached_property
-    def _depths(self) -> list[tuple[Ints, Ints]]:
-        """Return the indices of the bones at each depth of the hierarchy, and of their parents."""
+    def _bones_by_depth(self) -> list[tuple[Ints, Ints]]:
+        """Return for each level of the hierarchy the indices of its bones and of their parents."""
         depth = np.zeros(len(self.names), np.int64)
         for bone, parent in enumerate(self.parent.tolist()):
             depth[bone] = depth[parent] + 1 if parent >= 0 else 0
@@ -122,7 +132,7 @@ class Skeleton(ShortRepr):
         return [(level.astype(np.int32), self.parent[level]) for level in levels]
 
     def _bone_to_file(self, local: Doubles) -> Doubles:
-        """Return the matrices (b, 4, 4) from each bone's space to the file's."""
+        """Return the matrices (b, 4, 4) from each bone's space to the file's space."""
         world = np.empty_like(local)
         for bone, parent in enumerate(self.parent.tolist()):
             world[bone] = world[parent] @ local[bone] if parent >= 0 else local[bone]
@@ -130,18 +140,18 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def _parent_to_head(self) -> Doubles:
-        """Return the matrices (b, 4, 4) from the space of each bone's parent to the head's, at rest."""
+        """Return the matrices (b, 4, 4) from the space of each bone's parent to head space, at rest."""
         to_head = np.concatenate([self.to_head @ self._bone_to_file(self.local), self.to_head[None]])
         return np.asarray(to_head[self.parent])  # the last one is for roots, with parent -1
 
     @cached_property
     def _head_to_bone(self) -> Doubles:
-        """Return the matrices (b, 4, 4) from the head's space to each bone's, at rest."""
+        """Return the matrices (b, 4, 4) from head space to each bone's space, at rest."""
         return np.asarray(np.linalg.pinv(self.to_head @ self._bone_to_file(self.local)))
 
     @cached_property
     def _descendants(self) -> list[Intp]:
-        """Return the indices of each bone and its descendants."""
+        """Return for each bone the indices of itself and of its descendants."""
         descendants: list[list[int]] = [[] for _ in self.names]
         for bone in range(len(self.names)):
             ancestor = bone
@@ -152,11 +162,11 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def follower_counts(self) -> Doubles:
-        """Return the number of points (b,) that each bone and its descendants move, by their weights."""
+        """Return the number of points that each bone and its descendants move, weighted, (b,)."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
         return np.array([own[bones].sum() for bones in self._descendants])
 
     @cached_property
     def _is_bound_at_rest(self) -> bool:
-        """Return whether the matrices at rest are identities."""
+        """Return whether bind pose and rest pose agree, so that the bone matrices at rest are identities."""
         return bool(np.abs(self.rest_matrices - np.eye(3, 4, dtype=np.float32)).max(initial=0) < 1e-3)

@@ -1,4 +1,4 @@
-"""Hair strands on a mesh of quads: each is rooted in a quad and follows it."""
+"""Hair strands on a mesh of quads; each strand moves with the quad of its root."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ _MIN_LENGTH_MM = 1e-9
 
 
 class Roots(NamedTuple):
-    """Points on a mesh of quads.
+    """Points on the quads of a mesh at which strands are rooted.
 
     quad : (n,) row of `Mesh.quads`
-    position : (n, 2) bilinear coordinates in the quad: towards its second and its last corner, 0 to 1
+    position : (n, 2) bilinear coordinates in the quad, 0 to 1: from its first corner to the second and to the
+        last
     """
 
     quad: Ints
@@ -29,14 +30,14 @@ class Roots(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Strands(ShortRepr):
-    """Hair strands: thin round fibres, each a polyline of knots.
+    """Hair strands: thin round fibres, each a polyline of k knots.
 
     roots : root of each strand
     knots_mm : (n, k, 3) knots from root to tip in the frame of the root: along the quad, across, and along
         the normal
-    radius_mm : (n, k) radius of the fibre
+    radius_mm : (n, k) radius of the fibre at the knots
     absorption : (n, 3) absorption coefficient of the fibre [1/mm]
-    cover : (n,) optical coverage of each root by the hair around it; None for next to none [-]
+    cover : (n,) projected area of the hair around each root, per area of skin; None if negligible [-]
     """
 
     roots: Roots
@@ -50,16 +51,22 @@ class Strands(ShortRepr):
         return len(self.roots.quad)
 
     def knot_positions_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
-        """Return the positions of the knots (n, k, 3) for given points (p, 3) of the mesh [mm]."""
+        """Return the positions of the knots (n, k, 3) on a posed skin [mm].
+
+        points_mm : (p, 3) points of the posed mesh
+        """
         root, frame = root_frames(mesh, self.roots, points_mm)
         return np.asarray(root[:, None] + np.einsum("nic,nki->nkc", frame, self.knots_mm))
 
     def root_centre_mm(self, mesh: Mesh) -> Doubles:
-        """Return the mean position (3,) of the roots on a mesh at rest [mm]."""
+        """Return the mean position (3,) of the roots on the mesh at rest [mm]."""
         return np.asarray(_root_positions(mesh, self.roots, mesh.points_mm)[0].mean(axis=1))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
-        """Return the same strands on the mesh after Catmull-Clark subdivision."""
+        """Return these strands rooted on the Catmull-Clark subdivision `finer` of `mesh`.
+
+        levels : number of subdivision steps from `mesh` to `finer`
+        """
         _, frame = root_frames(mesh, self.roots, mesh.points_mm)
         offsets_mm = np.einsum("nic,nki->nkc", frame, self.knots_mm)
         roots = refine_roots(mesh, self.roots, levels)
@@ -67,20 +74,26 @@ class Strands(ShortRepr):
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
-    """Return the offsets of knots from their roots in the frames of the roots, as in `Strands.knots_mm`.
+    """Convert offsets of knots from their roots to the frames of the roots, as `Strands.knots_mm` has them.
 
-    offsets_mm : (n, k, 3) in space, on a mesh at rest
+    offsets_mm : (n, k, 3) in head space, on the mesh at rest
     """
     return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
 def to_frames(frame: Doubles, offsets_mm: Doubles) -> Floats:
-    """Return the offsets (n, k, 3) of knots from their roots in the frames (n, 3, 3) of the roots."""
+    """Convert offsets (n, k, 3) of knots from their roots to the frames of the roots, whose rows are axes.
+
+    frame : (n, 3, 3) as returned by `root_frames`
+    """
     return np.asarray(np.einsum("nic,nkc->nki", frame, offsets_mm), np.float32)
 
 
 def quad_corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
-    """Return the points of the mesh (n, 4) at the corners of quads."""
+    """Return the point indices at the four corners of quads, (n, 4).
+
+    quad : (n,) rows of `Mesh.quads`
+    """
     first, second = mesh.quads.take(quad, axis=0).T
     vertices = np.empty((4, len(quad)), np.int32)
     vertices[:3], vertices[3] = mesh.triangles.take(first, axis=0).T, mesh.triangles[:, 1].take(second)
@@ -88,7 +101,10 @@ def quad_corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
 
 
 def quad_weights(position: NDArray[np.floating]) -> Doubles:
-    """Return the bilinear weights (n, 4) of a quad's corners."""
+    """Return the bilinear weights (n, 4) of a quad's corners.
+
+    position : (n, 2) bilinear coordinates, see `Roots`
+    """
     s, t = position.astype(np.float64).T
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
@@ -96,9 +112,9 @@ def quad_weights(position: NDArray[np.floating]) -> Doubles:
 def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
     """Return the positions of roots (n, 3) [mm] and their frames (n, 3, 3).
 
-    The rows of a frame are unit vectors along the quad, across, and along its normal.
+    The rows of a frame are unit vectors along the quad, across it, and along its normal.
 
-    points_mm : (p, 3) of the mesh
+    points_mm : (p, 3) points of the mesh in a pose
     """
     root, (a, b, c, d) = _root_positions(mesh, roots, points_mm)
     along, normal = (b - a) + (c - d), cross_columns(c - a, d - b)
@@ -109,7 +125,7 @@ def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tu
 
 
 def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-    """Return the positions of roots (3, n) and of the corners of their quads (4, 3, n) [mm]."""
+    """Return the positions of roots (3, n) and of the corners of their quads (4, 3, n) [mm], as columns."""
     columns = np.ascontiguousarray(points_mm.T, np.float64)
     corners = columns.take(
         quad_corners(mesh, roots.quad).T, axis=1
@@ -118,7 +134,10 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
 
 
 def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubles:
-    """Interpolate values (c, 4, n) at the corners of quads bilinearly; return (c, n)."""
+    """Interpolate c quantities bilinearly in quads, from the corners (c, 4, n) to a position in each, (c, n).
+
+    position : (n, 2) bilinear coordinates, see `Roots`
+    """
     weight = quad_weights(position).T
     result: Doubles = weight[0] * corners[:, 0]
     for k in range(1, 4):
@@ -127,7 +146,9 @@ def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubl
 
 
 def refine_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
-    """Return the same points on the mesh after Catmull-Clark subdivision, whose quads start at old corners.
+    """Return the same surface points as quads and coordinates of the mesh after Catmull-Clark subdivision.
+
+    The first corner of each finer quad is a corner of the coarser face.
 
     mesh : before subdivision
     """

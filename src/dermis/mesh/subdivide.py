@@ -1,4 +1,4 @@
-"""Subdivision: a finer, smoother mesh, whose points are weighted means of control points."""
+"""Subdivision of meshes and heads; points of the finer mesh are weighted means of control points."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Corners = NDArray[np.integer]
 
 
 class SubdividedMesh(NamedTuple):
-    """A finer mesh, and stencils of its points; None for the stencils if the mesh is not subdivided."""
+    """Subdivided mesh with the stencils of its points, which are None at level 0."""
 
     mesh: Mesh
     stencils: Stencils | None
@@ -38,11 +38,11 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Refinement of all meshes of one topology.
+    """Subdivision of all meshes of one topology: v finer vertices at q finer points.
 
     weights : (q, p) weights of the control points in each finer point
-    stencils : the same weights in the form of a rig
-    uv, point : (v, 2) and (v,) of the finer vertices
+    stencils : these weights as a rig stores them
+    uv, point : (v, 2) and (v,) uv and point of the finer vertices
     triangles, material, quads : of the finer mesh, see `Mesh`
     """
 
@@ -55,14 +55,14 @@ class Refinement:
     quads: Ints
 
     def mesh(self, coarse: Mesh) -> Mesh:
-        """Return the refined mesh of a mesh with this topology."""
+        """Return the subdivision of a mesh of this topology."""
         positions = (self.weights @ coarse.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
         return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
-    """Return a head on a subdivided mesh, whose control points are moved by the head's rig.
+    """Return a head with a subdivided mesh, whose control points the head's rig moves.
 
     head : head that is not subdivided yet
     levels : 0 to 3, or a function that returns the levels for the head
@@ -77,7 +77,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
 
 
 def resolve_levels(head: Head, levels: int | Callable[[Head], int]) -> int:
-    """Return the levels of subdivision, given as a number or as a function of the head.
+    """Return the number of subdivision levels for a head, given as a number or as a function of the head.
 
     Raises DermisError for other numbers than 0 to 3.
     """
@@ -92,12 +92,12 @@ def _check_levels(levels: int) -> int:
 
 
 def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
-    """Return a mesh refined `levels` times, with smoothed positions and linearly interpolated uv.
+    """Return a mesh subdivided `levels` times, with smoothed positions and linearly interpolated uv.
 
-    A mesh of more quads than triangles is refined by the rules of Catmull and Clark and moved to the limit
-    surface; others by those of Loop. Positions follow the unique points, so that uv seams neither crack nor
-    crease; open borders are smoothed as curves. Normals and tangents are computed from the result; normals of
-    the file are dropped.
+    A mesh of more quads than triangles is subdivided by the rules of Catmull and Clark and moved to the limit
+    surface; any other by the rules of Loop. Positions depend on points and not on vertices, so that uv seams
+    neither crack nor crease; open borders are smoothed as curves. Normals and tangents are computed from the
+    result; normals of the file are dropped.
 
     levels : 0 to 3, each of which multiplies the number of triangles by four
     """
@@ -108,7 +108,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the refinement of meshes with this mesh's topology, see `subdivide`.
+    """Return the subdivision of all meshes with this mesh's topology; for its rules see `subdivide`.
 
     levels : 1 to 3
     """
@@ -131,7 +131,10 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
 
 
 def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return `_compute_refinement`, cached on disk for large meshes."""
+    """Return the arrays of a subdivision, cached on disk for large meshes.
+
+    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    """
     if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
         return _compute_refinement(mesh, levels, by_quads)
     sources = [mesh.uv, mesh.point, mesh.triangles, mesh.material, mesh.quads]
@@ -143,7 +146,10 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 @logged_step("subdividing the mesh")
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return the corners of the finer faces, and the weights of control points, row by row."""
+    """Return the arrays of a subdivision by name: corners of finer faces, and control point weights.
+
+    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    """
     triangles = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
     faces = polygons(mesh) if by_quads else triangles
     cage = Cage(mesh.uv.astype(np.float64), mesh.point.astype(np.int64), *faces)
@@ -167,9 +173,9 @@ def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 
 def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
-    """Return the corner vertices of all faces (n,), the number of corners of each (f,) and its material (f,).
+    """Return a mesh as polygons: corner vertices (n,), number of corners (f,) and material of each (f,).
 
-    Triangles come first, then quads.
+    Triangles that belong to no quad come first, then quads.
     """
     first, second = mesh.quads.T
     loose = np.delete(np.arange(len(mesh.triangles)), mesh.quads.ravel())
@@ -180,12 +186,12 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) of a subdivided head with levels of subdivision removed where it is flat.
+    """Return triangles (t, 3) of a subdivided head that leave out levels of subdivision in flat regions.
 
     The vertices are those of the subdivided mesh.
 
-    min_faces : smallest number of faces that is left
-    tolerance_mm : largest deviation of the midpoints of sides
+    min_faces : smallest number of faces of the coarsest level
+    tolerance_mm : largest distance of a left out vertex from the coarse edge that replaces it
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -202,7 +208,12 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Coarsen triangles of Loop's rules: each became four, of which the first three are at its corners."""
+    """Leave out levels of Loop subdivision in flat regions.
+
+    Loop's rules divide a triangle into four, the first three of which are at its corners.
+
+    levels : largest number of levels to leave out
+    """
     coarse, finer = triangles, triangles
     for _ in range(levels):
         coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
@@ -213,7 +224,12 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Coarsen quads of Catmull and Clark's rules: a polygon became a quad from each corner to its centre."""
+    """Leave out levels of Catmull-Clark subdivision in flat regions; the result is triangles.
+
+    The rules divide a polygon into quads, one from each corner to its centre.
+
+    levels : largest number of levels to leave out
+    """
     coarse = quads
     for _ in range(levels - 1):
         coarse = coarse[:, 0].reshape(-1, 4)
@@ -231,6 +247,9 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
 
 
 def _deviation_mm(positions_mm: Floats, middle: Corners, start: Corners, end: Corners) -> Floats:
-    """Return the distance of the refined midpoints of sides from the middle between their ends [mm]."""
+    """Return the distance of the vertices in the middle of coarse edges from the edges' midpoints [mm].
+
+    middle, start, end : indices of the vertex in the middle, and of both ends of each edge
+    """
     halfway = 0.5 * (positions_mm[start] + positions_mm[end])
     return np.asarray(np.linalg.norm(positions_mm[middle] - halfway, axis=-1))

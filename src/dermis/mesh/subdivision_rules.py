@@ -1,4 +1,4 @@
-"""One level of Loop and of Catmull-Clark subdivision: the weights of old points in each new point."""
+"""Rules for one level of Loop or Catmull-Clark subdivision: the weights of old points in each new point."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 
 class Cage(NamedTuple):
-    """Polygons that are refined.
+    """Polygons before a level of subdivision.
 
     uv : (v, 2) of each vertex
     point : (v,) point of each vertex
     corner : (n,) vertices at the corners, face by face
     sides : (f,) number of corners of each face
-    material : (f,)
+    material : (f,) material of each face
     """
 
     uv: Doubles
@@ -34,16 +34,17 @@ class Cage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sides of all faces, each from a corner to the next, and the edges that they are on.
+    """Half-edges of all faces, called sides, from each corner to the next, and the edges that they are on.
 
     points : number of points
     start : (n,) point where each side starts
-    previous : (n,) side of the same face that ends there
+    previous : (n,) preceding side of the same face
     face : (n,) face of each side
-    ends : (e, 2) points of each edge
+    ends : (e, 2) points at the ends of each edge
     edge : (n,) edge of each side
-    border : (e,) whether an edge has another number of sides than two
-    seam_edges, seam_edge : as `ends` and `edge` for vertices, where an edge on a uv seam counts twice
+    border : (e,) whether the number of sides of an edge is not two
+    seam_edges, seam_edge : edges as pairs of vertices, and the one of each side; an edge on a uv seam counts
+        twice
     """
 
     points: int
@@ -67,7 +68,7 @@ class _Sides:
         return np.bincount(self.ends[self.border].ravel(), minlength=self.points)
 
 
-def _sides(cage: Cage) -> _Sides:
+def _find_sides(cage: Cage) -> _Sides:
     last = np.cumsum(cage.sides) - 1
     first = last + 1 - cage.sides
     index = np.arange(len(cage.corner))
@@ -82,22 +83,22 @@ def _sides(cage: Cage) -> _Sides:
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of the finer points, and four triangles for each triangle.
+    """Return the weights (q, p) of old points in the new ones, and four triangles for each triangle.
 
-    Three of them are at its corners and one between. Old points come first, then one point on each edge.
-    Borders become cubic B-splines.
+    Three of them are at its corners and one in the middle. Old points come first, then one point on each
+    edge. Borders become cubic B-splines.
 
     Source: [Loop1987], with Warren's weights of the old points.
     """
     from scipy.sparse import vstack
 
-    sides = _sides(cage)
+    sides = _find_sides(cage)
     # total weight of all neighbours
     neighbours = np.where(sides.valence == 3, 9 / 16, 3 / 8)
     old = _old_point_weights(sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), along=1 / 8)
     opposite = sides.start[sides.previous]
     ends = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8))
-    new = ends + _matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), ends.shape)
+    new = ends + _sparse_matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), ends.shape)
     uv, point = _add_edge_vertices(cage, sides)
     a, b, c = cage.corner.reshape(-1, 3).T
     ab, bc, ca = (len(cage.uv) + sides.seam_edge).reshape(-1, 3).T
@@ -107,24 +108,24 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of the finer points, and a quad for each corner of each face.
+    """Return the weights (q, p) of old points in the new ones, and a quad for each corner of each face.
 
-    Old points come first, then one point on each edge, then one in each face. A quad starts at its old
-    corner, and the centre of the face is opposite. Borders become cubic B-splines.
+    Old points come first, then one point on each edge, then one in each face. The first corner of a quad is
+    an old point, the third is the centre of the face. Borders become cubic B-splines.
 
     Sources: [CatmullClark1978]; uv and borders as in [DeRose1998].
     """
     from scipy.sparse import vstack
 
-    sides = _sides(cage)
+    sides = _find_sides(cage)
     n, count = np.maximum(sides.valence, 1), len(cage.sides)
-    centres = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
+    centres = _sparse_matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
     new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4))
     weights = _inner_edge_weights(sides, 1 / 4)
-    new += _matrix(sides.edge, sides.face, weights, (len(sides.ends), count)) @ centres
+    new += _sparse_matrix(sides.edge, sides.face, weights, (len(sides.ends), count)) @ centres
     old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8)
     weights = _inner_point_weights(sides, 1 / n**2)
-    old += _matrix(sides.start, sides.face, weights, (sides.points, count)) @ centres
+    old += _sparse_matrix(sides.start, sides.face, weights, (sides.points, count)) @ centres
     uv, point = _add_edge_vertices(cage, sides)
     centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
     edge, face = len(cage.uv) + sides.seam_edge, len(uv) + sides.face
@@ -139,37 +140,45 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def catmull_clark_limit(cage: Cage) -> csr_array:
-    """Return the weights (p, p) that move the points of quads to the limit surface.
+    """Return the weights (p, p) that move the points of a mesh of quads to its limit surface.
 
     Source: [Halstead1993]; borders as cubic B-splines.
     """
-    sides = _sides(cage)
+    sides = _find_sides(cage)
     n = np.maximum(sides.valence, 1)
     direct = _old_point_weights(sides, n / (n + 5), 4 / (n * (n + 5)), along=1 / 6)
     opposite = sides.start.reshape(-1, 4)[:, [2, 3, 0, 1]].ravel()
-    diagonal = _matrix(sides.start, opposite, _inner_point_weights(sides, 1 / (n * (n + 5))), direct.shape)
+    diagonal = _sparse_matrix(
+        sides.start, opposite, _inner_point_weights(sides, 1 / (n * (n + 5))), direct.shape
+    )
     limit: csr_array = direct + diagonal
     return limit
 
 
 def _inner_edge_weights(sides: _Sides, weight: float) -> Doubles:
-    """Return the weight (n,) for sides on inner edges, 0 for sides on borders."""
+    """Return an array (n,) over sides that is `weight` on inner edges and 0 on borders."""
     return np.where(sides.border, 0, weight)[sides.edge]
 
 
 def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
-    """Return the weight (p,) of the start of each side (n,), 0 for points on borders."""
+    """Return for each side the weight of the point where it starts, (n,), 0 for points on borders.
+
+    weight : (p,) weight of each point
+    """
     return np.where(sides.border_valence == 0, weight, 0)[sides.start]
 
 
 def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
-    """Return the matrix (e, p) that weights both ends of each edge (e,)."""
+    """Return the matrix (e, p) that gives the points at both ends of an edge its weight.
+
+    weight : (e,) weight of each edge
+    """
     rows = np.repeat(np.arange(len(sides.ends)), 2)
-    return _matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
+    return _sparse_matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
 
 
 def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
-    """Return the weights (p, p) of the old points.
+    """Return the weights (p, p) of old points in the new positions of the old points.
 
     own, each : (p,) for inner points: weight of the point itself, and of each neighbour
     along : for border points: weight of either neighbour on the border
@@ -182,19 +191,19 @@ def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float)
     own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
     index, weights = np.arange(sides.points), np.concatenate((own_weight, neighbour_weight))
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
-    return _matrix(rows, columns, weights, (sides.points, sides.points))
+    return _sparse_matrix(rows, columns, weights, (sides.points, sides.points))
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
-    """Return uv and point of the old vertices and of a vertex in the middle of each edge."""
+    """Return uv and point of the old vertices, followed by those of a vertex in the middle of each edge."""
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))
     return uv, np.concatenate((cage.point, sides.points + edge_of_cut))
 
 
-def _matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
-    """Return the sparse matrix of the nonzero weights; those of the same row and column are summed."""
+def _sparse_matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
+    """Return a sparse matrix of nonzero weights; those with equal row and column are summed."""
     from scipy.sparse import coo_array
 
     used = weights != 0

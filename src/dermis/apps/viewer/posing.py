@@ -40,7 +40,7 @@ def bone_angles(scene: Scene, bone: str) -> Angles:
     if values.shape == (3,):
         x, y, z = values.tolist()
         return x, y, z
-    matrix = skeleton.head_space_changes([skeleton.index[bone]], values[None])[0, :3, :3]
+    matrix = skeleton.head_space_transforms([skeleton.index[bone]], values[None])[0, :3, :3]
     return matrix_angles(matrix / np.linalg.norm(matrix, axis=0))
 
 

@@ -1,1 +1,1 @@
-"""Eyeballs of realistic shape in heads from files, fitted to the file's eyeballs and lids."""
+"""Eyeballs of realistic shape for heads from files, fitted to the eyeballs and lids of the file."""

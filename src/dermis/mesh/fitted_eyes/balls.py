@@ -1,4 +1,4 @@
-"""Detection of the two eyeballs of a head among the pieces that its file declares to be eyes."""
+"""Detection of the two eyeballs of a head in the meshes that its file declares to be eyes."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere 
 
 
 @dataclass(frozen=True, eq=False)
-class Ball:
-    """An eyeball of a file.
+class DetectedEyeball:
+    """Eyeball found in a file.
 
-    sphere : sphere of its white
-    gaze : (3,) unit vector along which it looks
-    cornea : whether a cornea shows the gaze; else it is straight ahead
-    points : (n,) points of the mesh that belong to it
+    sphere : sphere fitted to the sclera
+    gaze : (3,) unit vector of the direction of gaze
+    cornea : whether `gaze` is that of a bulging cornea; else the eye is assumed to look straight ahead
+    points : (n,) indices of the mesh points that belong to the eyeball
     """
 
     sphere: Sphere
@@ -43,7 +43,7 @@ class Ball:
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
+class _EyePiece:
     points: Index
     area: Doubles  # around each point [mm2]
     sphere: Sphere
@@ -54,7 +54,7 @@ class _Piece:
 
     @property
     def fault(self) -> str:
-        """Return the reason why the piece is no eyeball, or an empty text if it is one."""
+        """Return why this connected piece is not an eyeball, as a verb phrase; empty if it is one."""
         (low, high), (_, radius, deviation) = RADIUS_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
@@ -66,30 +66,33 @@ class _Piece:
         return "" if covered >= _MIN_COVERED else f"is only {covered:.0%} of a ball"
 
 
-def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
-    """Return the left and right eyeball of a mesh, or None and the reason why there are not two.
+def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
+    """Find the left and the right eyeball of a mesh.
 
-    The reason is empty if the file declares no eyes.
+    If there are not two, the result is None with the reason, which is empty if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
         return None, ""
-    pieces = sorted(_pieces(mesh, eye_triangles), key=lambda piece: -float(piece.area.sum()))
-    chosen: list[_Piece] = []
+    pieces = sorted(_eye_pieces(mesh, eye_triangles), key=lambda piece: -float(piece.area.sum()))
+    chosen: list[_EyePiece] = []
     for piece in pieces:
         nested = any(_distance_in_radii(piece.sphere.centre, one) < 1.0 for one in chosen)
         if not piece.fault and not nested:
             chosen.append(piece)
     if len(chosen) == 2:
         left, right = sorted(chosen, key=lambda piece: -float(piece.sphere.centre[0]))
-        return _with_gaze(mesh, left, right, pieces), ""
+        return _add_gaze(mesh, left, right, pieces), ""
     names = ", ".join(sorted({repr(one.name) for one in mesh.materials if one.eye}))
     count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)} instead of two"
     return None, f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].fault}'}"
 
 
-def _pieces(mesh: Mesh, eye_triangles: Index) -> list[_Piece]:
-    """Return the connected pieces of some triangles."""
+def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
+    """Return the connected components of the eye triangles, each with a fitted sphere.
+
+    eye_triangles : (n,) indices of the triangles whose material is declared to be an eye
+    """
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
     points, own = np.unique(corners, return_inverse=True)
     own = own.reshape(-1, 3)
@@ -101,17 +104,23 @@ def _pieces(mesh: Mesh, eye_triangles: Index) -> list[_Piece]:
     for piece in range(int(label.max()) + 1):
         inside = label == piece
         sphere = fit_sphere(positions[inside], area[inside])
-        pieces.append(_Piece(points[inside], area[inside], sphere))
+        pieces.append(_EyePiece(points[inside], area[inside], sphere))
     return pieces
 
 
-def _distance_in_radii(points: Doubles, piece: _Piece) -> Doubles:
-    """Return the distance of points (..., 3) from the centre of a ball, in radii."""
+def _distance_in_radii(points: Doubles, piece: _EyePiece) -> Doubles:
+    """Return the distances of points (..., 3) from the centre of an eyeball, divided by its radius."""
     return np.asarray(np.linalg.norm(points - piece.sphere.centre, axis=-1) / piece.sphere.radius)
 
 
-def _with_gaze(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> tuple[Ball, Ball]:
-    """Return both eyeballs with all pieces inside them, and their gaze by the cornea or straight ahead."""
+def _add_gaze(
+    mesh: Mesh, left: _EyePiece, right: _EyePiece, pieces: list[_EyePiece]
+) -> tuple[DetectedEyeball, DetectedEyeball]:
+    """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
+
+    left, right : pieces that are the scleras
+    pieces : all pieces; those inside a sclera belong to its eyeball
+    """
     positions = mesh.points_mm
     centre = (left.sphere.centre + right.sphere.centre) / 2
     ahead = np.cross(left.sphere.centre - right.sphere.centre, (0.0, 1.0, 0.0))
@@ -123,16 +132,16 @@ def _with_gaze(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) ->
         points, area = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "area"))
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
         gaze = centre + _FOCUS_MM * ahead - ball.sphere.centre if axis is None else axis
-        balls.append(Ball(ball.sphere, gaze / np.linalg.norm(gaze), axis is not None, points))
+        balls.append(DetectedEyeball(ball.sphere, gaze / np.linalg.norm(gaze), axis is not None, points))
     return balls[0], balls[1]
 
 
 class Sphere(NamedTuple):
-    """A sphere fitted to points.
+    """Sphere fitted to points.
 
     centre : (3,) [mm]
     radius : [mm]
-    deviation : 85th percentile by area of the distance to the sphere, as a fraction of the radius [-]
+    deviation : 85th percentile by area of the points' distance from the sphere, divided by the radius [-]
     """
 
     centre: Doubles
@@ -141,12 +150,13 @@ class Sphere(NamedTuple):
 
 
 def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
-    """Fit a sphere to most of a surface; outliers such as a cornea count little.
+    """Fit a sphere to a surface robustly: outliers such as a cornea get low weights.
 
-    This is a least squares fit of |p|^2 = 2 p.c + (r^2 - |c|^2), iterated with Cauchy weights.
+    For centre c and radius r this is a least squares fit of |p|² = 2 p·c + (r² - |c|²), with Cauchy weights
+    that are updated iteratively.
 
-    points : (n, 3) [mm]
-    area : (n,) area of the surface around each point [mm2]
+    points : (n, 3) points p of the surface [mm]
+    area : (n,) area of the surface around each point [mm²]
     """
     weight, fraction = np.ones(len(points)), area / area.sum()
     start = points.mean(axis=0)
@@ -168,10 +178,12 @@ def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
 
 
 def corneal_axis(points: Doubles, area: Doubles, ball: Sphere, ahead: Doubles) -> Doubles | None:
-    """Return the direction (3,) of the cornea on a ball, or None if nothing bulges like one.
+    """Return the unit vector (3,) from an eyeball's centre to its cornea, or None if there is no bulge.
 
-    points, area : all points of the eye and their areas, see `fit_sphere`
-    ahead : (3,) unit vector, roughly where the head looks
+    points : (n, 3) all points of the eye [mm]
+    area : (n,) area of the surface around each point [mm²]
+    ball : sphere of the sclera
+    ahead : (3,) unit vector, roughly the direction in which the head looks
     """
     offset = points - ball.centre
     distance = np.linalg.norm(offset, axis=1)

@@ -1,4 +1,4 @@
-"""Rig of fitted eyeballs: they follow the bones and targets of those that they replace."""
+"""Rig of fitted eyeballs, which move like the eyeballs of the file that they replace."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.mesh.rig import INFLUENCES, BoneRotation, MorphTargets, Rig, RigidFollowers, Skeleton
 from dermis.mesh.rotations import matrix_angles, rigid_motion
 
-_ROOT, _NAMES = "scene", ("eye.L", "eye.R")
+_ROOT_NAME, _BONE_NAMES = "scene", ("eye.L", "eye.R")
 _MAX_OTHER_FOLLOWERS = 0.05
 """Of the points that follow a bone: with more beside the eye's, it is the head's and not the eye's."""
 _MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02
 
 
-class Eyeball(NamedTuple):
-    """An eyeball that replaces one of a file.
+class FittedEyeball(NamedTuple):
+    """Fitted eyeball that replaces an eyeball of a file.
 
     centre : (3,) [mm]
-    points : (n, 3) control points [mm]
+    points : (n, 3) control points of the fitted eyeball [mm]
     replaced : (m,) indices of the control points of the file's eyeball
     """
 
@@ -31,10 +31,10 @@ class Eyeball(NamedTuple):
     replaced: Index
 
 
-def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
-    """Return the rig with additional eyeballs, which follow the bones and targets of the old ones.
+def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
+    """Return a rig with fitted eyeballs, which follow bones and targets like the eyeballs of the file.
 
-    Their control points come after all others.
+    The control points of the fitted eyeballs come after all others.
     """
     skeleton, bones = _with_eye_bones(rig, eyeballs)
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
@@ -57,14 +57,19 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[Eyeball]) -> Rig:
     )
 
 
-def _with_eye_bones(rig: Rig, eyeballs: Sequence[Eyeball]) -> tuple[Skeleton, list[int]]:
-    """Return the skeleton with a bone for each eyeball, the file's own if it has one, and their indices."""
+def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skeleton, list[int]]:
+    """Return a skeleton that moves the fitted eyeballs, and the index of the bone of each.
+
+    An eyeball without a bone of its own in the file gets a new one.
+    """
     skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
     bones = _eye_bones(skeleton, eyeballs)
     for k, eyeball in enumerate(eyeballs):
         if bones[k] < 0:
             parent = int(np.argmax(_follower_counts(skeleton, eyeball)))
-            name = next(name for name in (_NAMES[k], f"fitted {_NAMES[k]}") if name not in skeleton.names)
+            name = next(
+                name for name in (_BONE_NAMES[k], f"fitted {_BONE_NAMES[k]}") if name not in skeleton.names
+            )
             skeleton, bones[k] = _with_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
     for eyeball, bone in zip(eyeballs, bones, strict=True):
         count = len(eyeball.points)
@@ -80,15 +85,18 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[Eyeball]) -> tuple[Skeleton, li
 
 
 def _single_bone(count: int) -> Skeleton:
-    """Return a skeleton of one bone that all points follow."""
+    """Return a skeleton with a single bone, which all points follow.
+
+    count : number of points
+    """
     identity = np.eye(4)[None]
     bone, weight = np.zeros((count, INFLUENCES), np.int32), np.zeros((count, INFLUENCES), np.float32)
     weight[:, 0] = 1.0
-    return Skeleton((_ROOT,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
+    return Skeleton((_ROOT_NAME,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
 
 
-def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[Eyeball]) -> list[int]:
-    """Return the bone that moves each eyeball and nothing else, -1 for none."""
+def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
+    """Return the index of the bone that moves only the eyeball, for each eyeball; -1 if there is none."""
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
@@ -99,14 +107,18 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[Eyeball]) -> list[int]:
     return bones
 
 
-def _follower_counts(skeleton: Skeleton, eyeball: Eyeball) -> Doubles:
-    """Return the number of points (b,) of the replaced eyeball that follow each bone."""
+def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
+    """Return the number of points of the file's eyeball that follow each bone, weighted, (b,)."""
     bone, weight = skeleton.bone[eyeball.replaced], skeleton.weight[eyeball.replaced]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
 def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -> Skeleton:
-    """Return the skeleton with another bone, whose joint is at a position in head space [mm]."""
+    """Return a skeleton with an additional bone.
+
+    parent : index of its parent
+    origin_mm : (3,) position of its joint in head space [mm]
+    """
     to_head = np.eye(4)
     to_head[:3, 3] = origin_mm
     world = np.linalg.inv(skeleton.to_head) @ to_head
@@ -120,9 +132,15 @@ def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -
 
 
 def _rigid_targets(
-    rig: Rig, eyeball: Eyeball, bone: str, origin_mm: Doubles
+    rig: Rig, eyeball: FittedEyeball, bone: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
-    """Return how targets move an eyeball rigidly: rotations of its bone, and shifts by target index [mm]."""
+    """Approximate the displacements of the file's eyeball by morph targets as rigid motions.
+
+    The result is the rotations of the eyeball's bone, and the translation (3,) by target index [mm].
+
+    bone : name of the eyeball's bone
+    origin_mm : (3,) position of its joint [mm]
+    """
     rest = rig.positions_mm[eyeball.replaced].astype(np.float64)
     deltas = rig.targets.dense(eyeball.replaced, len(rig.positions_mm)).astype(np.float64)
     rotations, shifts = list[BoneRotation](), dict[int, Doubles]()
@@ -143,7 +161,11 @@ def _rigid_targets(
 
 
 def _with_shifts(targets: MorphTargets, shifts: dict[int, Doubles], points: Index) -> MorphTargets:
-    """Return the targets with a shift of some points added to them."""
+    """Return morph targets that also translate the points of a fitted eyeball.
+
+    shifts : translation (3,) by target index [mm]
+    points : (n,) indices of the control points of the eyeball
+    """
     if not shifts:
         return targets
     point, delta, count = list[Ints](), list[Floats](), [0]

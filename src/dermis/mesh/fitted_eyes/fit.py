@@ -1,4 +1,4 @@
-"""Replacement of a file's eyeballs by eyeballs of realistic shape."""
+"""Replacement of the eyeballs of a file by eyeballs of realistic shape."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from dermis.mesh.eyeball import (
     limbus_plane_mm,
 )
 from dermis.mesh.eyes import Eyes
-from dermis.mesh.fitted_eyes.balls import Ball, Sphere, find_balls
-from dermis.mesh.fitted_eyes.eyeball_rig import Eyeball, with_eyeballs
-from dermis.mesh.fitted_eyes.lids import eye_axes, lids_before
+from dermis.mesh.fitted_eyes.balls import DetectedEyeball, Sphere, find_eyeballs
+from dermis.mesh.fitted_eyes.eyeball_rig import FittedEyeball, with_eyeballs
+from dermis.mesh.fitted_eyes.lids import eye_axes, lids_in_front
 from dermis.mesh.geometry import split_quads
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
 _SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
-_NAMES = "left eye", "right eye"
-_INWARDS = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
+_MATERIAL_NAMES = "left eye", "right eye"
+_INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
 
-class _Shape(NamedTuple):
+class _EyeShape(NamedTuple):
     """Shape of a fitted eye.
 
-    Corneas and irises hardly differ between people: larger balls get a cornea of adult size, smaller ones are
+    Corneas and irises hardly differ between people: larger balls get a cornea of adult size, smaller eyes are
     scaled as a whole.
 
     axis : (3,) unit vector from the centre to the cornea
-    radius_mm, centre_offset_mm : see `Eyes`
-    scale : length of 1 mm of an adult eye in the head [mm]
+    radius_mm, centre_offset_mm : ball of the eye before scaling, see `Eyes` [mm]
+    scale : size of the eye relative to an adult's, at most 1 [-]
     """
 
     axis: Doubles
@@ -62,19 +62,21 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     look : appearance of the eyes
     """
     mesh, control = head.mesh, head.control
-    balls, reason = find_balls(coarse or mesh)
+    balls, reason = find_eyeballs(coarse or mesh)
     if balls is None:
         return replace(head, note=reason)
     replaced = _ball_triangles(mesh, control.stencils, balls)
-    shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
+    shapes = _eye_shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
     points, quads = build_eyeball(_SIDE)
     pairs = list(zip(balls, shapes, strict=True))
-    eyeballs = [Eyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs]
+    eyeballs = [
+        FittedEyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs
+    ]
     vertex_point = mesh.point if control.vertex_point is None else control.vertex_point
     rig = with_eyeballs(replace(control, vertex_point=vertex_point), eyeballs)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
-        rig = replace(rig, stencils=_extended(control.stencils, begin, 2 * count))
+        rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
     new_mesh = _replace_eyeballs(mesh, replaced, [one.points for one in eyeballs], quads)
     starts = np.array([begin, begin + count], np.int32)
     apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_SIDE))
@@ -85,8 +87,13 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     return replace(head, mesh=new_mesh, rig=rig, eyes=eyes)
 
 
-def _ball_triangles(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -> tuple[Index, Index]:
-    """Return the triangles of each eyeball in a mesh that may be subdivided."""
+def _ball_triangles(
+    mesh: Mesh, stencils: Stencils | None, balls: tuple[DetectedEyeball, DetectedEyeball]
+) -> tuple[Index, Index]:
+    """Return the indices of the triangles of each eyeball.
+
+    stencils : of a subdivided mesh; None if it is not subdivided
+    """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
         first = stencils.point[stencils.first[first]]
@@ -94,33 +101,35 @@ def _ball_triangles(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ba
     return left, right
 
 
-def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
-    """Return the shapes of both eyes; eyes without a cornea are aligned with the lids before them.
+def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeball]) -> list[_EyeShape]:
+    """Return the shapes of both eyes.
 
-    corners_mm : (f, 3, 3) corners of all other triangles
+    The axis of an eyeball without a cornea points through the opening of the lids in front of it.
+
+    corners_mm : (f, 3, 3) corners of all triangles that are not eyeballs
     """
-    lids = [lids_before(corners_mm, ball.sphere, ball.gaze) for ball in balls]
-    (left, a), (right, b) = (one.iris for one in lids)
-    outwards, up = (left - right) / 2 - _INWARDS * (left != right), (a + b) / 2
+    lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in balls]
+    (left, a), (right, b) = (one.opening_angles for one in lids)
+    outwards, up = (left - right) / 2 - _INWARD_ANGLE * (left != right), (a + b) / 2
     shapes = []
     for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
         if not ball.cornea:
             axis = lid.direction(side * outwards, up)
-            sunk = lid.sunk_mm(axis, scale) / scale
+            sunk = lid.cornea_recess_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
         offset = limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk
-        shapes.append(_Shape(axis, radius, offset, scale))
+        shapes.append(_EyeShape(axis, radius, offset, scale))
     return shapes
 
 
-def _eyeball_points(ball: Sphere, shape: _Shape) -> Doubles:
-    """Return the points (n, 3) of an eyeball in the head [mm]."""
+def _eyeball_points(ball: Sphere, shape: _EyeShape) -> Doubles:
+    """Return the points (n, 3) of a fitted eyeball in head space [mm]."""
     return np.asarray(ball.centre + shape.scale * _shape_points(shape) @ eye_axes(shape.axis))
 
 
-def _shape_points(shape: _Shape) -> Doubles:
-    """Return the points (n, 3) of an eyeball around its centre, with a cornea of adult size [mm]."""
+def _shape_points(shape: _EyeShape) -> Doubles:
+    """Return the points (n, 3) of an eyeball before scaling, about its centre and with axis +Z [mm]."""
     points, _ = build_eyeball(_SIDE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
@@ -134,10 +143,11 @@ def _shape_points(shape: _Shape) -> Doubles:
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), along], axis=1)
 
 
-def _extended(stencils: Stencils, begin: int, count: int) -> Stencils:
-    """Return stencils with additional control points that are points of the mesh themselves.
+def _extend_stencils(stencils: Stencils, begin: int, count: int) -> Stencils:
+    """Return stencils with additional mesh points that coincide with additional control points.
 
-    begin, count : index of the first one and their number
+    begin : index of the first additional control point
+    count : number of additional points
     """
     own = np.arange(count, dtype=np.int32)
     return Stencils(
@@ -148,13 +158,18 @@ def _extended(stencils: Stencils, begin: int, count: int) -> Stencils:
 
 
 def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index) -> Mesh:
-    """Return the mesh with its eyeballs replaced; other points keep their indices."""
+    """Return a mesh with fitted eyeballs instead of those of the file; other points keep their indices.
+
+    balls : indices of the triangles of each eyeball of the file
+    positions : (n, 3) points of each fitted eyeball [mm]
+    quads : (q, 4) of a fitted eyeball
+    """
     remains = np.ones(len(mesh.triangles), bool)
     remains[np.concatenate(balls)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
     replaced = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
-    pairs = zip(_NAMES, replaced, strict=True)
+    pairs = zip(_MATERIAL_NAMES, replaced, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
     new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
@@ -174,7 +189,11 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
 
 
 def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Material, ...]) -> Mesh:
-    """Return a mesh of both eyeballs, each with its own material."""
+    """Return one mesh of both fitted eyeballs, each with its own material.
+
+    positions : (n, 3) points of each eyeball [mm]
+    quads : (q, 4) of an eyeball
+    """
     count, faces = len(positions[0]), len(quads)
     return build_mesh(
         np.concatenate(positions),

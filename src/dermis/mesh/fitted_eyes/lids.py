@@ -1,4 +1,4 @@
-"""Lids before an eyeball: the direction of gaze through their opening, and corneas that stay behind them."""
+"""Lids in front of an eyeball: they suggest the direction of gaze and limit the position of the cornea."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Lids:
-    """Surfaces in front of an eyeball, sampled by parallel rays along its axis.
+    """Surfaces in front of an eyeball, sampled by parallel rays towards it.
 
-    ball : the eyeball
-    axes : (3, 3) rows across, up and ahead
-    corners : (f, 3, 3) triangles around the eyeball, relative to its centre in these axes [mm]
+    ball : sphere of the eyeball
+    axes : (3, 3) unit vectors as rows: across (to the side), up and ahead
+    corners : (f, 3, 3) corners of the head's triangles in these axes, relative to the ball's centre [mm]
     """
 
     ball: Sphere
@@ -37,19 +37,22 @@ class Lids:
 
     @cached_property
     def ray_positions(self) -> Doubles:
-        """Return the positions (n, 2) of the rays in the plane through the ball's centre [mm]."""
+        """Return the positions (n, 2) of the rays across and up, relative to the ball's centre [mm]."""
         line = np.linspace(-_EXTENT, _EXTENT, _RAYS) * self.ball.radius
         x, y = np.meshgrid(line, line)
         return np.stack([x.ravel(), y.ravel()], axis=1)
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return the depth (n,) of the ball's front along each ray, from its centre [mm]."""
+        """Return the height (n,) of the ball's front above its centre along each ray [mm]."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return the depth (n,) of the first other surface along each ray, -inf for none [mm]."""
+        """Return the height (n,) of the frontmost lid or skin above the ball's centre, along each ray [mm].
+
+        It is -inf for rays that hit none.
+        """
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
         triangle, ray = self._candidate_pairs(corners)
         a, b, c = np.moveaxis(corners[triangle], 1, 0)
@@ -64,7 +67,10 @@ class Lids:
         return front
 
     def _candidate_pairs(self, corners: Doubles) -> tuple[Index, Index]:
-        """Return pairs of triangles and rays where the ray is within the triangle's bounding box."""
+        """Return pairs of triangles and rays, where the ray is within the triangle's bounding box.
+
+        corners : (f, 3, 3) corners of the triangles [mm]
+        """
         extent = _EXTENT * self.ball.radius
         cell = (corners[:, :, :2] + extent) * (_RAYS - 1) / (2 * extent)
         first = np.maximum(np.ceil(cell.min(axis=1)), 0).astype(np.int64)
@@ -75,11 +81,11 @@ class Lids:
         return triangle, (first[triangle, 1] + row) * _RAYS + first[triangle, 0] + column
 
     @property
-    def iris(self) -> tuple[float, float]:
-        """Return the angles across and up at which an iris is in the opening of the lids [rad].
+    def opening_angles(self) -> tuple[float, float]:
+        """Return the angles across and up that point an eye at the middle of the lids' opening [rad].
 
-        They are zero if there are not lids on all sides. In files, the lids are the best indication of the
-        gaze, as eyeballs and lids seldom have the same centre.
+        They are 0 if there are no lids on some side. In files, the lids are the best indication of the gaze,
+        as eyeballs and lids seldom have the same centre.
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_ABOVE_CENTRE)):
@@ -94,15 +100,15 @@ class Lids:
         return angles[0], angles[1]
 
     def direction(self, across: float, up: float) -> Doubles:
-        """Return the unit vector (3,) at angles across and up [rad]."""
+        """Return the unit vector (3,) in head space at angles across and up from straight ahead [rad]."""
         local = np.sin(across) * np.cos(up), np.sin(up), np.cos(across) * np.cos(up)
         return np.asarray(np.array(local) @ self.axes)
 
-    def sunk_mm(self, axis: Doubles, scale: float) -> float:
-        """Return the distance by which a cornea has to be moved inwards to stay behind the lids [mm].
+    def cornea_recess_mm(self, axis: Doubles, scale: float) -> float:
+        """Return the distance by which a cornea must be moved inwards to stay behind the lids [mm].
 
-        axis : (3,) unit vector of the gaze
-        scale : size of the cornea, 1 for that of an adult
+        axis : (3,) unit vector of the eye's axis
+        scale : size of the cornea relative to an adult's [-]
         """
         local, radius = self.axes @ axis, CORNEA_MM * scale
         centre = scale * (limbus_plane_mm(self.ball.radius / scale) - limbus_plane_mm(CORNEA_MM))
@@ -114,18 +120,19 @@ class Lids:
         return float(np.clip(protrusion - _MAX_PROTRUSION_MM, 0.0, deepest))
 
 
-def lids_before(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
-    """Return the lids before an eyeball.
+def lids_in_front(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
+    """Return the surfaces in front of an eyeball.
 
-    corners_mm : (f, 3, 3) corners of all triangles but those of eyeballs, in head space
-    ahead : (3,) unit vector of the gaze
+    corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs, in head space
+    ball : sphere of the eyeball
+    ahead : (3,) unit vector of the direction of gaze
     """
     axes = eye_axes(ahead)
     return Lids(ball, axes, (corners_mm.astype(np.float64) - ball.centre) @ axes.T)
 
 
 def eye_axes(axis: Doubles) -> Doubles:
-    """Return the axes (3, 3) across, up and along a direction, as rows."""
+    """Return unit vectors as rows (3, 3): across (horizontal), up, and `axis` itself."""
     across = np.cross((0.0, 1.0, 0.0), axis)
     across /= np.linalg.norm(across)
     return np.stack([across, np.cross(axis, across), axis])
