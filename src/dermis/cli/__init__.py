@@ -1,4 +1,4 @@
-"""The command `dermis`, with one module per subcommand."""
+"""The command line program `dermis`, with one module per subcommand."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def _run() -> int:
-    """Run the subcommand named on the command line and return its exit status."""
+    """Run the subcommand that the command line names, and return its exit status."""
     from dermis.base.command_line import add_command, make_app, run_app
 
     app = make_app("dermis", "Physically based rendering of human skin in real time.")

@@ -18,7 +18,7 @@ from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
 from dermis.cli.options import AdapterOption, Flag, Integer, JsonOption, Options, OutputPath
 from dermis.cli.output_options import AnimationOutput
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene, note_subdivision
+from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene, note_subdivision
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -30,10 +30,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _AnimatedScene:
-    """Scene animated by a clip, with frame k at time k / rate.
+    """Scene whose head is moved by a clip; frame k shows the time k / rate.
 
+    scene, settings : scene without the motion, and settings of all frames
+    clip : motion of the head
     rate : frame rate [1/s]
-    first : number of the first frame
+    first : number of the first frame, at which automatic exposure is metered
     """
 
     scene: Scene
@@ -43,7 +45,7 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene of each frame; targets and bones without animation keep the pose of the scene."""
+        """Yield the scene at each frame; what the clip does not animate keeps the pose of the scene."""
         from dermis.mesh.pose import merge_poses
 
         for frame in numbers:
@@ -65,7 +67,7 @@ def animate(
     crf: Integer = None,
     overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
     names: Flag = False,
-    scene: SceneOptions = DEFAULTS,
+    scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
 ) -> int:
@@ -127,9 +129,11 @@ def animate(
         note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
     animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
-    missing = target.missing(numbers, settings.size, _frame_digest(animation, scene, head, motion_path))
+    missing = target.frames_to_render(
+        numbers, settings.size, _frame_digest(animation, scene, head, motion_path)
+    )
     draw_started = time.perf_counter()
-    adapter_name = _draw(animation, missing, target, adapter) if missing else None
+    adapter_name = _render_frames(animation, missing, target, adapter) if missing else None
     now = time.perf_counter()
     report = {
         "file": str(output),
@@ -146,15 +150,17 @@ def animate(
     return 0
 
 
-def _draw(animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str) -> str:
-    """Render the frames, write them, and return the name of the adapter."""
+def _render_frames(
+    animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str
+) -> str:
+    """Render and write the frames with the given numbers, and return the name of the adapter."""
     from dermis.frame.renderer import Renderer
 
     renderer, size = Renderer(adapter), animation.settings.size
-    options: Options = {**animation.settings.model_dump(), "linear": target.linear}
-    options["exposure"] = _exposure(animation, renderer)
-    options["alpha"] = target.numbered and animation.settings.background == "none"
-    writing, bar = target.writing(size, animation.rate), progress_bar("rendering frames")
+    options: Options = {**animation.settings.model_dump(), "linear": target.is_linear}
+    options["exposure"] = _common_exposure(animation, renderer)
+    options["alpha"] = target.is_numbered and animation.settings.background == "none"
+    writing, bar = target.open_writer(size, animation.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
         pictures = renderer.render_many(animation.scenes(numbers), **options)
         for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
@@ -163,8 +169,8 @@ def _draw(animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOu
     return str(renderer.device.adapter.name)
 
 
-def _exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the --exposure value, or the one metered at the first frame."""
+def _common_exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
+    """Return one exposure for all frames: the --exposure value, or the one metered at the first frame."""
     if animation.settings.exposure != "auto":
         return animation.settings.exposure
     (scene,) = animation.scenes([animation.first])
@@ -174,9 +180,9 @@ def _exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
 
 
 def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
-    """Return a hash that changes whenever the appearance of the frames may change.
+    """Return a hash of everything that determines the frames, by which images of earlier runs are reused.
 
-    files : head and motion as named on the command line; files contribute their size and modification time
+    files : head and motion as named on the command line; of files, size and modification time are hashed
     """
     scene = animation.scene
     names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
@@ -189,7 +195,7 @@ def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str)
 
 
 def _file_state(name: str) -> str:
-    """Return the path, size and modification time of a file; the name itself if no such file exists."""
+    """Return the path, size and modification time of a file as text; the name itself if it is not a file."""
     path = Path(name.partition("#")[0])
     if not path.exists():
         return name
@@ -218,11 +224,11 @@ _DEFAULT_RATE = 30.0
 
 @dataclass(frozen=True)
 class TimeSpan:
-    """Time span and frame rate of an animation; None for each option that was omitted.
+    """Time span and frame rate from the options of `dermis animate`; fields of omitted options are None.
 
-    begin, end : times within the motion [s]
-    rate : frame rate of the animation [1/s]
-    own_rate : frame rate of motion files without times [1/s]
+    begin, end : first and last time within the motion [s]
+    rate : frame rate of the animation, of --fps [1/s]
+    motion_rate : frame rate of motion files that have no time stamps, of --motion-fps [1/s]
     """
 
     begin: Fraction | None
@@ -231,7 +237,7 @@ class TimeSpan:
     motion_rate: float | None
 
     def frames(self, clip: Clip) -> tuple[range, Fraction]:
-        """Return the range of frame numbers and the frame rate [1/s]; frame k is at time k / rate.
+        """Return the frame numbers and the frame rate [1/s] for a clip; frame k is at time k / rate.
 
         Raises DermisError if the motion ends before the time span begins.
         """
@@ -253,7 +259,10 @@ class TimeSpan:
 def parse_time_span(
     begin: float | None, end: float | None, fps: str | None, motion_rate: float | None
 ) -> TimeSpan:
-    """Return the time span given by the options --from, --to, --fps and --motion-fps."""
+    """Return the time span and frame rates of the options --from, --to, --fps and --motion-fps.
+
+    Raises DermisError for invalid values.
+    """
     from dermis.images.movie import parse_frame_rate
     from dermis.mesh.clip import MAX_DURATION_S, check_rate
 
@@ -270,12 +279,15 @@ def parse_time_span(
 
 
 def motion_file(name: str, motion: str | None) -> str:
-    """Return the name of the motion file: the --motion value, or the head's own file if it can hold clips."""
+    """Return the name of the motion file: the --motion value, or the head's own file if it is glTF.
+
+    name : head or scene file as named on the command line
+    """
     from dermis.formats.parts import is_gltf
 
     if motion is not None:
         return motion
-    own_file = str(_table(name).get("name", name))
+    own_file = str(_head_table(name).get("name", name))
     if not is_gltf(own_file):
         advice = "Add --motion with a .glb, .csv or .jsonl file, or a sequence of .obj files"
         refuse("--motion", "a file", f"it is missing, and {own_file} cannot contain clips", advice)
@@ -287,8 +299,10 @@ def load_clip(
 ) -> Clip:
     """Load the clip that animates a head from a motion file.
 
-    name : head as named on the command line
-    head_options : options of the head; `unit_mm` and `up` also apply to mesh sequences
+    name : head or scene file as named on the command line
+    motion, clip : motion file, and name of one of its clips
+    head_options : options of the head, of which `unit_mm` and `up` also apply to mesh sequences
+    span : time span, of which the frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
@@ -296,23 +310,23 @@ def load_clip(
     rate = span.motion_rate
     if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
         rate = float(span.rate)
-    fields = {**_table(name), **head_options}
+    fields = {**_head_table(name), **head_options}
     units = {key: fields[key] for key in ("unit_mm", "up") if key in fields}
     return load_motion(motion, head, clip=clip, fps=rate, **units)
 
 
 def animatable_names(name: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return the names of the morph targets and bones of the head, and of the clips in its file."""
+    """Return the names of the head's morph targets and bones, and of the clips in its file, by kind."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
-    own_file = Path(str(_table(name).get("name", name)))
+    own_file = Path(str(_head_table(name).get("name", name)))
     clips = clip_names(own_file) if is_gltf(own_file) else ()
     return {"targets": head.targets, "bones": head.bones, "clips": clips}
 
 
-def _table(name: str) -> Options:
-    """Return the [head] table of a scene file; an empty table for heads that are not scene files."""
+def _head_table(name: str) -> Options:
+    """Return the [head] table of a scene file; an empty table for any other head name."""
     from dermis.scene.files import head_table
 
     return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else {}

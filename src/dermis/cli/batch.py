@@ -143,7 +143,7 @@ def batch(
 
 
 def _parse_part(text: str) -> tuple[int, int]:
-    """Return the integers I and N of the option --shard I/N."""
+    """Return the integers I and N of the value "I/N" of the option --shard."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
     if not match or int(match[1]) >= int(match[2]):
         refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
@@ -159,7 +159,7 @@ def _checked_count(option: str, value: int | None, minimum: int) -> int | None:
 def _local_processes(
     adapter: str, adapters: str | None, workers: int | None, workers_per_gpu: int | None, encoders: int | None
 ) -> tuple[WorkerPool, int]:
-    """Return the pool of local worker processes and the number of encoders of each."""
+    """Return a pool of worker processes on this machine, and the number of encoder processes per worker."""
     from dermis.apps.batch.worker_pool import ProcessPool, SlotRequest
 
     if workers is not None and workers_per_gpu is not None:
@@ -233,7 +233,10 @@ _RATE_WINDOW_S = 60.0  # over which the rate is averaged
 
 @contextmanager
 def image_progress() -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that reports progress, given the number of finished images and their total number."""
+    """Yield a function that shows progress, whose arguments are the finished and the total number of images.
+
+    It updates a progress bar in a terminal, and otherwise logs lines.
+    """
     if not sys.stderr.isatty():
         yield ProgressLog(note).report
         return
@@ -258,9 +261,9 @@ def image_progress() -> Iterator[Callable[[int, int], None]]:
 
 
 class ImageRate:
-    """Number of images per second over the last minute.
+    """Number of images per second, averaged over the last minute, for progress messages.
 
-    clock : function that returns the time [s]
+    clock : function that returns the current time [s]
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -268,7 +271,7 @@ class ImageRate:
         self._samples = deque([(clock(), 0)])
 
     def update(self, done: int) -> float:
-        """Return the current rate [1/s], given the number of images finished so far."""
+        """Record the number of images finished so far, and return the rate [1/s]."""
         now = self._clock()
         self._samples.append((now, done))
         while len(self._samples) > 2 and now - self._samples[1][0] >= _RATE_WINDOW_S:
@@ -280,7 +283,8 @@ class ImageRate:
 class ProgressLog:
     """Progress messages for log files, at most one every 30 seconds.
 
-    write : function that takes the line to log
+    write : function that writes one line to the log
+    clock : function that returns the current time [s]
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
@@ -288,7 +292,7 @@ class ProgressLog:
         self._rate, self._last = ImageRate(clock), clock()
 
     def report(self, done: int, total: int) -> None:
-        """Log the number of finished images, unless the last message is too recent."""
+        """Log the number of finished images and the remaining time, unless the last message is too recent."""
         rate, now = self._rate.update(done), self._clock()
         if now - self._last < _LOG_INTERVAL_S:
             return

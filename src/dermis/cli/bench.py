@@ -92,6 +92,6 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
 
 
 def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:
-    """Return the rows of a table as lines with right-aligned columns."""
+    """Return the rows of a table as lines of text with right-aligned columns."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table]

@@ -36,7 +36,7 @@ from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
 
 _PATH_TRACERS = ("path-traced", "cycles")
-_SIZES = {"size": (256, 256), "atlas": 1024}
+_DEFAULT_SIZES = {"size": (256, 256), "atlas": 1024}
 _DIRECTION = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     SizeOptions = Options
     SkinOptions = Options
 else:
-    SizeOptions = model_options(Settings, only=_SIZES, defaults=_SIZES)
+    SizeOptions = model_options(Settings, only=_DEFAULT_SIZES, defaults=_DEFAULT_SIZES)
     SkinOptions = model_options(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
 
 
@@ -127,7 +127,10 @@ def compare(
 
 
 def _refuse_unused_options(subject: str, options: Options) -> None:
-    """Raise DermisError for options that would have no effect on this comparison."""
+    """Raise DermisError for options that have no effect on a comparison of this subject.
+
+    subject : name of a head, or "specular"
+    """
     if subject == "specular":
         unused = dict.fromkeys(options.keys() - {"roughness"}, "specular models are compared without a head")
     else:
@@ -141,11 +144,14 @@ def _refuse_unused_options(subject: str, options: Options) -> None:
 
 
 def _comparison_arguments(options: Options, sizes: Options) -> Options:
-    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare`."""
+    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the options.
+
+    sizes : picture and atlas sizes given on the command line
+    """
     from dermis.apps.validation.comparisons.scenes import default_region
 
     names = [name.strip() for name in options.get("techniques", ",".join(TECHNIQUES)).split(",")]
-    size_settings = {**_SIZES, **sizes}
+    size_settings = {**_DEFAULT_SIZES, **sizes}
     for name in names:
         check_fields(Settings, {**size_settings, "technique": name}, {"technique": "techniques"})
     light = options.get("light", "front")
@@ -165,7 +171,11 @@ def _comparison_arguments(options: Options, sizes: Options) -> Options:
 def _compare_techniques(
     head: str, shape: Options, arguments: Options, output: Path | None, as_json: bool
 ) -> None:
-    """Compare the techniques with a reference on a head; print the result and write the report."""
+    """Compare techniques with a reference solution on a head, print the errors and write an HTML report.
+
+    shape : options of the head that affect its mesh
+    arguments : keyword arguments of the comparison
+    """
     from dermis.apps.validation.comparisons import compare as comparison
     from dermis.apps.validation.comparisons.report import write_report
     from dermis.base.atomic_write import check_output
@@ -206,16 +216,24 @@ def _report_lines(comparison: Comparison) -> Sequence[str]:
     return lines
 
 
-_DEGREES = (0, 30, 60, 75, 85)  # angles of the printed albedos
-_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}  # angles of incidence [degrees] and plot colours
+_ALBEDO_DEGREES = (0, 30, 60, 75, 85)  # angles of the printed albedos
+_INCIDENT_COLOURS = {
+    15: "#2a62b0",
+    45: "#2e8b57",
+    75: "#c0392b",
+}  # angles of incidence [degrees] and plot colours
 _DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
-_COLUMNS = 4
+_PLOT_COLUMNS = 4
 _PLOT_RADIUS = 1.8  # least radius of the plots: square root of the intensity over the peak of kelemen
-_UP = np.array([0.0, 0.0, 1.0])
+_NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
-    """Print reflectance and cost of the specular models, and plot their lobes if a folder is given."""
+    """Print directional albedo and GPU cost of the specular models, and plot their lobes.
+
+    output : folder of the plots; None for no plots
+    roughness : Beckmann roughness m [-]
+    """
     if output is not None:
         _draw_lobes_and_albedo(output, roughness)
     with spinner("measuring"):
@@ -224,7 +242,7 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 
 
 def _specular_report(adapter: str) -> Options:
-    """Return the properties of all specular models as one JSON object."""
+    """Return albedos, reciprocity errors and GPU costs of all specular models, for JSON."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import run_on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
@@ -251,8 +269,8 @@ def _specular_report(adapter: str) -> Options:
 def _specular_lines(report: Options, m: float) -> list[str]:
     from dermis.specular.comparison import normal_incidence_peak
 
-    cosine = np.cos(np.radians(_DEGREES))
-    angles = "".join(f"{f'{angle}°':>8}" for angle in _DEGREES)
+    cosine = np.cos(np.radians(_ALBEDO_DEGREES))
+    angles = "".join(f"{f'{angle}°':>8}" for angle in _ALBEDO_DEGREES)
     lines = [
         f"roughness {m:g}, rho_s 1, Schlick's Fresnel term; cost per evaluation on {report['adapter']}",
         "",
@@ -276,7 +294,7 @@ def _specular_lines(report: Options, m: float) -> list[str]:
 
 
 def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
-    """Write lobes.png and albedo.png with all specular models to a folder, created if necessary."""
+    """Plot lobes and directional albedos of the specular models to lobes.png and albedo.png in a folder."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
@@ -286,23 +304,26 @@ def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
 
 
 def _distinct_models() -> list[str]:
-    """Return the names of the specular models, without those that equal another model."""
+    """Return the names of the specular models, without "kelemen-direct", which has the lobe of "kelemen"."""
     return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 
 def _lobe_figure(m: float) -> Figure:
-    """Return a figure with one polar plot per model: intensity in the plane of incidence for three lights."""
-    peak = _intensity("kelemen", m).max(axis=1, keepdims=True)
-    curves_by_model = {name: np.sqrt(_intensity(name, m) / peak) for name in _distinct_models()}
+    """Return polar plots of reflected intensity in the plane of incidence, one plot per specular model.
+
+    m : Beckmann roughness [-]
+    """
+    peak = _lobe_intensity("kelemen", m).max(axis=1, keepdims=True)
+    curves_by_model = {name: np.sqrt(_lobe_intensity(name, m) / peak) for name in _distinct_models()}
     radius = max(_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
-    rows = -(-len(curves_by_model) // _COLUMNS)
-    figure = _figure(3.0 * _COLUMNS, 2.4 * rows)
+    rows = -(-len(curves_by_model) // _PLOT_COLUMNS)
+    figure = _empty_figure(3.0 * _PLOT_COLUMNS, 2.4 * rows)
     figure.suptitle(f"Intensity relative to the peak of kelemen, square root scale; m = {m:g}")
-    panels = figure.subplots(rows, _COLUMNS, subplot_kw={"projection": "polar"}).ravel()
+    panels = figure.subplots(rows, _PLOT_COLUMNS, subplot_kw={"projection": "polar"}).ravel()
     for axes in panels[len(curves_by_model) :]:
         axes.remove()
     for axes, (name, curves) in zip(panels, curves_by_model.items(), strict=False):
-        for (degrees, colour), curve in zip(_INCIDENT.items(), curves, strict=True):
+        for (degrees, colour), curve in zip(_INCIDENT_COLOURS.items(), curves, strict=True):
             axes.plot(_view_angles(), curve, color=colour, label=f"light from {degrees}°")
         axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=radius)
         axes.set(rticks=np.sqrt([0.25, 1.0, 2.25]), yticklabels=["", "1", ""])
@@ -313,15 +334,18 @@ def _lobe_figure(m: float) -> Figure:
     return figure
 
 
-def _intensity(name: str, m: float) -> Doubles:
-    """Return the (3, n) BRDF times both cosines by angle of incidence and view angle [1/sr]."""
+def _lobe_intensity(name: str, m: float) -> Doubles:
+    """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
+
+    The rows are the angles of incidence `_INCIDENT_COLOURS`, the columns the angles `_view_angles`.
+    """
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     rows = []
-    for degrees in _INCIDENT:
+    for degrees in _INCIDENT_COLOURS:
         theta = np.radians(degrees)
         light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
-        rows.append(MODELS[name].lobe(cosines(_UP, light, view), m) * np.cos(theta) * np.cos(angle))
+        rows.append(MODELS[name].lobe(cosines(_NORMAL, light, view), m) * np.cos(theta) * np.cos(angle))
     return np.stack(rows)
 
 
@@ -330,8 +354,11 @@ def _view_angles() -> Doubles:
 
 
 def _albedo_figure(m: float) -> Figure:
-    """Return a figure of the directional albedo of all models by angle."""
-    figure = _figure(7.2, 4.6)
+    """Return a plot of the directional albedo of each specular model by angle of incidence.
+
+    m : Beckmann roughness [-]
+    """
+    figure = _empty_figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
     for name in _distinct_models():
@@ -344,8 +371,8 @@ def _albedo_figure(m: float) -> Figure:
     return figure
 
 
-def _figure(width: float, height: float) -> Figure:
-    """Return an empty figure of the given width and height [inch]."""
+def _empty_figure(width: float, height: float) -> Figure:
+    """Return an empty matplotlib figure of a given width and height [inch]."""
     figure_class: type[Figure] = import_extra("matplotlib.figure", "plots").Figure
     return figure_class(figsize=(width, height), dpi=130, layout="constrained")
 

@@ -32,13 +32,13 @@ def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> i
     as_json:
         Print one JSON object with all results.
     """
-    report = examine(adapter)
+    report = diagnose(adapter)
     print_report(as_json, report, lambda: _report_lines(report))
     return 0 if report["healthy"] else 2
 
 
-def examine(adapter: str) -> Options:
-    """Return all results of the diagnosis as one JSON object."""
+def diagnose(adapter: str) -> Options:
+    """Return the diagnosis of this machine for JSON: adapters, library versions, test frame and samples."""
     from dermis.base.private import cache_folder
     from dermis.formats.samples import SAMPLES, is_available
     from dermis.gpu.adapters import OPTIONAL_FEATURES, list_adapters
@@ -54,14 +54,14 @@ def examine(adapter: str) -> Options:
         "adapters": adapters,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "libraries": {name: _version(name) for name in _LIBRARIES},
+        "libraries": {name: _package_version(name) for name in _LIBRARIES},
         "cache": str(cache_folder()),
         "samples": {name: is_available(name) for name in SAMPLES},
     }
 
 
-def _version(name: str) -> str:
-    """Return the version of an installed package, or "not installed"."""
+def _package_version(name: str) -> str:
+    """Return the version of an installed Python package, or "not installed"."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -69,7 +69,7 @@ def _version(name: str) -> str:
 
 
 def _test_adapter(adapter: str) -> Options:
-    """Open the adapter, render a test frame and return the results."""
+    """Open an adapter, render a test frame, and return whether the adapter works and how it was chosen."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
 
@@ -90,9 +90,9 @@ def _test_adapter(adapter: str) -> Options:
 
 
 def _render_test_frame(renderer: Renderer) -> Options:
-    """Render a white sphere lit from the camera and check its brightness.
+    """Render a white sphere lit from the camera, and return whether its brightness is right.
 
-    The centre must equal the irradiance, and no pixel may be brighter.
+    The centre must have radiance 1, which is the irradiance over pi, and no pixel may be brighter.
     """
     from dermis.mesh.head import Head
     from dermis.mesh.maps import Maps

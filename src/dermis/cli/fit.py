@@ -85,11 +85,11 @@ def fit(
     options |= {"exposure": exposure, "white": colour, "noise": noise, "side": side, "atlas": atlas}
     with progress_bar("fitting") as report_progress:
         result = fitted(photo, head, progress=report_progress, **options)
-    _report(result, save_fit(output, result), as_json)
+    _print_report(result, save_fit(output, result), as_json)
     return 0
 
 
-def _report(result: FitResult, written: list[Path], as_json: bool) -> None:
+def _print_report(result: FitResult, written: list[Path], as_json: bool) -> None:
     summary = result.summary() | {"files": [str(path) for path in written]}
     if as_json:
         print_json(summary)

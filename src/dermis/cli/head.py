@@ -141,7 +141,7 @@ def head(
     ancestry = drop_none(african=african, asian=asian, caucasian=caucasian)
     numbers = ancestry | drop_none(sex=sex, age=age, weight=weight, muscle=muscle)
     rest_weights = parse_weights(expression or [], EXPRESSION)
-    person = _person(seed, numbers, parse_weights(target or [], TARGET))
+    person = _build_person(seed, numbers, parse_weights(target or [], TARGET))
     person = replace(
         person,
         skin=_with_values(person.look, skin, "--skin"),
@@ -157,7 +157,7 @@ def head(
         person_head = person.head(layout=layout, **drop_none(subdivide=subdivide))
         person_head = _with_maps(person_head, drop_none(colour=colour, normal=normal, roughness=roughness))
         person_head, eyes = run_on_device(adapter, lambda device: paint_head(device, person_head, size))
-        byte_count = _write(output, person, person_head, rest_weights, eyes)
+        byte_count = _write_glb(output, person, person_head, rest_weights, eyes)
     seconds, mesh = round(time.perf_counter() - started, 3), person_head.mesh
     report |= {"vertices": len(mesh.positions), "triangles": len(mesh.triangles)}
     report |= {"bytes": byte_count, "seconds": seconds}
@@ -166,8 +166,11 @@ def head(
     return 0
 
 
-def _person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Human:
-    """Return the random or average person with the given parameters and shape targets."""
+def _build_person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Human:
+    """Return the average person, or a random one for a seed, with given parameters and shape targets.
+
+    numbers : fields of `Human` by name
+    """
     from dermis.human.person import Human
 
     base = Human() if seed is None else Human.drawn(seed)
@@ -175,7 +178,10 @@ def _person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Hu
 
 
 def _with_values(look: Look, option_values: list[str] | None, option: str) -> Look:
-    """Return a copy of a skin, eye or hair appearance with the values given by an option."""
+    """Return a copy of a skin, eye or hair look with the fields set on the command line.
+
+    option_values : texts "NAME=NUMBER,..." of the option, such as --skin
+    """
     values = parse_weights(option_values or [], option)
     field_names = [field.name for field in fields(look)]
     for name in values:
@@ -188,7 +194,7 @@ def _with_values(look: Look, option_values: list[str] | None, option: str) -> Lo
 
 
 def _with_hair_values(look: HairLook, option_values: list[str] | None) -> HairLook:
-    """Return a copy of the hair with the values given by --hair; its style is a word."""
+    """Return a copy of a hair look with the fields set by --hair, of which only the style is a word."""
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
     numbers = [pair for pair in pairs if not pair.startswith("style=")]
@@ -197,7 +203,7 @@ def _with_hair_values(look: HairLook, option_values: list[str] | None) -> HairLo
 
 
 def _with_maps(head: Head, files: Options) -> Head:
-    """Return a copy of the head with maps from files; a normal map also replaces the height map."""
+    """Return a copy of the head with maps loaded from files; a normal map also removes the height map."""
     from dermis.formats.maps import load_maps
 
     loaded = load_maps(**files)
@@ -205,7 +211,7 @@ def _with_maps(head: Head, files: Options) -> Head:
     return replace(head, maps=replace(head.maps, **maps))
 
 
-def _write(
+def _write_glb(
     output: Path, person: Human, head: Head, expression: dict[str, float], eyes: EyeTextures | None
 ) -> int:
     from dermis.human.person_file import write_person_glb

@@ -1,4 +1,4 @@
-"""Options of a head: file format, eye appearance and pose."""
+"""Command line options of a head: file format, eye look, morph target weights, bones and gaze."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from dermis.scene.head_table import HeadTable
 
 HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
 """Option names by field of the [head] table, where they differ from the name of the field."""
-_SHAPE = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
-_MAPS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
+_SHAPE_FIELDS = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
+_MAP_FIELDS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
@@ -28,14 +28,16 @@ if TYPE_CHECKING:
     FileOptions = Options
 else:
     HeadOptions = model_options(HeadTable, without=("name",), names=HEAD_OPTION_NAMES)
-    ShapeOptions = model_options(HeadTable, only=_SHAPE)
-    FileOptions = model_options(HeadTable, only=(*_SHAPE, *_MAPS), names=HEAD_OPTION_NAMES)
+    ShapeOptions = model_options(HeadTable, only=_SHAPE_FIELDS)
+    FileOptions = model_options(HeadTable, only=(*_SHAPE_FIELDS, *_MAP_FIELDS), names=HEAD_OPTION_NAMES)
 
 
 def check_head(name: str, options: Options) -> None:
     """Validate the options of a head.
 
-    Raises DermisError that names the option.
+    name : name of the head or its file
+
+    Raises DermisError that names the invalid option.
     """
     check_fields(HeadTable, {"name": name, **options}, HEAD_OPTION_NAMES)
 
@@ -56,7 +58,7 @@ EyeOptions = Annotated[
 
 
 def note_eyes(head: Head, requested: str | None) -> None:
-    """Print a note on stderr if the eyeballs of a file could not be replaced by those of the package.
+    """Print a note on stderr if the eyeballs of a mesh file were not replaced by the package's eyes.
 
     requested : value of the option --eyes
     """
@@ -68,7 +70,7 @@ def note_eyes(head: Head, requested: str | None) -> None:
 
 _LARGEST_NUMBER = 1e10
 POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
-Weights = Annotated[
+WeightsOption = Annotated[
     list[str] | None,
     Parameter(
         name=POSE,
@@ -99,21 +101,25 @@ BoneAngleOptions = Annotated[
 
 
 def parse_weights(texts: Sequence[str], option: str = POSE) -> dict[str, float]:
-    """Return a dictionary of weights by name, parsed from texts such as "jawOpen=0.6,mouthSmileLeft=1"."""
+    """Return weights by name from option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in texts for part in text.split(","))
     return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option, expected)}
 
 
 def parse_bone_angles(texts: Sequence[str]) -> dict[str, list[float]]:
-    """Return a dictionary of the three angles [degrees] by bone, parsed from texts such as "head=0,25,0"."""
+    """Return the angles about x, y and z [degrees] by bone from option values such as "head=0,25,0"."""
     return dict(_parse_pairs(texts, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
 
 
 def _parse_pairs(
     texts: Iterable[str], count: int, option: str, expected: str
 ) -> Iterator[tuple[str, list[float]]]:
-    """Yield the name and the numbers of each text "NAME=NUMBER,..."."""
+    """Yield the name and the numbers of each option value "NAME=NUMBER,...".
+
+    count : number of numbers that each value must have
+    option, expected : name of the option and its format, for error messages
+    """
     for item in texts:
         name, _, text = item.rpartition("=")
         numbers = _parse_numbers(text)
@@ -125,11 +131,12 @@ def _parse_pairs(
 def pose_from_options(
     weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, name: str
 ) -> Pose:
-    """Return the pose with the weights and bone angles from the command line.
+    """Return the pose of the options --pose and --bone.
 
-    name : head as named on the command line, for messages
+    weights, bone_angles : morph target weights, and three angles per bone [degrees], by name
+    name : head as named on the command line, for error messages
 
-    Raises DermisError for names that do not exist in the head, with the command that lists all names.
+    Raises DermisError for targets and bones that the head does not have.
     """
     from dermis.mesh.pose import Pose
 
@@ -145,7 +152,10 @@ def pose_from_options(
 
 
 def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
-    """Return the pose of the scene with the eyes turned to a point or to the camera."""
+    """Return the pose of a scene with the eyes turned to a point.
+
+    option_value : value of --look-at: "X,Y,Z" [mm], or "camera"
+    """
     from dermis.scene.gaze import looking_at
 
     point = scene.camera.position if option_value == "camera" else _parse_numbers(option_value)
@@ -156,7 +166,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
 
 
 def _parse_numbers(text: str) -> list[float] | None:
-    """Return the comma-separated numbers of a text; None if one is invalid or too large."""
+    """Return the numbers of a comma-separated text; None if one is not a number or exceeds 1e10."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:

@@ -28,7 +28,7 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
     from dermis.base.errors import refuse
     from dermis.scene.lights import NO_LIGHTS, light_presets, preset_lights, preset_toml
 
-    rigs = {rig: _summary(preset_toml(rig)) for rig in light_presets() if rig != NO_LIGHTS}
+    rigs = {rig: _first_sentence(preset_toml(rig)) for rig in light_presets() if rig != NO_LIGHTS}
     if name and name not in rigs:
         refuse(name, f"a rig ({', '.join(rigs)})", "it is none of these", "List them with dermis lights")
     if as_json:
@@ -42,7 +42,7 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
     return 0
 
 
-def _summary(text: str) -> str:
-    """Return the first sentence of the comment at the top of a TOML file."""
+def _first_sentence(text: str) -> str:
+    """Return the first sentence of the comment at the top of a TOML file, which describes a light preset."""
     comment = " ".join(line.lstrip("# ") for line in text.split("\n\n")[0].splitlines())
     return comment.split(". ")[0].rstrip(".") + "."

@@ -1,4 +1,4 @@
-"""Options generated from pydantic models, options shared by commands, and parsers of option values."""
+"""Options generated from pydantic models, option types that commands share, and parsers of values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 
 
 def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return the chosen word, checked when the command runs because plug-ins can register further choices."""
+    """Return the choice that was typed; other text is accepted too, as plug-ins may register it later."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field)):
@@ -75,14 +75,14 @@ def model_options(
     names: Mapping[str, str] | None = None,
     defaults: Mapping[str, object] | None = None,
 ) -> Any:
-    """Return a parameter type for cyclopts with one option per model field; its value is a dictionary.
+    """Return a parameter type for cyclopts that has one option per field of a settings model.
 
-    Type, choices, bounds and help of each option are those of the field. Fields that hold other models have
-    no option. The dictionary contains only the options that were given.
+    Type, choices, bounds and help of each option are those of the field; fields that hold other models have
+    no option. The parameter's value is a dictionary of the given options by field name.
 
     only, without : names of the fields to include (all by default) and to exclude
     names : option names by field, where they differ from the name of the field
-    defaults : default values to show in the help instead of those of the model
+    defaults : defaults to show in the help instead of those of the model
     """
     from dermis.scene.frozen_model import field_heading
 
@@ -99,22 +99,28 @@ def model_options(
 
 
 def drop_none(**options: object) -> Options:
-    """Return a dictionary of the keyword arguments without those that are None."""
+    """Return the keyword arguments that are not None, as a dictionary."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
-    """Return the option name of a field, such as --rho-s for rho_s."""
+    """Return the command line option for a field, such as --rho-s for rho_s.
+
+    names : option names of fields, where they differ from the name of the field
+    """
     return "--" + (names or {}).get(field, field).replace("_", "-")
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
-    """Return whether a field can be an option: it holds words or numbers, not other models."""
+    """Return whether a field gets an option: it holds words, numbers or tuples of them, not other models."""
     return _option_type(model, field)[0] is not None
 
 
 def _option_type(model: type[FrozenModel], field: str) -> tuple[Any, Options]:
-    """Return the type of a field's option, None if it cannot be one, and arguments of its `Parameter`."""
+    """Return the type of a field's option and the keyword arguments of its `cyclopts.Parameter`.
+
+    The type is None for fields that cannot be options.
+    """
     from dermis.scene.field_errors import field_keywords
     from dermis.scene.frozen_model import field_choices
 
@@ -145,7 +151,7 @@ def _option_type(model: type[FrozenModel], field: str) -> tuple[Any, Options]:
 
 
 def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, object]) -> str:
-    """Return the help text of a field's option, with its bounds and its default."""
+    """Return the help text of a field's option, with its range and default."""
     from dermis.scene.field_errors import field_keywords
     from dermis.scene.frozen_model import accepted_values, field_choices, field_help, format_default
 
@@ -158,9 +164,8 @@ def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, ob
 
 
 def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> M:
-    """Return the model with the given field values; errors name the option instead of the field.
+    """Return a model with given field values; its errors name the option instead of the field.
 
-    values : field values by name
     names : option names by field, where they differ from the name of the field
 
     Raises DermisError for invalid values.
@@ -176,13 +181,17 @@ def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[st
 
 
 def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, context: str, advice: str) -> None:
-    """Raise DermisError if any of the given options would have no effect."""
+    """Raise DermisError if any option is given where it would have no effect.
+
+    fields : field names of the given options
+    context, advice : end of the message, such as "with a dask cluster", and advice to the user
+    """
     for field in fields:
         refuse(option_name(field, names), f"no such option {context}", "it is given", advice)
 
 
 def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
-    """Return width and height [pixel] of a text such as "1024x1024"."""
+    """Return the width and height [pixel] of an option value such as "1024x1024"."""
     match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
     if not match:
         refuse(option, "WIDTHxHEIGHT, such as 1024x1024", f"got {text!r}", "Write two integers with an x")
@@ -190,7 +199,7 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
 
 
 def parse_colour(text: str, option: str) -> tuple[float, float, float]:
-    """Return the linear Rec. 709 colour of a text "red,green,blue"."""
+    """Return the linear Rec. 709 colour of an option value "red,green,blue"."""
     try:
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
@@ -199,7 +208,7 @@ def parse_colour(text: str, option: str) -> tuple[float, float, float]:
 
 
 def parse_lengths(option: str, text: str) -> tuple[float, ...]:
-    """Return the lengths [mm] of a text such as "0.5,1,2"."""
+    """Return the lengths [mm] of an option value such as "0.5,1,2"."""
     try:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:

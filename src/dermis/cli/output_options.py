@@ -1,4 +1,4 @@
-"""Output files of `dermis render` and `animate`: outputs, landmarks, movies and numbered images."""
+"""Output files of `dermis render` and `animate`: depth and other outputs, landmarks, movies, images."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dermis.scene.outputs import OUTPUTS, check_outputs
 if TYPE_CHECKING:
     from dermis.base.arrays import Bytes, Floats
     from dermis.frame.features.outputs.planes import PlaneArray
-    from dermis.frame.observation import Landmarks as ProjectedLandmarks
+    from dermis.frame.observation import LandmarksOption as ProjectedLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
     from dermis.mesh.head import Head
@@ -34,14 +34,16 @@ _OUTPUTS_HELP = (
     "parts of the same .exr file."
 )
 _FORMAT_HELP = "Format of the outputs beside the image: exr, png (16 bit, quantised) or npy. [default: exr]"
-Outputs = Annotated[str | None, Parameter(name="--outputs", help=_OUTPUTS_HELP, metavar="NAME,...")]
-Format = Annotated[Literal["exr", "png", "npy"] | None, Parameter(name="--outputs-format", help=_FORMAT_HELP)]
+OutputsOption = Annotated[str | None, Parameter(name="--outputs", help=_OUTPUTS_HELP, metavar="NAME,...")]
+OutputsFormatOption = Annotated[
+    Literal["exr", "png", "npy"] | None, Parameter(name="--outputs-format", help=_FORMAT_HELP)
+]
 
 
 class FrameOutputs:
-    """Outputs requested with --outputs, and the files that they are written to.
+    """Outputs of a frame requested with --outputs, such as depth, and the files they are written to.
 
-    Raises DermisError for unknown names and for files that cannot be written.
+    Raises DermisError for unknown outputs and for files that cannot be written.
     """
 
     def __init__(
@@ -50,7 +52,7 @@ class FrameOutputs:
         if file_format and typed is None:
             refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs")
         self.image = image
-        self.names = check_outputs(_names(typed)) if typed is not None else ()
+        self.names = check_outputs(_split_names(typed)) if typed is not None else ()
         self.together = image.suffix.lower() == ".exr" and file_format in (None, "exr")
         if not self.names:
             self.paths: dict[str, Path] = {}
@@ -68,10 +70,10 @@ class FrameOutputs:
             note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
     def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
-        """Write the outputs.
+        """Write the outputs to their files.
 
-        picture : linear image, for outputs that are parts of the same EXR file
-        values : output arrays by name
+        picture : linear image, which shares one EXR file with the outputs; None for separate files
+        values : pixel arrays by output name
         """
         from dermis.frame.output_files import write_multipart, write_output
 
@@ -84,11 +86,11 @@ class FrameOutputs:
 
     @property
     def report(self) -> dict[str, str]:
-        """Return the paths of the written files by name of the output."""
+        """Return the path of each output's file, by output name, for JSON reports."""
         return {name: str(path) for name, path in self.paths.items()}
 
 
-def _names(typed: str) -> list[str]:
+def _split_names(typed: str) -> list[str]:
     return [name.strip() for name in typed.split(",")]
 
 
@@ -96,11 +98,13 @@ _LANDMARKS_HELP = (
     "Landmark sets to write beside the image, such as face.landmarks.json, with camera, head pose and gaze: "
     f"{', '.join(SETS)}, or a .csv file of name,vertex; separated by commas."
 )
-Landmarks = Annotated[str | None, Parameter(name="--landmarks", help=_LANDMARKS_HELP, metavar="SET,...")]
+LandmarksOption = Annotated[
+    str | None, Parameter(name="--landmarks", help=_LANDMARKS_HELP, metavar="SET,...")
+]
 
 
 class FrameLandmarks:
-    """Landmark sets requested with --landmarks, and the file that they are written to.
+    """Landmark sets requested with --landmarks, and the JSON file they are written to.
 
     Raises DermisError for unknown sets and for a file that cannot be written.
     """
@@ -111,11 +115,11 @@ class FrameLandmarks:
         if typed is not None:
             from dermis.frame.features.outputs.landmarks import checked_landmarks
 
-            self.names = checked_landmarks(_names(typed))
+            self.names = checked_landmarks(_split_names(typed))
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
-        """Raise DermisError if the head does not have the requested landmarks."""
+        """Raise DermisError if the head lacks a requested landmark set, before anything is rendered."""
         if self.names:
             from dermis.human.landmarks.points import landmark_points
 
@@ -123,7 +127,7 @@ class FrameLandmarks:
                 landmark_points(head, name)
 
     def write(self, renderer: Renderer, scene: Scene, settings: Settings) -> None:
-        """Write the requested landmarks of the scene to the JSON file."""
+        """Write the landmarks of a scene, with its camera, head pose and gaze, to the JSON file."""
         if not self.names:
             return
         observation = next(renderer.observe([scene], settings, landmarks=self.names))
@@ -155,9 +159,10 @@ WriteFrame = Callable[[int, "PlaneArray"], None]
 
 @dataclass(frozen=True)
 class AnimationOutput:
-    """Output of `dermis animate`: a movie or numbered images.
+    """Output of `dermis animate`: a movie file or numbered images.
 
-    crf : constant rate factor of the movie; None for the default
+    path : movie file, or image files with a number format such as %05d
+    crf : constant rate factor of the movie, which sets its quality; None for the default
     overwrite : whether existing numbered images are rendered again
     """
 
@@ -166,21 +171,21 @@ class AnimationOutput:
     overwrite: bool
 
     @property
-    def numbered(self) -> bool:
-        """Return whether the output is a sequence of numbered images."""
+    def is_numbered(self) -> bool:
+        """Return whether the output is a sequence of numbered images instead of a movie."""
         return "%" in self.path.name
 
     @property
-    def linear(self) -> bool:
-        """Return whether the images are stored as linear floats."""
+    def is_linear(self) -> bool:
+        """Return whether the images store linear light as floats (EXR)."""
         return self.path.suffix.lower() == ".exr"
 
     def check(self, size: tuple[int, int]) -> None:
-        """Raise DermisError if the output cannot be written, before anything is rendered."""
+        """Raise DermisError if frames of this size cannot be written, before anything is rendered."""
         from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
 
-        if self.numbered:
+        if self.is_numbered:
             if self.crf is not None:
                 refuse("--crf", f"a movie ({MOVIE_SUFFIX}) as output", f"got {self.path}", "Leave it out")
             FrameFiles(self.path).prepare()
@@ -192,26 +197,26 @@ class AnimationOutput:
             refuse(self.path, "a movie or numbered pictures", "it is one picture", f"Name it {numbered}")
         check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
 
-    def missing(self, numbers: range, size: tuple[int, int], digest: str) -> Sequence[int]:
-        """Return the numbers of the frames that must be rendered.
+    def frames_to_render(self, numbers: range, size: tuple[int, int], digest: str) -> Sequence[int]:
+        """Return the numbers of the frames to render: those without a complete image of an earlier run.
 
-        digest : hash of everything that determines the frames
+        digest : hash of everything that determines the frames; images with another hash are rendered again
         """
         from dermis.images.writer import FrameFiles
 
-        if not self.numbered:
+        if not self.is_numbered:
             return numbers
         files = FrameFiles(self.path)
         files.start(digest, force=self.overwrite)
         return files.missing(numbers, size)
 
     @contextmanager
-    def writing(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
-        """Yield a function that writes a frame in the background; all are written when the block ends."""
+    def open_writer(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+        """Yield a function that queues a frame for writing; the context ends when all frames are written."""
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
 
-        if self.numbered:
+        if self.is_numbered:
             files = FrameFiles(self.path)
             with ImageWriter() as writer:
                 yield lambda number, picture: writer.write(files.path(number), picture)

@@ -1,4 +1,4 @@
-"""Standard streams and signals of the process that runs a command.
+"""Standard streams and signal handling of the process that runs a command.
 
 A failed write to stdout or stderr does not raise an exception; it is reported once when the command ends.
 Ctrl-C and signals that ask the process to end raise KeyboardInterrupt, so that no file is left half-written.
@@ -29,14 +29,14 @@ _OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of the null device, for c
 
 
 class StandardStreams:
-    """Context manager that replaces stdout and stderr by streams whose writes never fail.
+    """Context manager that replaces stdout and stderr by streams whose write methods never raise.
 
-    A closed stream is treated as one that cannot be written to. Its file descriptor is reserved, because the
-    next opened file would get it otherwise and libraries would print into that file.
+    A stream that is closed from the start is treated as one that cannot be written to. Its file descriptor is
+    reserved, because otherwise the next opened file would get it and libraries would print into that file.
     """
 
     def __enter__(self) -> Self:
-        """Replace the standard streams."""
+        """Replace sys.stdout and sys.stderr."""
         for number, mode in enumerate(_OPEN_MODES):
             _reserve_descriptor(number, mode)
         self._original = sys.stdout, sys.stderr
@@ -50,20 +50,20 @@ class StandardStreams:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Flush the replacements and restore the original streams."""
+        """Flush the replacement streams and restore the original ones."""
         for stream, original in zip((sys.stdout, sys.stderr), self._original, strict=True):
             if stream is not original:
                 stream.flush()
         sys.stdout, sys.stderr = self._original
 
     def stdout_error(self) -> OSError | None:
-        """Return the error by which output to stdout was lost, or None; a closed pipe is not an error."""
+        """Return the first error of a write to stdout, or None; a closed pipe does not count as an error."""
         sys.stdout.flush()
         faults = [raw.fault for raw in self._raw if raw.number == 1]
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard the remaining output to stdout after an interruption, because its reader may be blocked."""
+        """Discard the buffered output to stdout after an interruption, as its reader may be blocked."""
         for raw in self._raw:
             if raw.number == 1:
                 raw.fault = raw.fault or BrokenPipeError()
@@ -81,9 +81,11 @@ class StandardStreams:
 
 
 class _GuardedStream(io.RawIOBase):
-    """Raw stream that discards all output after the first failed write.
+    """Raw output stream that discards all data after the first failed write.
 
-    fault : the first error, None before
+    inner : raw stream that receives the data
+    number : file descriptor
+    fault : error of the first failed write; None until then
     """
 
     def __init__(self, inner: io.RawIOBase, number: int) -> None:
@@ -102,11 +104,11 @@ class _GuardedStream(io.RawIOBase):
         return memoryview(data).nbytes
 
     def writable(self) -> bool:
-        """Return True, also after a failed write."""
+        """Return True: the stream accepts data even after a failed write."""
         return True
 
     def fileno(self) -> int:
-        """Return the file descriptor."""
+        """Return the file descriptor of the stream."""
         return self.number
 
     def isatty(self) -> bool:
@@ -115,7 +117,7 @@ class _GuardedStream(io.RawIOBase):
 
 
 def _reserve_descriptor(number: int, mode: int) -> None:
-    """Open the null device at the file descriptor of a standard stream if that is closed."""
+    """Open the null device at a file descriptor, 0 to 2, unless that descriptor is already open."""
     try:
         os.fstat(number)
     except OSError:
@@ -140,9 +142,9 @@ class Interruption:
     """Context manager that raises KeyboardInterrupt once, after Ctrl-C, SIGTERM or SIGHUP.
 
     A second signal ends the process immediately, even while the main thread is inside a driver or another
-    library. Signals that the caller ignores or handles keep their handlers.
+    library. Signals for which the parent process or a library has set a handler are left alone.
 
-    code : exit status for the received signal; 0 if there was none
+    code : exit status for the received signal; 0 without a signal
     """
 
     def __init__(self) -> None:
@@ -152,7 +154,7 @@ class Interruption:
         self._resent = 0  # signals that this object sent again
 
     def __enter__(self) -> Self:
-        """Install the signal handlers, if called from the main thread."""
+        """Install the signal handlers; no effect outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
         for number in _SIGNALS:
@@ -171,7 +173,7 @@ class Interruption:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Restore the signal handlers."""
+        """Restore the previous signal handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number, handler in self._original.items():
@@ -200,14 +202,17 @@ class Interruption:
         self._writing.send(_RETRY)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
-        """Raise the interruption again if it occurred where Python cannot raise, as in a destructor."""
+        """Repeat a KeyboardInterrupt that was raised where Python ignores exceptions, as in a destructor."""
         if self.code and issubclass(error.exc_type, KeyboardInterrupt):
             self._raise_later()
         else:
             self._original_hook(error)
 
     def _watch(self) -> None:
-        """Receive signals in a thread, as the main thread handles them only between Python instructions."""
+        """Wait for signals in a thread: end the process after a second one, repeat a postponed one.
+
+        The main thread handles signals only between Python instructions, not inside a library.
+        """
         first_signal_s = 0.0
         with self._reading:
             while True:
@@ -252,7 +257,10 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _would_be_swallowed(frame: FrameType | None) -> bool:
-    """Return whether a library in the call stack of the frame would swallow an exception."""
+    """Return whether an exception in this frame would be swallowed by a library that called it.
+
+    Examples are callbacks of a graphics driver and modules during their import.
+    """
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
         if package in _UNSAFE_PACKAGES or (package in _DRIVERS and "callback" in name):

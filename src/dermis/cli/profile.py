@@ -28,7 +28,7 @@ _OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment as help text, with the values of named skins that differ from it."""
+    """Return help text for the default of each pigment option, with the pigments of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -129,7 +129,7 @@ def profile(
     as_json:
         Print one JSON object with the profile, its fits and errors.
     """
-    from dermis.cli.profile_report import Report, draw_plot, gaussian_fit, other_fit
+    from dermis.cli.profile_report import ProfileReport, additional_fit, draw_plot, gaussian_fit
     from dermis.optics.diffusion.models import error_against_photons, known_error
     from dermis.optics.half_space import COUNTED_MODEL
     from dermis.optics.profiles import find_gaussians
@@ -146,17 +146,19 @@ def profile(
         tissue, radial, monte_carlo = None, replace(gaussian_radial_profile(table), name=name), None
         model_error, spectrum = None, None
     else:
-        tissue = _tissue(name, tissue_options, eta)
-        radial = _profile(tissue, model, clamp, tracing)
+        tissue = _load_tissue(name, tissue_options, eta)
+        radial = _compute_profile(tissue, model, clamp, tracing)
         monte_carlo, model_error = None, known_error(radial.model, "" if changed else name)
         if check and model != "montecarlo":
-            monte_carlo = _profile(tissue, "montecarlo", clamp, tracing)
+            monte_carlo = _compute_profile(tissue, "montecarlo", clamp, tracing)
             model_error = error_against_photons(radial, monte_carlo)
-        spectrum = _spectrum(tissue, model, clamp)
+        spectrum = _reflectance_spectrum(tissue, model, clamp)
     conserve = keep_energy or radial.model == COUNTED_MODEL
     table_fit, terms = (table, _TERMS) if fit is None else (None, fit)
     fitted = gaussian_fit(radial, table_fit, terms, shared=variances == "shared", keep_energy=conserve)
-    report = Report(radial, tissue, fitted, other_fit(radial, fit_kind), thicknesses, model_error, spectrum)
+    report = ProfileReport(
+        radial, tissue, fitted, additional_fit(radial, fit_kind), thicknesses, model_error, spectrum
+    )
     if output is not None:
         report.save(output)
     if plot is not None:
@@ -182,7 +184,10 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
 
 
 def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, is_traced: bool) -> Options:
-    """Return the options of the Monte Carlo simulation; print a note if it will not run."""
+    """Return the keyword arguments of the Monte Carlo simulation.
+
+    Prints a note if they are given, but no simulation will run.
+    """
     if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")
     return {
@@ -199,7 +204,7 @@ def _refuse_tissue_options(name: str, options: Options) -> None:
             refuse(option_name(option, _OPTION_NAMES), expected, actual, "Remove the option")
 
 
-def _tissue(name: str, options: Options, eta: float | None) -> Tissue:
+def _load_tissue(name: str, options: Options, eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
     pigments = dict(options)
@@ -210,13 +215,13 @@ def _tissue(name: str, options: Options, eta: float | None) -> Tissue:
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | None:
+def _reflectance_spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | None:
     if model is None or model == "counted" or model == "montecarlo":
         return tissue.spectrum(clamp=clamp)
     return tissue.spectrum(model, clamp)
 
 
-def _profile(tissue: Tissue, model: Model | None, clamp: Clamp, tracing: Options) -> RadialProfile:
+def _compute_profile(tissue: Tissue, model: Model | None, clamp: Clamp, tracing: Options) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile

@@ -1,4 +1,4 @@
-"""Report of `dermis profile` as text, as JSON, as a profile file and as a plot."""
+"""Report of `dermis profile` as text, JSON, profile file and plot."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 
 def _format_row(values: Floats) -> str:
-    """Return three numbers as aligned text."""
+    """Return a number for each of red, green and blue as aligned text."""
     return " ".join(f"{value:7.4f}" for value in values)
 
 
 def _to_lists(value: object) -> object:
-    """Convert arrays to lists, and remove the None entries of dictionaries."""
+    """Convert nested arrays to lists for JSON, and drop dictionary entries that are None."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, dict):
@@ -47,31 +47,37 @@ def _to_lists(value: object) -> object:
 def gaussian_fit(
     radial: RadialProfile, table: GaussianSum | None, terms: int, *, shared: bool, keep_energy: bool
 ) -> GaussianFit:
-    """Return the Gaussians fitted to a profile; a published table of Gaussians is returned as it is."""
+    """Return the Gaussians fitted to a diffusion profile, or a published table of Gaussians unchanged.
+
+    table : published Gaussians; None to fit the profile
+    terms : number of Gaussians to fit
+    shared : whether all colour channels have the same variances
+    keep_energy : whether the weights must sum to the total reflectance
+    """
     if table is not None:
         return GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
     target = radial.points() if radial.finite_at_centre else radial.rings()
     return fit_gaussians(target, terms, shared=shared, keep_energy=keep_energy, name=radial.name)
 
 
-def other_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
-    """Return the additional fit, "burley" or "separable"; None for any other kind."""
+def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
+    """Return the fit named by --fit-kind, "burley" or "separable"; None for "gaussian"."""
     if kind == "burley":
         return fit_burley(radial.rings())
     return fit_separable(radial.rings()) if kind == "separable" else None
 
 
 @dataclass(frozen=True)
-class Report:
-    """Diffusion profile with its fits and errors.
+class ProfileReport:
+    """Diffusion profile with its fits and their errors, as `dermis profile` prints it.
 
-    radial : the diffusion profile
-    tissue : tissue of the profile, None for a table of Gaussians
+    radial : diffusion profile
+    tissue : tissue that the profile describes; None for a table of Gaussians
     fit : fitted Gaussians and their error
-    other : additional fit, None for none
+    other : Burley or separable fit; None if not requested
     through_mm : thicknesses at which the transmitted colour is reported [mm]
-    model_error : error of the diffusion model compared with Monte Carlo, None where unknown
-    spectrum : (31,) total reflectance by wavelength, None for media defined by colours [-]
+    model_error : error of the diffusion model relative to Monte Carlo, None if unknown
+    spectrum : (31,) total reflectance by wavelength; None for tissue given by RGB coefficients [-]
     """
 
     radial: RadialProfile
@@ -84,11 +90,11 @@ class Report:
 
     @property
     def ring_error(self) -> Floats:
-        """Return the (3,) relative error of the Gaussians in the light through concentric rings [-]."""
+        """Return the relative error of the Gaussians (3,) in the light that emerges through rings [-]."""
         return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
     def as_json(self) -> object:
-        """Return the report as nested dictionaries and lists."""
+        """Return the report as nested dictionaries and lists for JSON."""
         radial, gaussians, error = self.radial, self.fit.profile, self.model_error
         transmitted = self._transmitted_colours()
         return _to_lists(
@@ -122,7 +128,7 @@ class Report:
         )
 
     def lines(self) -> list[str]:
-        """Return the lines of the report as text."""
+        """Return the report as lines of text."""
         radial, fit = self.radial, self.fit
         total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
         lines = [f"{radial.name}, model {radial.model}", total]
@@ -144,7 +150,7 @@ class Report:
         return lines
 
     def _model_lines(self) -> list[str]:
-        """Return the lines about the error of the diffusion model, which the fit does not reduce."""
+        """Return text lines about the error of the diffusion model, which no fit can reduce."""
         error = self.model_error
         if error is None:
             return []
@@ -167,7 +173,7 @@ class Report:
         return [*lines, fit_error, f"rings      {_format_row(self.ring_error)}  error of the Gaussians"]
 
     def save(self, path: Path) -> None:
-        """Write the Gaussians as a profile file for the renderer."""
+        """Write the fitted Gaussians to a TOML file for `dermis render --profile`."""
         from dermis.optics.profiles import write_profile
 
         remarks: dict[str, object] = {"name": self.radial.name, "model": self.radial.model}
@@ -213,7 +219,7 @@ class Report:
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
-        """Return the (n, 3) light transmitted through the given thicknesses, by method of computation [-]."""
+        """Return the transmittance (n, 3) of slabs with the thicknesses `through_mm`, by method [-]."""
         if not self.through_mm:
             return {}
         gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}
@@ -232,10 +238,11 @@ _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "
 _MAX_PHOTON_ERROR = 0.3  # relative standard error above which a point is not plotted
 
 
-def draw_plot(path: Path, report: Report, monte_carlo: RadialProfile | None) -> None:
-    """Write a plot of r R(r) by channel: model, fitted Gaussians, and Monte Carlo results with error bars.
+def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | None) -> None:
+    """Plot r R(r) per colour channel: the model, its Gaussian fit, and Monte Carlo with error bars.
 
-    path : .png, .svg or .pdf
+    path : file to write, .png, .svg or .pdf
+    monte_carlo : profile traced for comparison; None for no comparison
     """
     rc_context = import_extra("matplotlib", "plots").rc_context
     spectral = report.spectrum is not None
@@ -249,7 +256,7 @@ def draw_plot(path: Path, report: Report, monte_carlo: RadialProfile | None) -> 
         peak = max(peak, _plot_photons(axes, monte_carlo))
     axes.set(xscale="log", yscale="log", xlabel="r [mm]", ylabel="r R(r) [1/mm]")
     axes.set(xlim=(1e-3, 30.0), ylim=(_PLOT_FLOOR * peak, 2.0 * peak))
-    axes.set_title(_title(report), fontsize=10, loc="left")
+    axes.set_title(_plot_title(report), fontsize=10, loc="left")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
     _add_legend(figure, axes)
     buffer, file_format = BytesIO(), path.suffix.lower()[1:]
@@ -259,8 +266,8 @@ def draw_plot(path: Path, report: Report, monte_carlo: RadialProfile | None) -> 
         temporary.write_bytes(buffer.getvalue())
 
 
-def _plot_spectra(axes: Axes, report: Report) -> None:
-    """Plot the reflectance by wavelength, and the coefficients of the layers on a second axis."""
+def _plot_spectra(axes: Axes, report: ProfileReport) -> None:
+    """Plot total reflectance by wavelength, and the coefficients of the layers on a second axis."""
     assert report.tissue is not None and report.spectrum is not None
     axes.plot(WAVELENGTHS_NM, report.spectrum, color="black", linewidth=1.6, label="R")
     axes.set(xlim=(400, 700), ylim=(0, 1), xlabel="wavelength [nm]", ylabel="R, of incident light")
@@ -275,14 +282,14 @@ def _plot_spectra(axes: Axes, report: Report) -> None:
 
 
 def _add_legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend below the plot with one column per channel."""
+    """Add a legend below the plot, with one column per colour channel."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     by_channel = sorted(entries, key=lambda entry: _CHANNEL_NAMES.index(entry[1].partition(",")[0]))
     style: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "frameon": False, "fontsize": 8}
     figure.legend(*zip(*by_channel, strict=True), **style)
 
 
-def _plot_curves(axes: Axes, report: Report) -> float:
+def _plot_curves(axes: Axes, report: ProfileReport) -> float:
     radial, fit = report.radial, report.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
@@ -317,7 +324,7 @@ def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
     return peak
 
 
-def _title(report: Report) -> str:
+def _plot_title(report: ProfileReport) -> str:
     radial = report.radial
     total = ", ".join(f"{value:.3f}" for value in radial.total)
     eta = f", index {report.tissue.medium.eta:g}" if report.tissue is not None else ""

@@ -12,8 +12,14 @@ from typing import TYPE_CHECKING
 
 from dermis.base.console import note, print_report, spinner
 from dermis.cli.options import AdapterOption, JsonOption, OutputPath
-from dermis.cli.output_options import Format, FrameLandmarks, FrameOutputs, Landmarks, Outputs
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene, note_subdivision
+from dermis.cli.output_options import (
+    FrameLandmarks,
+    FrameOutputs,
+    LandmarksOption,
+    OutputsFormatOption,
+    OutputsOption,
+)
+from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene, note_subdivision
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
@@ -31,10 +37,10 @@ def render(
     /,
     *,
     output: OutputPath = Path("dermis.png"),
-    scene: SceneOptions = DEFAULTS,
-    outputs: Outputs = None,
-    outputs_format: Format = None,
-    landmarks: Landmarks = None,
+    scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
+    outputs: OutputsOption = None,
+    outputs_format: OutputsFormatOption = None,
+    landmarks: LandmarksOption = None,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
 ) -> int:
@@ -93,7 +99,7 @@ def render(
             if as_json:  # time a second frame, because the first one fills the caches
                 rendered = renderer.draw_warm(loaded_scene, settings)
         _note_light(loaded_scene, settings, rendered)
-        _write(rendered, output, frame_outputs, values)
+        _write_images(rendered, output, frame_outputs, values)
         _note_clipped(rendered)
         landmark_output.write(renderer, loaded_scene, settings)
     report = {
@@ -118,7 +124,7 @@ def render(
 
 @contextlib.contextmanager
 def _gc_disabled() -> Iterator[None]:
-    """Disable garbage collection, which would scan all loaded libraries for little gain in one picture."""
+    """Disable garbage collection in a context, as scanning all libraries saves little in one picture."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -128,10 +134,13 @@ def _gc_disabled() -> Iterator[None]:
             gc.enable()
 
 
-def _write(
+def _write_images(
     rendered: RenderedFrame, output: Path, outputs: FrameOutputs, values: Mapping[str, PlaneArray]
 ) -> None:
-    """Write the image, and the outputs into the same file or beside it."""
+    """Write the image file and the requested outputs, which may share the image's EXR file.
+
+    values : pixel arrays of the outputs by name
+    """
     from dermis.images.io import write_image, write_png
 
     linear, with_alpha = None, rendered.settings.background == "none"
@@ -146,7 +155,11 @@ def _write(
 
 
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
-    """Print notes about lighting that may surprise: unscattered triangles, sun-like peaks, wrong gamma."""
+    """Print notes on stderr about lighting that may surprise users.
+
+    These are skin triangles lit without scattering, sun-like peaks of the environment, and the setting gamma
+    "wrong".
+    """
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
     if technique.uses_atlas and technique.stitches_seams and rendered.unscattered_fraction > _MAX_UNSCATTERED:
         fraction = f"{rendered.unscattered_fraction:.0%} of the skin's triangles"

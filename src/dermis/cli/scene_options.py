@@ -18,7 +18,7 @@ from dermis.cli.head_options import (
     EyeOptions,
     HeadOptions,
     LookAtOption,
-    Weights,
+    WeightsOption,
     check_head,
     note_eyes,
     parse_bone_angles,
@@ -56,7 +56,7 @@ if not TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """Scene options from the command line, as dictionaries of model fields."""
+    """Scene options from the command line; field values of settings models are dictionaries by field name."""
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
@@ -85,18 +85,20 @@ class SceneOptions:
     ] = None
     head: HeadOptions = field(default_factory=dict)
     eye: EyeOptions = None
-    pose: Weights = None
+    pose: WeightsOption = None
     bone: BoneAngleOptions = None
     look_at: LookAtOption = None
 
 
-DEFAULTS = SceneOptions()
+DEFAULT_SCENE_OPTIONS = SceneOptions()
 
 
 def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
-    """Return the scene and settings of a head or scene file, with the options applied.
+    """Return the scene and settings that a head or scene file and the command line options describe.
 
-    Settings without a value in the file or in the options get the values of `PHOTOGRAPHIC_SETTINGS`.
+    Settings that neither the file nor an option gives have the values of `PHOTOGRAPHIC_SETTINGS`.
+
+    name : head or scene file as named on the command line
     """
     from dermis.scene import Scene, load_camera
 
@@ -129,7 +131,7 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
 
 
 def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
-    """Print a note on stderr if the subdivision level was chosen automatically.
+    """Print a note on stderr if the subdivision level of the head was chosen automatically.
 
     name : head or scene file as named on the command line
     """
@@ -144,7 +146,7 @@ def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
 
 
 def _check_values(name: str, options: SceneOptions) -> None:
-    """Validate the options before the head is loaded, because loading takes longer."""
+    """Validate all options before the head is loaded, which takes longer."""
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
@@ -163,13 +165,13 @@ def _check_values(name: str, options: SceneOptions) -> None:
 
 
 def _note_profile_map(skin: Skin, settings: Settings) -> None:
-    """Print a note on stderr if the profile map has no effect with the technique."""
+    """Print a note on stderr if the skin has a profile map that the technique ignores."""
     if skin.profile_map and not TECHNIQUES[settings.technique].mixes_profiles:
         note(f"note: {settings.technique} uses only the first profile; texture-space mixes them by the map")
 
 
 def _base_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
-    """Return the scene of a file, or a scene of the head with default settings."""
+    """Return the scene of a scene file, or a default scene of a head, before options are applied."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
     from dermis.scene.smoothness import SmoothIn
@@ -200,7 +202,10 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 def _select_lights(
     scene: Scene, name: str | None, environment: Environment | None, *, replaced: bool
 ) -> tuple[Light, ...]:
-    """Return the lights of --lights; none if only an environment is given; else those of the scene."""
+    """Return the lights of --lights; none if only --env is given; otherwise those of the scene.
+
+    replaced : whether --env replaces the environment
+    """
     from dermis.scene import load_lights
 
     if name is None:

@@ -100,14 +100,14 @@ def unmix(
     written = save_maps(output, result, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
     if widths:
         written += save_mixture(output, profile_mixture(result))
-    _report(result, written, time.perf_counter() - started, as_json)
+    _print_report(result, written, time.perf_counter() - started, as_json)
     return 0
 
 
 def _parse_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> PigmentChange | None:
-    """Return the change of colour given by the options, None if there is none."""
+    """Return the change of pigments that the recolouring options request; None without such options."""
     from dermis.apps.inverse.unmixing.unmix import PigmentChange, parse_fraction_change
     from dermis.base.quantities import checked_number
 
@@ -119,7 +119,7 @@ def _parse_change(
     return PigmentChange(**values) if values else None
 
 
-def _report(result: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
+def _print_report(result: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
     summary = result.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
     if as_json:
         print_json(summary)

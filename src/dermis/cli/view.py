@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dermis.base.console import note, print_lines, spinner
 from dermis.base.errors import refuse
 from dermis.cli.options import AdapterOption, Flag, Integer
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble_scene
+from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene
 
 if TYPE_CHECKING:
     from dermis.apps.viewer.player import MotionFile
@@ -28,7 +28,7 @@ def view(
     token: Flag = False,
     motion: str | None = None,
     motion_fps: float | None = None,
-    scene: SceneOptions = DEFAULTS,
+    scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
     adapter: AdapterOption = "auto",
 ) -> int:
     """Show a head in an interactive window or web page.
@@ -93,7 +93,7 @@ def view(
 
 
 def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerState:
-    """Return the viewer state described by the options."""
+    """Return the state of the viewer at its start, for a head or scene file and the options."""
     from dermis.apps.viewer.state import initial_state
     from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_absolute_paths
@@ -108,7 +108,7 @@ def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerStat
 
 
 def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
-    """Return the motion for the head, loaded before the window opens; None without a motion file."""
+    """Load the motion file for the head before the window opens; None without a motion file."""
     if file is None:
         return None
     from dermis.apps.viewer.player import MotionFile
