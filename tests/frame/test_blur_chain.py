@@ -9,7 +9,7 @@ from test_diffuse_stage import point_of_light
 from tolerances import SPREAD_ENERGY, SPREAD_PEAK
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas.textures import AtlasMip, _coarser
+from dermis.frame.features.atlas.textures import AtlasMip, _upload_coarser
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion.kernels import add_intermediate_levels, chain_cost
@@ -47,7 +47,7 @@ def test_steps_are_told_from_the_profiles_levels() -> None:
 def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm: float) -> None:
     """Compare a blurred point of light with the analytic peak."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
-    coarser = _coarser(
+    coarser = _upload_coarser(
         device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
     )
     textures, wanted = resting(device, atlas, coarser=coarser, median_texels_per_mm=texels_per_mm), SIX[-1:]

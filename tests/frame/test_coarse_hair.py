@@ -71,7 +71,7 @@ def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> Non
     head, device = wool(20_000, 1.0), renderer.device
     tables = hairs.make_strand_tables(device, head, make_strand_buffers(device, strand_capacity(head)))
     near, far = (hairs.drawn_hair_count(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
-    assert near == 20_000 and hairs._MIN_DRAWN <= far < 12_000
+    assert near == 20_000 and hairs._MIN_DRAWN_STRANDS <= far < 12_000
     assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
 
 

@@ -15,7 +15,13 @@ from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.features.atlas.textures import AtlasMip, AtlasTextures, _coarser, halve_mip, upload_atlas
+from dermis.frame.features.atlas.textures import (
+    AtlasMip,
+    AtlasTextures,
+    _upload_coarser,
+    halve_mip,
+    upload_atlas,
+)
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion.pyramid import (
@@ -121,7 +127,7 @@ def test_constant_light_stays_constant_at_every_resolution(
 def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
     """With texels of 1 mm halving adds more than 0.4 mm2 to the second level; the third compensates."""
     atlas = build_atlas(plane(256.0), 256)
-    coarser = _coarser(
+    coarser = _upload_coarser(
         device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
     )
     textures = resting(device, atlas, coarser=coarser, median_texels_per_mm=2.0)

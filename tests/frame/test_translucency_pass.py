@@ -112,7 +112,7 @@ def test_twin_of_what_comes_through(
     row: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(programs, "_ROW", row)
+    monkeypatch.setattr(programs, "_GROUPS_PER_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
     twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1

@@ -94,7 +94,7 @@ def test_triangles_of_all_sizes(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, what: str, groups: int, samples: int
 ) -> None:
     """Workgroups of few and of many triangles agree, with one or two words per sample."""
-    monkeypatch.setattr(visibility_buffer, "_GROUPS", groups)
+    monkeypatch.setattr(visibility_buffer, "_TARGET_GROUPS", groups)
     monkeypatch.setattr(visibility_buffer, "_MAX_DEPTH_STEP_MM", 0.0 if "after" in what else 0.1)
     layers = make_layers(renderer.device, SIZE, samples, triangles=what != "depth", compute=True)
     made, clips = shown(layers, renderer, SOUP, TURNED, samples)
@@ -110,8 +110,8 @@ def test_triangles_of_all_sizes(
 
 def test_more_blocks_than_a_workgroup_lists(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """A workgroup of 128 triangles with 11 blocks each exceeds its list of 1024."""
-    monkeypatch.setattr(visibility_buffer, "_GROUPS", 1)
-    monkeypatch.setattr(visibility_buffer, "_RUN", 128)
+    monkeypatch.setattr(visibility_buffer, "_TARGET_GROUPS", 1)
+    monkeypatch.setattr(visibility_buffer, "_RUN_TRIANGLES", 128)
     head = head_of(plane(80.0, 8))
     layers = make_layers(renderer.device, SIZE, 1, triangles=True, compute=True)
     (layer,), _ = shown(layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)

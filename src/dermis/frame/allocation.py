@@ -54,18 +54,20 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     shapes = shape.make(memo, device, request)
     strands = hair.make(memo, device, request)
     bindings = _shared_bindings(memo, device, request, shadow_maps, shapes, strands)
-    atlases = [_atlas(memo, device, request, name, k) for k, name in enumerate(request.atlas_plan.layouts)]
+    atlases = [
+        _layout_atlas(memo, device, request, name, k) for k, name in enumerate(request.atlas_plan.layouts)
+    ]
     uploaded = memo.result(maps)
     bindings |= uploaded.bindings | cached(detail_bindings, device, request.has_fine_relief)
     layouts = tuple(
-        _layout(memo, device, request, technique, atlas, shapes, bindings, k)
+        _make_layout(memo, device, request, technique, atlas, shapes, bindings, k)
         for k, atlas in enumerate(atlases)
     )
     own = technique.make(memo, device, settings, request.profile)
     thin = [layout.translucency for layout in layouts]
     scattered = layouts[0].scattered
     if len(layouts) > 1:
-        scattered = _sum(memo, device, request, technique, settings.atlas, "both")
+        scattered = _exitance_texture(memo, device, request, technique, settings.atlas, "both")
     needs_layers = "diffuse" in request.outputs
     return Resources(
         shape=shapes,
@@ -76,10 +78,12 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         scattered=scattered,
         technique=own,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
-        sky=_sky(memo, device, request, layouts[0], shapes) if request.occlusion_follows_shape else None,
+        sky=_vertex_sky(memo, device, request, layouts[0], shapes)
+        if request.occlusion_follows_shape
+        else None,
         hair=strands,
-        visibility=cached(_visibility, device, settings.size, settings.samples),
-        view=_view(device, request, technique, own),
+        visibility=cached(_visibility_layers, device, settings.size, settings.samples),
+        view=_shade_record(device, request, technique, own),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
         post=post.make(memo, device, request),
         outputs=outputs.make(memo, device, request, shapes.tables, thin),
@@ -99,7 +103,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     return tuple((name, 1) for name, value in used.items() if value)
 
 
-def _view(
+def _shade_record(
     device: Device, request: FrameRequest, technique: Technique, own: TechniqueResources | None
 ) -> UniformRecord:
     """Return the uniform record of the shading pass, with all members except those of the camera.
@@ -143,11 +147,11 @@ def _shared_bindings(
         "curvatures": curvature.smoothed if curvature else placeholder_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": request.environment_map.panorama,
-        "albedo_table": memo.get(_albedo, device, lobe_name(skin), skin.fresnel),
+        "albedo_table": memo.get(_albedo_texture, device, lobe_name(skin), skin.fresnel),
     }
 
 
-def _sky(
+def _vertex_sky(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
 ) -> VertexSky:
     """Return buffers with the visible fraction of the sky at each vertex, computed for the head at rest."""
@@ -155,13 +159,13 @@ def _sky(
     return memo.get(make_vertex_sky, device, request.topology, untracked=(at_rest,))
 
 
-def _atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
+def _layout_atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
     stretch = request.technique.stretch(request.settings)
     atlas = memo.get(cached_atlas, request.topology.mesh, request.atlas_plan.side, name, owner=str(index))
     return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, owner=str(index))
 
 
-def _layout(
+def _make_layout(
     memo: Memo,
     device: Device,
     request: FrameRequest,
@@ -210,7 +214,7 @@ def _layout(
     )
     side = settings.atlas if request.blur_count else 1
     surfaces = cached(make_surface_texture, device, side, owner=number)
-    scattered = _sum(memo, device, request, technique, side, number)
+    scattered = _exitance_texture(memo, device, request, technique, side, number)
     optional = gutter_update, translucency, moving_occlusion, interreflection
     return AtlasLayout(textures, geometry, bindings, surfaces, scattered, *optional)
 
@@ -219,7 +223,7 @@ def _gutter_update(tracing: GutterTracing, geometry: HeadGeometry, rest_shape: S
     return GutterUpdate(tracing, geometry.with_shape(rest_shape))
 
 
-def _sum(
+def _exitance_texture(
     memo: Memo, device: Device, request: FrameRequest, technique: Technique, side: int, role: str
 ) -> Texture:
     owner = f"{role} {request.view_name}"
@@ -230,11 +234,11 @@ def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> Shadow
     return make_shadow_maps(device, layers, size)
 
 
-def _visibility(device: Device, size: tuple[int, int], samples: int) -> ViewLayers:
+def _visibility_layers(device: Device, size: tuple[int, int], samples: int) -> ViewLayers:
     return make_layers(device, size, samples, triangles=True)
 
 
-def _albedo(device: Device, lobe: str, fresnel: str) -> Texture:
+def _albedo_texture(device: Device, lobe: str, fresnel: str) -> Texture:
     return texture_from_array(device, albedo_table(lobe, fresnel), "rg32float")
 
 

@@ -25,10 +25,12 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
-_BATCH = 1 << 20  # surface points per pass; their results fit a buffer of the default limits of WebGPU
-_PICTURE = (64, 64)  # size of the frame that lights the atlas, which is not used
+_POINTS_PER_PASS = (
+    1 << 20
+)  # surface points per pass; their results fit a buffer of the default limits of WebGPU
+_PICTURE_SIZE = (64, 64)  # size of the frame that lights the atlas, which is not used
 _ALBEDO_ATLAS, _ALBEDO_SIDE = 512, 2048  # sides of the atlas and of the filtered texels, for albedo only
-_CONDITIONAL = {
+_CONDITIONAL_OUTPUTS = {
     ("thickness",): "no light crosses thin parts: transmission is none, or no light is blurred",
     ("melanin", "blood"): "the skin is not made of pigments",
 }  # outputs that only some scenes have, and the reason why others do not
@@ -58,11 +60,13 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Bak
 
     Raises DermisError for sizes over the limits of the device, and when the device fails.
     """
-    changes = {"size": _PICTURE, "samples": 1, "technique": "texture-space", "parts": "all"}
+    changes = {"size": _PICTURE_SIZE, "samples": 1, "technique": "texture-space", "parts": "all"}
     settings = settings.model_copy(update=changes)
     absent: dict[str, str] = {}
     outputs = tuple(
-        name for names in _CONDITIONAL for name in _available(renderer, scene, settings, names, absent)
+        name
+        for names in _CONDITIONAL_OUTPUTS
+        for name in _available_outputs(renderer, scene, settings, names, absent)
     )
     texel, points = layout_points(scene.head.mesh, side)
     job = partial(_bake_points, renderer, scene, settings, outputs, points, side)
@@ -77,7 +81,7 @@ def bake_albedo(
     triangle : (n,) indices of the triangles on which the points lie
     weights : (n, 2) barycentric weights of the second and third corner
     """
-    settings = Settings(size=_PICTURE, samples=1, atlas=_ALBEDO_ATLAS, strands=False)
+    settings = Settings(size=_PICTURE_SIZE, samples=1, atlas=_ALBEDO_ATLAS, strands=False)
     points = baking_pass.point_words(triangle, weights)
     job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_SIDE)
     values = renderer.reopening_device.run(job)
@@ -96,10 +100,12 @@ def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.
     owner = np.full(side * side, -1, np.int64)
     owner[texel[order]] = triangle[order]
     covered = np.flatnonzero(owner >= 0)
-    return covered, baking_pass.point_words(owner[covered], _weights(mesh, side, covered, owner[covered]))
+    return covered, baking_pass.point_words(
+        owner[covered], _texel_weights(mesh, side, covered, owner[covered])
+    )
 
 
-def _weights(
+def _texel_weights(
     mesh: Mesh, side: int, texel: NDArray[np.int64], triangle: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Return (n, 2) barycentric weights of texel centres for the second and third corner of a triangle.
@@ -116,14 +122,14 @@ def _weights(
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1.0))
 
 
-def _available(
+def _available_outputs(
     renderer: Renderer, scene: Scene, settings: Settings, names: tuple[str, ...], absent: dict[str, str]
 ) -> tuple[str, ...]:
     """Return `names` if the scene can render these outputs, else nothing and the reason in `absent`."""
     try:
         renderer.draw(scene, settings, timed=False, outputs=names)
     except DermisError:
-        absent |= dict.fromkeys(names, _CONDITIONAL[names])
+        absent |= dict.fromkeys(names, _CONDITIONAL_OUTPUTS[names])
         return ()
     return names
 
@@ -144,18 +150,18 @@ def _bake_points(
     """
     renderer.draw(scene, settings, timed=False, outputs=outputs)
     inputs = renderer.prepare(scene, settings, "", outputs)
-    bindings, output_resources = _bindings(renderer, inputs, scene), inputs.resources.outputs
+    bindings, output_resources = _bake_bindings(renderer, inputs, scene), inputs.resources.outputs
     pigments = output_resources.light.pigments if output_resources and "melanin" in outputs else (0.0, 0.0)
     values = np.empty((len(points), COUNT), np.float32)
-    for start in range(0, len(points), _BATCH):
-        part = slice(start, start + _BATCH)
+    for start in range(0, len(points), _POINTS_PER_PASS):
+        part = slice(start, start + _POINTS_PER_PASS)
         options = bindings, points[part], 1.0 / side, pigments
         values[part] = baking_pass.bake(renderer.device, inputs.constants, *options)
         LOGGER.info("baking maps: %d of %d texels", min(part.stop, len(points)), len(points))
     return values
 
 
-def _bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
+def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
     """Return the shader resources of bake.wgsl: those of a rendered frame, curvature and thickness."""
     resources, device = inputs.resources, renderer.device
     skin_curvature = make_curvature(device, scene.head.topology.mesh)
@@ -176,7 +182,7 @@ def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[s
     """
     covered = np.zeros(side * side, np.bool_)
     covered[texel] = True
-    uncovered, nearest = np.flatnonzero(~covered), _nearest(covered.reshape(side, side))
+    uncovered, nearest = np.flatnonzero(~covered), _nearest_covered_texels(covered.reshape(side, side))
     maps, first = {}, 0
     for name, count in CHANNELS.items():
         channels = values[:, first : first + count]
@@ -190,7 +196,7 @@ def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[s
     return BakedMaps(covered.reshape(side, side), maps, absent)
 
 
-def _nearest(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _nearest_covered_texels(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return, for each texel outside the mask in row order, the flat index of the nearest texel inside."""
     from scipy.ndimage import distance_transform_edt
 

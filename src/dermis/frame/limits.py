@@ -19,14 +19,14 @@ from dermis.gpu import Device
 from dermis.gpu.memory import OutOfMemoryError, allocated_bytes, check_memory, format_bytes, probe_memory
 from dermis.scene.settings import Settings
 
-_DISTANCE = 4  # bytes per texel: distance to the edge of the chart
-_FLOATS = 16  # bytes per texel: four floats
-_GEOMETRY = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, reach
-_PICTURE = 36  # bytes per pixel
-_SAMPLE = 8  # bytes per sample
-_CHANNEL = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
+_DISTANCE_BYTES = 4  # bytes per texel: distance to the edge of the chart
+_TEXEL_BYTES = 16  # bytes per texel: four floats
+_GEOMETRY_BYTES = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, reach
+_PICTURE_BYTES = 36  # bytes per pixel
+_SAMPLE_BYTES = 8  # bytes per sample
+_CHANNEL_BYTES = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
 _FEW_SAMPLES = 4  # per pixel; with fewer, edges alias
-_FRACTION = 0.75  # of the available memory; the head, its maps and programs need the rest
+_BUDGET_FRACTION = 0.75  # of the available memory; the head, its maps and programs need the rest
 _MIN_SIDE = 64  # smaller sides save nothing
 
 
@@ -58,9 +58,9 @@ def out_of_memory_error(error: OutOfMemoryError, device: Device, request: FrameR
         traceback.clear_frames(raised.__traceback__)
     needed = sum(frame_bytes(request).values())
     free = probe_memory(device, needed)
-    budget = _FRACTION * (allocated_bytes() + free)
+    budget = _BUDGET_FRACTION * (allocated_bytes() + free)
     if needed <= budget:  # the estimate fits, so the process holds memory that cannot be counted
-        budget = _FRACTION * free
+        budget = _BUDGET_FRACTION * free
     return OutOfMemoryError(error.expected, error.actual, error.size, suggest_settings(request, budget))
 
 
@@ -73,7 +73,7 @@ def suggest_settings(request: FrameRequest, budget: float) -> str:
     needed = frame_bytes(request)
     while sum(needed.values()) > budget:
         option = max(needed, key=lambda name: needed[name])
-        halved = _halved(smaller.settings, option)
+        halved = _halved_settings(smaller.settings, option)
         if halved is None:
             break
         smaller = replace(smaller, settings=halved)
@@ -87,13 +87,13 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
     """Return the memory of a frame for each size setting [bytes], without that of the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
-    pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
-    pixel += _CHANNEL * sum(request.output_channels.values())
+    pixel = _PICTURE_BYTES + _SAMPLE_BYTES * settings.samples + technique.pixel_bytes
+    pixel += _CHANNEL_BYTES * sum(request.output_channels.values())
     pixel += technique.subsurface_layer_bytes * ("diffuse" in request.outputs)
     texel = atlas_texel_bytes(technique, request.blur_count, len(atlases.layouts))
     texel += _mixing_bytes(request) if request.blur_count else 0.0
     if "translucent" in request.outputs:
-        texel += _FLOATS * (2 * len(atlases.layouts) - 1)
+        texel += _TEXEL_BYTES * (2 * len(atlases.layouts) - 1)
     return {
         "atlas": texel * atlases.side**2,
         "size": float(pixel * width * height),
@@ -105,10 +105,10 @@ def _mixing_bytes(request: FrameRequest) -> float:
     """Return the memory per atlas texel that a blend of several profiles adds [bytes]."""
     others = len(request.other_profiles)
     maps = len(request.atlas_plan.layouts) + sum_count(others)
-    return others * request.technique.texel_bytes(request.blur_count) + _FLOATS * maps if others else 0.0
+    return others * request.technique.texel_bytes(request.blur_count) + _TEXEL_BYTES * maps if others else 0.0
 
 
-def _halved(settings: Settings, option: str) -> Settings | None:
+def _halved_settings(settings: Settings, option: str) -> Settings | None:
     """Return settings with half the value of a size option, None if that is too small.
 
     For "size", the samples per pixel are halved first.
@@ -137,7 +137,7 @@ def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int)
     layouts : number of atlas layouts
     """
     if not blur_count:
-        return layouts * _GEOMETRY
+        return layouts * _GEOMETRY_BYTES
     blurs = technique.texel_bytes(blur_count)
-    blended = _FLOATS + layouts * _DISTANCE if layouts > 1 else 0
-    return blurs + blended + layouts * (_GEOMETRY + SURFACE_BYTES + _FLOATS)
+    blended = _TEXEL_BYTES + layouts * _DISTANCE_BYTES if layouts > 1 else 0
+    return blurs + blended + layouts * (_GEOMETRY_BYTES + SURFACE_BYTES + _TEXEL_BYTES)

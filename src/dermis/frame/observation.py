@@ -90,10 +90,10 @@ def observation_jobs(
     settings : settings of each scene
     """
     for (scene, before), chosen in zip(pair_with_previous(scenes, previous), settings, strict=False):
-        yield partial(submit, scene, before, settings=chosen), partial(_observation, scene, chosen)
+        yield partial(submit, scene, before, settings=chosen), partial(_read_observation, scene, chosen)
 
 
-def _observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
+def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
     picture, outputs, landmark_sets = readback.image_and_outputs()
     camera = scene.camera.to_opencv(settings.size)
     landmarks = {name: _landmarks(camera, *rows) for name, rows in landmark_sets.items()}

@@ -19,7 +19,7 @@ from dermis.scene.outputs import OUTPUTS, Output
 
 Format = Literal["exr", "png", "npy"]
 _PNG_MAX = 65535
-_PICTURE = "rgba"  # name of the first part, a convention of compositing programs
+_PICTURE_PART = "rgba"  # name of the first part, a convention of compositing programs
 
 
 def check_formats(names: Iterable[str], kind: Format) -> None:
@@ -55,7 +55,7 @@ def write_output(path: Path, name: str, values: PlaneArray) -> None:
     values : (h, w) or (h, w, c) array of the output
     """
     kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
-    _write(path, encode_output(name, values, kinds[path.suffix.lower()]))
+    _write_atomically(path, encode_output(name, values, kinds[path.suffix.lower()]))
 
 
 def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
@@ -64,9 +64,9 @@ def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneA
     picture : (h, w, 3 or 4) linear floats
     values : arrays of the outputs by name
     """
-    parts = {_PICTURE: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
+    parts = {_PICTURE_PART: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
     parts |= {name: _channels(OUTPUTS[name], one) for name, one in values.items()}
-    _write(path, encode_exr_parts(parts))
+    _write_atomically(path, encode_exr_parts(parts))
 
 
 def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
@@ -111,6 +111,6 @@ _ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
 }
 
 
-def _write(path: Path, data: bytes) -> None:
+def _write_atomically(path: Path, data: bytes) -> None:
     with files.atomic_file(path) as temporary:
         temporary.write_bytes(data)

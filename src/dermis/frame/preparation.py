@@ -46,9 +46,9 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-_SLACK_MM = 10.0  # margin of the outline of a rig, which is approximate
+_OUTLINE_MARGIN_MM = 10.0  # margin of the outline of a rig, which is approximate
 Lights = tuple[Light, ...]
-Names = tuple[str, ...]
+RequestedNames = tuple[str, ...]
 
 
 class HeadState(NamedTuple):
@@ -90,7 +90,7 @@ class Preparation:
         """
         inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
         if "motion" in outputs:
-            inputs = replace(inputs, previous=self._previous(scene, previous or scene, inputs))
+            inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
         self.memo.end_frame()
         return inputs
 
@@ -100,7 +100,7 @@ class Preparation:
         settings: Settings,
         technique: Technique,
         view: str,
-        requested: tuple[Names, Names],
+        requested: tuple[RequestedNames, RequestedNames],
     ) -> FrameInputs:
         cached, device, head, environment = self.memo.get, self.device, scene.head.bare, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
@@ -109,7 +109,7 @@ class Preparation:
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.motion)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
-        lights, shadow_views, part_counts = cached(_lights, *light_inputs, untracked=(device, scene))
+        lights, shadow_views, part_counts = cached(_light_resources, *light_inputs, untracked=(device, scene))
         request = FrameRequest(
             head=scene.head,
             skin=scene.skin,
@@ -145,7 +145,7 @@ class Preparation:
             motion=state.motion,
             face_movements=cached(_face_movements, head, scene.motion) if animated else None,
             layouts=tuple(with_lights(layout, lights) for layout in resources.layouts),
-            blurs=cached(_scaled, resources.diffusion.blurs, scale),
+            blurs=cached(_scaled_blurs, resources.diffusion.blurs, scale),
             shadow_views=shadow_views,
             light_constants=constants,
             camera_views=camera_views(camera, state.outline, settings.samples),
@@ -172,7 +172,7 @@ class Preparation:
         anchors, motion = self.memo.get(make_anchors, head.topology), motion or head.control.rest
         return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
 
-    def _previous(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
+    def _previous_scene(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
         """Return the pose and the camera of the previous scene, for motion vectors.
 
         Raises DermisError for a scene of another head.
@@ -235,7 +235,7 @@ def _posed_state(head: Head, motion: Motion, at_rest: MotionBytes) -> HeadState:
     rig, posed = head.control, _motion_bytes(head, motion, at_rest)
     if posed == at_rest:  # the outline of the mesh is exact
         return HeadState(posed, head.mesh.outline, _eye_poses(head, motion))
-    return HeadState(posed, Outline(rig.outline_mm(motion), _SLACK_MM), _eye_poses(head, motion))
+    return HeadState(posed, Outline(rig.outline_mm(motion), _OUTLINE_MARGIN_MM), _eye_poses(head, motion))
 
 
 def _sky_view(
@@ -250,11 +250,11 @@ def with_lights(layout: AtlasLayout, lights: UniformRecord) -> AtlasLayout:
     return replace(layout, bindings=layout.bindings | {"lights": lights})
 
 
-def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
+def _scaled_blurs(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
     return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
-def _lights(
+def _light_resources(
     _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
     """Return the uniform record of the lights, the views of shadow maps, and the parts of each light.

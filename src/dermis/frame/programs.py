@@ -32,13 +32,13 @@ TILE = 16
 """Side of the workgroups of short shaders; smaller ones end before a GPU has started the next."""
 WORKGROUP_SIZE = 64
 """Invocations per workgroup, EACH of each.wgsl."""
-_ROW = 32768  # workgroups along x, at most 65535
-_STRIP = 16  # pixels per invocation of shade.wgsl on software adapters
-_SPLAT_STEP = 2.0  # step along hairs in shadow maps on software adapters [texels]
+_GROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
+_STRIP_PIXELS = 16  # pixels per invocation of shade.wgsl on software adapters
+_SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
 _MAX_SAMPLES = 64  # per invocation: a driver ends loops after 65,535 iterations
 
 
-_ALWAYS = (  # shaders of most frames
+_COMMON_SHADERS = (  # shaders of most frames
     "shading/shade.wgsl",
     "surface/surface_texels.wgsl",
     "shadows/shadow_bounds.wgsl",
@@ -120,7 +120,7 @@ def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, in
     workgroup : entries per workgroup
     """
     groups = max(1, -(-count // workgroup))
-    return min(groups, _ROW), -(-groups // _ROW), 1
+    return min(groups, _GROUPS_PER_ROW), -(-groups // _GROUPS_PER_ROW), 1
 
 
 def registry_version() -> int:
@@ -139,7 +139,7 @@ def device_constants(device: Device) -> Constants:
     lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
     """
     if device.adapter.kind == "CPU":
-        return (("SKIPS_UNLIT", 1), ("STRIP", _STRIP), ("SPLAT_STEP", _SPLAT_STEP))
+        return (("SKIPS_UNLIT", 1), ("STRIP", _STRIP_PIXELS), ("SPLAT_STEP", _SPLAT_STEP_TEXELS))
     return (("MESH_IN_BUFFERS", 1),)
 
 
@@ -149,7 +149,7 @@ def strip_constants(device: Device, samples: int) -> Constants:
     Software adapters shade columns of pixels, and a driver limits the iterations of an invocation.
     """
     strip = max(1, _MAX_SAMPLES // samples)
-    return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP else ()
+    return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP_PIXELS else ()
 
 
 def level_format(device: Device) -> str:
@@ -159,7 +159,7 @@ def level_format(device: Device) -> str:
 
 def warm_up(device: Device) -> None:
     """Start compiling the programs that most frames need, while other threads load the scene."""
-    for name in _ALWAYS:
+    for name in _COMMON_SHADERS:
         program(device, name)
     texel = level_format(device)
     program(device, "atlas/stitch_gather.wgsl", source=texel)

@@ -180,7 +180,7 @@ def point_shadow_views(
     depth = view_points[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_outside(lights, [one > _MIN_DISTANCE_MM for one in near])
-    steepest = _steepest(view_points[:2], depth)
+    steepest = _largest_tangents(view_points[:2], depth)
     _check_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
     slack = outline.margin_mm
     bounds = [
@@ -203,7 +203,7 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
         refuse(culprit, "a position outside the head", actual, "Move it away or set shadows = false")
 
 
-def _steepest(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
+def _largest_tangents(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
     """Return the largest tangent of the view angle of any point, for each view.
 
     sides : (2, k, n) x and y of points in k views, which is overwritten to avoid allocations

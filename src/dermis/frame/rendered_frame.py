@@ -82,7 +82,7 @@ class RenderedFrame(ShortRepr):
 
     def linear(self) -> NDArray[np.float32]:
         """Return the (h, w, 3) linear Rec. 709 picture after bloom and exposure [-]."""
-        return np.ascontiguousarray(self._exposed()[..., :3])
+        return np.ascontiguousarray(self._download_exposed()[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
         """Return the (h, w, 3) sRGB bytes of the picture after the tone curve."""
@@ -97,7 +97,7 @@ class RenderedFrame(ShortRepr):
 
     def linear_rgba(self) -> NDArray[np.float32]:
         """Return (h, w, 4) linear floats over the background "none", multiplied by alpha as in OpenEXR."""
-        return self._exposed()
+        return self._download_exposed()
 
     def output(self, name: str) -> PlaneArray:
         """Return an output of the frame, (h, w) or (h, w, channels) with row 0 at the top.
@@ -117,7 +117,7 @@ class RenderedFrame(ShortRepr):
         head = levels[levels[..., 3] == _WHITE]
         return float((head[:, :3].max(axis=1) == _WHITE).mean()) if len(head) else 0.0
 
-    def _exposed(self) -> NDArray[np.float32]:
+    def _download_exposed(self) -> NDArray[np.float32]:
         return self._read(lambda frame: download(frame.device, frame.picture.exposed))
 
     def _read_back(self, **options: Any) -> NDArray[Any]:

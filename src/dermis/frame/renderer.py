@@ -40,7 +40,7 @@ FRAMES_IN_FLIGHT = 3
 
 Submit = Callable[[], Readback]
 Receive = Callable[[Readback], T]
-_MAX_CACHE = 1000
+_MAX_CACHE_SIZE = 1000
 _WARM_UP_FRAMES = 100
 
 
@@ -115,8 +115,8 @@ class Renderer:
         if not isinstance(adapter, str):
             actual = f"got {format_value(adapter)}"
             refuse("adapter", "the name of an adapter", actual, "Write auto, cpu or a part of its name")
-        self._cache_size = checked_integer("cache_size", cache_size, 1, _MAX_CACHE)
-        self._cache_ttl = checked_integer("cache_ttl", cache_ttl, 1, _MAX_CACHE)
+        self._cache_size = checked_integer("cache_size", cache_size, 1, _MAX_CACHE_SIZE)
+        self._cache_ttl = checked_integer("cache_ttl", cache_ttl, 1, _MAX_CACHE_SIZE)
         self._adapter, self._opening_ms = adapter, 0.0
         self._latest: FrameTextures | None = None
         self._in_flight: deque[int] = deque()

@@ -127,7 +127,7 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     rows = []
     for (light, siblings), view in zip(divided, views, strict=True):
-        members = _members(light, scene.head.centre_mm, view, siblings)
+        members = _light_members(light, scene.head.centre_mm, view, siblings)
         one = {**none, **members, "layer": next(layers) if view else -1}
         rows.append(tuple(one.values()))
     lights[: len(rows)] = rows  # in one assignment, as each access to a record is slow
@@ -146,7 +146,7 @@ def light_sample_points() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
+def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
     """Return the members of the shader struct `Light` that are not 0.
 
     siblings : number of parts into which the light is divided, this part included

@@ -10,7 +10,7 @@ from dermis.frame.lights.kind import Kind, Members, area_light_members
 from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
-_MAX_PART = 0.35  # side of a part over its distance
+_MAX_PART_RATIO = 0.35  # side of a part over its distance
 _MAX_PARTS = 3  # along each side
 
 
@@ -58,7 +58,7 @@ KIND = _Rectangle()
 
 def _part_count(side_mm: float, distance_mm: float) -> int:
     """Return the number of parts along one side of a rectangle, seen from a distance."""
-    return min(max(math.ceil(side_mm / (_MAX_PART * distance_mm)), 1), _MAX_PARTS)
+    return min(max(math.ceil(side_mm / (_MAX_PART_RATIO * distance_mm)), 1), _MAX_PARTS)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:

@@ -27,7 +27,7 @@ from dermis.gpu import (
 )
 from dermis.gpu.textures import FORMAT_BYTES
 
-Pair = tuple[TextureOrView, TextureOrView]
+TexturePair = tuple[TextureOrView, TextureOrView]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class StretchedLevels(PyramidLevels):
     stretch : blurred stretch map, and the map that is blurred along u only
     """
 
-    stretch: Pair | None = None
+    stretch: TexturePair | None = None
 
 
 class GpuGems3(AtlasTechnique):
@@ -102,7 +102,7 @@ class GpuGems3(AtlasTechnique):
         graph: Recorder,
         shader: ComputeProgram | RenderProgram,
         bound: MutableBindings,
-        into: Pair,
+        into: TexturePair,
         side: int,
     ) -> None:
         """Declare one blur pass, which writes a texture of light and one of the stretch map.

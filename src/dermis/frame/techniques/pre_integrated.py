@@ -20,10 +20,10 @@ from dermis.scene.settings import Settings
 MAX_CURVATURE = 0.5
 """Curvature of the last row of the sphere table [1/mm], a radius of 2 mm."""
 
-_COSINES = 257  # odd, so that one column is N.L = 0, where incident light begins
-_CURVATURES, _EDGES = 33, 9  # as in pre_integrated.wgsl
-_NODES = 48
-_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
+_COSINE_COUNT = 257  # odd, so that one column is N.L = 0, where incident light begins
+_CURVATURE_ROWS, _EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
+_QUADRATURE_NODES = 48
+_EXTENT_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
 _SHADOW_TAIL = 0.01  # fraction of the light that scatters across the edge of a shadow beyond the table
 _MAX_PENUMBRA_MM = 8.0
 
@@ -82,7 +82,7 @@ TECHNIQUE = PreIntegratedSkin()
 def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
     """Compute the tables of scattered light for a profile, and upload them."""
     penumbra = penumbra_width_mm(profile)
-    edges = [shadow_edge(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGES)]
+    edges = [shadow_edge(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGE_ROWS)]
     rows = np.concatenate([sphere_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
     return PreIntegratedTables(
@@ -98,10 +98,10 @@ def sphere_table(profile: GaussianSum) -> Floats:
     exp(r^2/v (cos a - 1)) at the central angle a, normalised over the sphere. [Penner2011] integrates around
     a ring instead, which does not conserve energy.
     """
-    cosines = np.linspace(-1.0, 1.0, _COSINES)
+    cosines = np.linspace(-1.0, 1.0, _COSINE_COUNT)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
     fractions = profile.weight / profile.albedo
-    for curvature_per_mm in np.linspace(0.0, MAX_CURVATURE, _CURVATURES)[1:]:
+    for curvature_per_mm in np.linspace(0.0, MAX_CURVATURE, _CURVATURE_ROWS)[1:]:
         concentration = 1.0 / (curvature_per_mm**2 * profile.variance_mm2)
         rows.append(np.stack([scattered_cosine(cosines, k) for k in concentration], axis=1) @ fractions)
     return np.stack(rows)
@@ -116,9 +116,9 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     from scipy.special import i0e
 
     theta = np.arccos(np.asarray(cosines, dtype=np.float64))
-    extent = _SIGMAS / np.sqrt(concentration)
+    extent = _EXTENT_SIGMAS / np.sqrt(concentration)
     low, high = np.clip(theta - extent, 0.0, 0.5 * np.pi), np.clip(theta + extent, 0.0, 0.5 * np.pi)
-    x, w = np.polynomial.legendre.leggauss(_NODES)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
     half = 0.5 * (high - low)[..., None]
     lit, theta = low[..., None] + half * (1.0 + x), theta[..., None]
     ring = i0e(concentration * np.sin(theta) * np.sin(lit))  # the kernel over all azimuths
@@ -134,8 +134,8 @@ def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0
     half_width_mm : half width of the tent filter that already softens the edge [mm]
     """
     kernel = preintegrated_kernel(profile)
-    distance = radius_mm * np.linspace(-1.0, 1.0, _COSINES)
-    x, w = np.polynomial.legendre.leggauss(_NODES)
+    distance = radius_mm * np.linspace(-1.0, 1.0, _COSINE_COUNT)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
     x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, normalised
     ends = half_width_mm * np.concatenate([x, -x])
     lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.half_line_integral(distance[:, None] - ends)

@@ -30,9 +30,11 @@ from dermis.scene.camera import Window
 from dermis.scene.settings import Settings
 
 FOLDER = Path(__file__).parent
-_TAIL = 5e-4  # largest fraction of the light of a channel that may lie beyond the kernel's reach on one side
+_MAX_TAIL = (
+    5e-4  # largest fraction of the light of a channel that may lie beyond the kernel's reach on one side
+)
 _MIN_REACH_MM, _MAX_REACH_MM = 0.01, 400.0
-_ENTRIES = 256
+_ENTRY_COUNT = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,14 +183,14 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
     Distances are evenly spaced in their square root.
     """
-    reach = _reach(kernel)
-    fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
+    reach = _kernel_reach_mm(kernel)
+    fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRY_COUNT) ** 2)
     fractions *= 0.5 / fractions[-1]  # the light beyond the reach is added to the light within it
-    return np.concatenate([fractions, np.zeros((_ENTRIES, 1))], axis=1)[None], reach
+    return np.concatenate([fractions, np.zeros((_ENTRY_COUNT, 1))], axis=1)[None], reach
 
 
-def _reach(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which, on one side, no channel has more than `_TAIL` of its light [mm]."""
+def _kernel_reach_mm(kernel: SeparableKernel) -> float:
+    """Return the distance beyond which, on one side, no channel has over `_MAX_TAIL` of its light [mm]."""
     distance = np.geomspace(_MIN_REACH_MM, _MAX_REACH_MM, 4096)
-    beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _TAIL
+    beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -14,7 +14,7 @@ from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import FLOATS, HALVES, program_constants, registry_version, shader_folders
-from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
+from dermis.frame.techniques.gpu_gems_3 import GpuGems3, StretchedLevels, TexturePair
 from dermis.gpu import (
     ComputeProgram,
     Constants,
@@ -79,7 +79,7 @@ class FragmentPasses(GpuGems3):
         graph: Recorder,
         shader: ComputeProgram | RenderProgram,
         bound: MutableBindings,
-        into: Pair,
+        into: TexturePair,
         side: int,
     ) -> None:
         """Fill a texture of light and one of stretch."""

@@ -40,7 +40,7 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
     """Upload the constant inputs of gutter tracing, for an atlas that has gutters."""
     starts, sides = (device.buffer(words, "STORAGE") for words in (_start_words(atlas), _side_words(mesh)))
     pairs = pairwise((textures, *textures.coarser))
-    halvings = tuple(_halving(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
+    halvings = tuple(_halving_buffers(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
     return GutterTracing(starts, sides, halvings)
 
 
@@ -82,7 +82,7 @@ def _side_words(mesh: Mesh) -> Words:
     return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR).astype(np.uint32)
 
 
-def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
+def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
     """Upload, for each texel of the coarser gutter, the texels of the finer gutter that it averages."""
     width = int(finer.gutter_texels.max()) + 1
 

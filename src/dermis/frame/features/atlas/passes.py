@@ -10,13 +10,13 @@ from dermis.frame.seams import FEATHER_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 
 _STRETCH_SOURCE_BYTES = 12  # of an entry of the list in stretch_beyond.wgsl
-_ROW = 1024  # ROW of gutter.wgsl
+_ENTRIES_PER_ROW = 1024  # ROW of gutter.wgsl
 
 
 def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> None:
     """Declare the passes that fill the stretch maps of an atlas at all its resolutions."""
     device, bound, constants = graph.device, {**head.resources, **atlas.resources}, atlas.stretch_constants
-    bound.setdefault("edge_map", _no_edges(device))
+    bound.setdefault("edge_map", _placeholder_edge_map(device))
     own = program(device, "atlas/stretch.wgsl", constants)
     graph.compute("stretch", own, bound, atlas.resources["atlas"].size[:2])
     if atlas.stretch_sources is not None:
@@ -37,7 +37,7 @@ def draw_coarser(graph: Recorder, atlas: AtlasTextures) -> None:
         finer = level.resources
 
 
-def _no_edges(device: Device) -> Texture:
+def _placeholder_edge_map(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for `edge_map`, the texel distances to chart edges, where it is not read."""
     return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))
 
@@ -57,7 +57,7 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
     gather = program(device, "atlas/stitch_gather.wgsl", source=texel)
     place = program(device, "atlas/stitch_place.wgsl", store=texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
-    size = (_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _ROW)))
+    size = (_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}
     graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE)
     graph.compute(stage, place, {**lists, "stored": light}, size, TILE, in_place="stored")

@@ -15,12 +15,12 @@ from dermis.frame.seams import FEATHER_MM, SEAM_METHODS, SeamMethod
 from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, mark_scratch
 from dermis.gpu.textures import texture_from_array
 
-_HALVING = "halved 2"  # key of the disk cache: increase the number when `halve_mip` changes its results
+_HALVING_KEY = "halved 2"  # key of the disk cache: increase the number when `halve_mip` changes its results
 MAX_HALVINGS = 3
 """Number of coarser resolutions of an atlas that blurs may use."""
 GUTTER_ENTRY_BYTES = 16
 """Size of an entry of the gutter list in gutter.wgsl [bytes]."""
-_NAME = "map of the atlas"
+_TEXTURE_NAME = "map of the atlas"
 _LIGHT_BYTES = 16  # of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # of the first component of reach_map, see reach.wgsl
 SAME_SOURCE_TEXELS = 4.0
@@ -84,9 +84,9 @@ def upload_atlas(
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
     texels[~own] = 0
-    resources = {"atlas": texture_from_array(device, texels, "rg32uint", _NAME)}
+    resources = {"atlas": texture_from_array(device, texels, "rg32uint", _TEXTURE_NAME)}
     if seams.feathered or len(seams.layouts) > 1:
-        resources["edge_map"] = texture_from_array(device, edge_distances(atlas), "r32float", _NAME)
+        resources["edge_map"] = texture_from_array(device, edge_distances(atlas), "r32float", _TEXTURE_NAME)
     even = _mean_density(atlas.stretch[own]) if stretch == "none" else 0.0
     feather = FEATHER_MM if seams.feathered else 0.0
     mip = AtlasMip(atlas.coverage, own, atlas.edge_distance, atlas.gutter, atlas.source)
@@ -97,7 +97,7 @@ def upload_atlas(
         sheared=stretch == "full",
         stretch_constants=(("SHEAR", stretch == "full"), ("EVEN", even), ("FEATHER_MM", feather)),
         stretch_sources=device.buffer(_stretch_sources(atlas), "STORAGE") if len(atlas.outside) else None,
-        coarser=_coarser(device, mip) if len(atlas.gutter) else (),
+        coarser=_upload_coarser(device, mip) if len(atlas.gutter) else (),
         median_texels_per_mm=_median_density(atlas.stretch, own),
     )
 
@@ -128,8 +128,10 @@ def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **
     reach = mip.reach.copy()
     reach[..., 0] |= np.where(mip.covered & ~mip.lit, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
-        "reach_map": texture_from_array(device, reach, "rgba16uint", _NAME),
-        "stretch_map": make_texture(device, (reach.shape[1], reach.shape[0]), "rgba16float", name=_NAME),
+        "reach_map": texture_from_array(device, reach, "rgba16uint", _TEXTURE_NAME),
+        "stretch_map": make_texture(
+            device, (reach.shape[1], reach.shape[0]), "rgba16float", name=_TEXTURE_NAME
+        ),
     }
     if not len(mip.gutter):
         return AtlasTextures(resources, **more)
@@ -150,7 +152,7 @@ def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)
 
 
-def _coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
+def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
     """Upload the atlas at half, a quarter, ... of its resolution, computed or read from the disk cache."""
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
@@ -164,7 +166,7 @@ def _coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
         return {f"{k} {part}": getattr(coarser, part) for k, coarser in enumerate(mips[1:]) for part in parts}
 
     names = [f"{k} {part}" for k in range(count) for part in parts]
-    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING, names, compute)
+    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING_KEY, names, compute)
     mips = (AtlasMip(**{part: arrays[f"{k} {part}"] for part in parts}) for k in range(count))
     return tuple(_upload_mip(device, coarser, {}) for coarser in mips)
 
@@ -213,32 +215,38 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
     """
     from scipy.ndimage import binary_dilation
 
-    own = _quads(mip.lit)
+    own = _square_texels(mip.lit)
     any_own = own[0] | own[1] | own[2] | own[3]
-    counted = np.where(any_own, own, _quads(mip.covered))
+    counted = np.where(any_own, own, _square_texels(mip.covered))
     covered = counted[0] | counted[1] | counted[2] | counted[3]
     stitched = covered & ~binary_dilation(any_own, np.ones((3, 3), bool))
-    return AtlasMip(covered, covered & ~stitched, _reach(mip.reach, counted), *_gutter(mip, stitched))
+    return AtlasMip(
+        covered, covered & ~stitched, _halved_reach(mip.reach, counted), *_halved_gutter(mip, stitched)
+    )
 
 
-def _quads(image: NDArray[np.generic]) -> NDArray[np.generic]:
+def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
     """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), with their corners in row order."""
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.uint16]:
+def _halved_reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square, in squares: the smallest reach of its texels in `counted`."""
     squares = np.zeros((*counted.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
-        steps = _quads(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
+        steps = (
+            _square_texels(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
+        )
         steps[~counted] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
     squares[~counted.any(axis=0)] = 0
     return squares
 
 
-def _gutter(mip: AtlasMip, stitched: NDArray[np.bool_]) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+def _halved_gutter(
+    mip: AtlasMip, stitched: NDArray[np.bool_]
+) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Return the (x, y) of stitched squares, and the mean position of the sources of their texels."""
     x, y = (mip.gutter.astype(np.int64) // 2).T
     used = stitched[y, x]

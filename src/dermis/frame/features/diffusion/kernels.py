@@ -58,19 +58,19 @@ def kernel_table() -> NDArray[np.float32]:
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MAX_TAPS + 1)
-    within_kernel = n[None, :] <= n[:, None]  # column of the table, tap
+    tap_mask = n[None, :] <= n[:, None]  # column of the table, tap
     low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        too_narrow = _kernel_variance(middle, within_kernel) < variance
+        too_narrow = _kernel_variance(middle, tap_mask) < variance
         low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return (0.5 * (low + high)).astype(np.float32)
 
 
-def _kernel_variance(q: Floats, within_kernel: NDArray[np.bool_]) -> Floats:
-    n2 = np.arange(within_kernel.shape[1], dtype=np.float64) ** 2
+def _kernel_variance(q: Floats, tap_mask: NDArray[np.bool_]) -> Floats:
+    n2 = np.arange(tap_mask.shape[1], dtype=np.float64) ** 2
     with np.errstate(under="ignore"):
-        weights = np.where(within_kernel, q[..., None] ** n2, 0.0)
+        weights = np.where(tap_mask, q[..., None] ** n2, 0.0)
     variance: Floats = 2.0 * (weights @ n2) / (2.0 * weights.sum(axis=-1) - 1.0)
     return variance
 

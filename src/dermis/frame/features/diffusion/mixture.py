@@ -96,11 +96,11 @@ def load_blend_weights(name: str) -> NDArray[np.float32]:
     except (OSError, ValueError):
         expected = "a picture: grey, or red and green"
         refuse(f"profile map {name}", expected, "there is no such file", "Check the name")
-    return _load(path, (status.st_mtime_ns, status.st_size, status.st_ino))
+    return _load_image(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
 @lru_cache(_CACHE_SIZE)
-def _load(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
+def _load_image(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 
 

@@ -61,7 +61,7 @@ class SkinProfiles:
         return shared_gaussians((first, *others)), load_blend_weights(skin.profile_map)
 
     def _load_or_fit(self, skin: Skin) -> GaussianSum:
-        cached = self._latest_fit(_tissue, skin)
+        cached = self._latest_fit(_tissue_key, skin)
         if not skin.layers and skin.pigments in (None, Pigments()):
             profile = load_profile(skin.profile)
         elif cached:
@@ -75,17 +75,17 @@ class SkinProfiles:
         pigments_only = skin.pigments is not None and skin.pigments.structure is None and not skin.layers
         if pigments_only and skin.profile in preset_names():
             return load_profile(skin.profile)
-        fit = self._latest_fit(_kind, skin)
+        fit = self._latest_fit(_similarity_key, skin)
         return fit and fit[1]
 
     def _latest_fit(self, key: Callable[[Skin], object], skin: Skin) -> tuple[Skin, GaussianSum] | None:
         return next((fit for fit in reversed(self._fits) if key(fit[0]) == key(skin)), None)
 
 
-def _tissue(skin: Skin) -> tuple[object, ...]:
+def _tissue_key(skin: Skin) -> tuple[object, ...]:
     return skin.profile, skin.pigments, skin.layers
 
 
-def _kind(skin: Skin) -> tuple[object, ...]:
+def _similarity_key(skin: Skin) -> tuple[object, ...]:
     """Return a key that is equal for skins whose profiles are good initial guesses for one another."""
     return skin.profile, skin.pigments and skin.pigments.structure, len(skin.layers)

@@ -60,7 +60,7 @@ def make(
     atlases: Sequence[AtlasTextures],
 ) -> Resources:
     """Return the resources of the diffusion for all atlas layouts."""
-    blurs = tuple(_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
+    blurs = tuple(_make_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
     args = device, scheme, side, halvings, request.light_key
     levels = memo.get(_make_levels, *args, owner=request.view_name)
@@ -69,12 +69,12 @@ def make(
         names = (f"{request.view_name} other {k}" for k in range(len(request.other_profiles)))
         entering = tuple(memo.get(_make_levels, *args, owner=name) for name in names)
         mixture = memo.get(
-            _mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name
+            _cached_mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name
         )
     return Resources(levels, blurs, mixture)
 
 
-def _blur(request: FrameRequest, scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
+def _make_blur(request: FrameRequest, scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
     red, green, blue = (np.pi * c * request.seam_method.coloured for c in request.settings.seam_colour)
     edge, clear = request.seam_method.edge, (red, green, blue)
     split, intermediate = scheme.add_intermediate_levels(request.split, atlas, edge)
@@ -94,7 +94,7 @@ def _make_levels(device: Device, scheme: BlurScheme, side: int, halvings: Halvin
     return scheme.make_levels(device, side, halvings)
 
 
-def _mixture(
+def _cached_mixture(
     device: Device, weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layouts: int
 ) -> Mixture:
     return make_mixture(device, upload_blend_weights(device, weights), entering, layouts)

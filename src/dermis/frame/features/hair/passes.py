@@ -25,8 +25,8 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 """Resources of the lighting, record of the shading, and pipeline constants of the lights."""
 
 _MAX_ROWS, _MAX_ITERATIONS = 8, 60_000
-_HEAD_MM = 100.0  # side of a square in the picture that holds all hair of a head
-_CROWDING = 6.0  # segments in a crowded tile over the mean of all tiles
+_HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
+_CROWDING_FACTOR = 6.0  # segments in a crowded tile over the mean of all tiles
 _CLEARING_GROUPS = 256
 _RAY_STRIDE = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
 
@@ -145,9 +145,9 @@ def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) 
     segments : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
-    tiles = max(1.0, (_HEAD_MM / (TILE * pixel_mm)) ** 2)
+    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()
-    return int(fine + min(1.0, _CROWDING / tiles) * (segments - fine))
+    return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segments - fine))
 
 
 def rows_per_invocation(device: Device, segments: int) -> int:

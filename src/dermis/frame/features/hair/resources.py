@@ -31,17 +31,17 @@ _FINE_STEP, _KNOT_STEP = (
     1 << 12,
     1 << 19,
 )  # to which capacities are rounded up, so that most heads share them
-_SHADOW_CASTERS = 32_000  # coarse strands that cast the shadows of all
-_MIN_DRAWN = 5_000
-_DRAWN_WIDTH = 0.45  # width of the drawn coarse strands [pixel]
-_COVERED_WIDTH = 0.2  # further width per cover: where hair hides hair, fewer strands are enough
+_MAX_SHADOW_CASTERS = 32_000  # coarse strands that cast the shadows of all
+_MIN_DRAWN_STRANDS = 5_000
+_DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
+_WIDTH_PER_COVER_PX = 0.2  # further width per cover: where hair hides hair, fewer strands are enough
 WINDOW_KNOTS = 1 << 12
 """Knots whose bounds a workgroup of strands_window.wgsl computes."""
-_STRAND = np.dtype(
+_STRAND_DTYPE = np.dtype(
     [("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)]
 )  # in strands_pose.wgsl
-_COUNTS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
-_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("width_scale", "f4")])
+_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
+_HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
 
 class StrandCounts(NamedTuple):
@@ -223,8 +223,8 @@ def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
     total_mm = tables.coarse.hairs * tables.mean_width_mm
-    drawn_mm = (_DRAWN_WIDTH + _COVERED_WIDTH * tables.mean_cover) * pixel_mm
-    return int(min(tables.coarse.hairs, max(_MIN_DRAWN, total_mm / drawn_mm)))
+    drawn_mm = (_DRAWN_WIDTH_PX + _WIDTH_PER_COVER_PX * tables.mean_cover) * pixel_mm
+    return int(min(tables.coarse.hairs, max(_MIN_DRAWN_STRANDS, total_mm / drawn_mm)))
 
 
 def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> StrandTables:
@@ -237,13 +237,15 @@ def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> St
     both = head.strands, head.hair
     parts = [part for part in both if part is not None]
     fine, coarse = map(strand_counts, both)
-    rows = np.zeros(fine.hairs + coarse.hairs, _STRAND)
+    rows = np.zeros(fine.hairs + coarse.hairs, _STRAND_DTYPE)
     for part, first in zip(parts, (0, len(parts[0])), strict=False):
         _fill_rows(rows[first : first + len(part)], head, part)
     knots = np.concatenate([_knot_rows(part) for part in parts])
-    casters = min(coarse.hairs, _SHADOW_CASTERS)
+    casters = min(coarse.hairs, _MAX_SHADOW_CASTERS)
     width_scale = coarse.hairs / max(1, casters)
-    record = np.array((fine.hairs, coarse.hairs, casters, fine.knots, coarse.knots, width_scale), _HAIRS)
+    record = np.array(
+        (fine.hairs, coarse.hairs, casters, fine.knots, coarse.knots, width_scale), _HAIRS_DTYPE
+    )
     hair = head.hair
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),

@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.interreflection import SAMPLES, SIDE, FormFactors, cached_form_factors
+from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, cached_form_factors
 from dermis.frame.programs import WORKGROUP_SIZE, program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark_scratch
 from dermis.mesh.head import Head
 
 LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
 """Sample points and their number, links of patches, links of cells."""
-_TEXEL = 16  # bytes of four floats
+_FLOAT4_BYTES = 16  # bytes of four floats
 _BOUNCES = 4  # between patches; the gathering by cells is another one
-_TEAM = 16  # invocations of a patch or a cell
+_TEAM_SIZE = 16  # invocations of a patch or a cell
 
 
 def shader_constants() -> dict[str, int]:
     """Return the values that `//#fill` lines insert in the interreflection shaders, by name."""
-    return {"linked_side": SIDE, "linked_samples": SAMPLES}
+    return {"linked_side": CELLS_PER_SIDE, "linked_samples": SAMPLES_PER_PATCH}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class InterreflectionBuffers:
     sample_points : buffer of the surface points at which patches are lit, and the number of points
     patch_links : buffers of the form factors between patches, by their names in shaders
     cell_links : buffers of the form factors from atlas cells to patches, by their names in shaders
-    averaged : whether cells store the mean exitance of the patches they see, instead of its sum by form
+    stores_means : whether cells store the mean exitance of the patches they see, instead of its sum by form
         factors
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
@@ -47,7 +47,7 @@ class InterreflectionBuffers:
     sample_points: tuple[Buffer, int]
     patch_links: dict[str, Buffer]
     cell_links: dict[str, Buffer]
-    averaged: bool
+    stores_means: bool
     sample_exitance: Buffer
     direct_exitance: Buffer
     uniform_exitance: Buffer
@@ -97,7 +97,9 @@ def make_interreflection(
 
 def no_interreflection(device: Device) -> Buffer:
     """Return a buffer of zeros in place of the light from other skin, for heads without interreflection."""
-    return device.cached("no interreflection", lambda: device.storage_buffer(_TEXEL * SIDE * SIDE))
+    return device.cached(
+        "no interreflection", lambda: device.storage_buffer(_FLOAT4_BYTES * CELLS_PER_SIDE * CELLS_PER_SIDE)
+    )
 
 
 def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
@@ -125,22 +127,25 @@ def _upload_rows(
     return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _make_buffers(device: Device, uploaded: LinkBuffers, averaged: bool, _: str) -> InterreflectionBuffers:
+def _make_buffers(
+    device: Device, uploaded: LinkBuffers, stores_means: bool, _: str
+) -> InterreflectionBuffers:
     sample_points, patch_links, cell_links = uploaded
     count = sample_points[1]
     direct, uniform, *bounced = (
-        mark_scratch(device, device.storage_buffer(_TEXEL * (count // SAMPLES))) for _ in range(4)
+        mark_scratch(device, device.storage_buffer(_FLOAT4_BYTES * (count // SAMPLES_PER_PATCH)))
+        for _ in range(4)
     )
     return InterreflectionBuffers(
         sample_points=sample_points,
         patch_links=patch_links,
         cell_links=cell_links,
-        averaged=averaged,
-        sample_exitance=mark_scratch(device, device.storage_buffer(2 * _TEXEL * count)),
+        stores_means=stores_means,
+        sample_exitance=mark_scratch(device, device.storage_buffer(2 * _FLOAT4_BYTES * count)),
         direct_exitance=direct,
         uniform_exitance=uniform,
         bounced_exitance=(bounced[0], bounced[1]),
-        from_skin=device.storage_buffer(_TEXEL * SIDE * SIDE),
+        from_skin=device.storage_buffer(_FLOAT4_BYTES * CELLS_PER_SIDE * CELLS_PER_SIDE),
         no_light=no_interreflection(device),
     )
 
@@ -155,7 +160,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
     """
     shader = program(graph.device, "interreflection/interreflection_points.wgsl", constants)
     buffers, albedo = interreflection
-    (points, count), footprint = buffers.sample_points, 2.0 / (SIDE * SAMPLES**0.5)
+    (points, count), footprint = buffers.sample_points, 2.0 / (CELLS_PER_SIDE * SAMPLES_PER_PATCH**0.5)
     own: Bindings = {
         "samples": shader.record("Samples", count=count, footprint=footprint, albedo=albedo),
         "sample_points": points,
@@ -163,17 +168,17 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
         "from_skin": buffers.no_light,
     }
     graph.dispatch("interreflection", shader, {**bindings, **own}, workgroup_grid(count))
-    graph.repeat(_bounce, buffers)
+    graph.repeat(_draw_bounces, buffers)
 
 
-def _bounce(graph: Recorder, buffers: InterreflectionBuffers) -> None:
+def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
     """Declare the passes that let light bounce between the patches, and gather it in the atlas cells."""
     device = graph.device
-    team = 1 if device.adapter.kind == "CPU" else _TEAM  # barriers are slow on software adapters
-    constants: Constants = (("TEAM", team), ("MEAN", int(buffers.averaged)))
+    team = 1 if device.adapter.kind == "CPU" else _TEAM_SIZE  # barriers are slow on software adapters
+    constants: Constants = (("TEAM", team), ("MEAN", int(buffers.stores_means)))
     patches, cells = (
         workgroup_grid(count, WORKGROUP_SIZE // team)
-        for count in (buffers.sample_points[1] // SAMPLES, SIDE * SIDE)
+        for count in (buffers.sample_points[1] // SAMPLES_PER_PATCH, CELLS_PER_SIDE * CELLS_PER_SIDE)
     )
     shared = {"direct_exitance": buffers.direct_exitance, "uniform_exitance": buffers.uniform_exitance}
     means = program(device, "interreflection/interreflection_means.wgsl", constants[:1])

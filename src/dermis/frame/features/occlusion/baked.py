@@ -23,7 +23,7 @@ MAP_SIZE = 512
 """Texels along the side of a depth map."""
 CACHE_VERSION = f"1 {DIRECTIONS} {MAP_SIZE}"
 """Version of baked maps on disk; change it when baking gives other results."""
-_BATCH = 32  # depth maps that are drawn at a time
+_MAPS_PER_BATCH = 32  # depth maps that are drawn at a time
 _MAX_SIDE = 1024  # texels a side: occlusion is smooth, and such a texel is smaller than a millimetre
 
 
@@ -54,12 +54,14 @@ def bake_occlusion(
     shader, to_sky = program(device, "occlusion/occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)
     sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
-    layers = make_layers(device, (map_size, map_size), _BATCH, triangles=False)
-    for first in range(0, len(to_sky), _BATCH):
-        views = [parallel_shadow_view(-d, mesh.outline, map_size) for d in to_sky[first : first + _BATCH]]
+    layers = make_layers(device, (map_size, map_size), _MAPS_PER_BATCH, triangles=False)
+    for first in range(0, len(to_sky), _MAPS_PER_BATCH):
+        views = [
+            parallel_shadow_view(-d, mesh.outline, map_size) for d in to_sky[first : first + _MAPS_PER_BATCH]
+        ]
         draw_layers(commands, "occlusion", layers, shadow_map_views(views), geometry)
         sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
-        lights: Bindings = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
+        lights: Bindings = {"lights": _light_record(shader, views), "shadow_maps": layers.texture, "sky": sky}
         resources: Bindings = {**bindings, **geometry.resources, **lights, "atlas": texels, "sums": sums}
         commands.compute("occlusion", shader, resources, (side, rows))
     commands.submit()
@@ -68,7 +70,7 @@ def bake_occlusion(
         return np.asarray(raw[..., 0] / raw[..., 1])
 
 
-def _lights(shader: ComputeProgram, views: list[ShadowView]) -> UniformRecord:
+def _light_record(shader: ComputeProgram, views: list[ShadowView]) -> UniformRecord:
     record = shader.record("Lights")
     for layer, view in enumerate(views):
         light = record["light"][layer]

@@ -28,12 +28,12 @@ VIEWS = 64
 SIDE = 256
 """Texels along the side of a depth map."""
 _MARGIN_MM = 1.0
-_BORDER = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
+_BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
 _ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e
 _MAX_ANCHORS = 512
-_VERTICES = "occlusion/moving_occlusion_vertices.wgsl"
+_VERTEX_SHADER = "occlusion/moving_occlusion_vertices.wgsl"
 # Least number of faces of the coarse head, and the largest error of others [mm], a quarter of a texel.
-_OCCLUDERS = (5_000, 0.4)
+_OCCLUDER_LIMITS = (5_000, 0.4)
 
 
 class SkyViews(NamedTuple):
@@ -75,7 +75,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _MARGIN_MM, 0.5 * (high + low)
     half[:, 2] += outline.margin_mm
-    half[:, :2] *= SIDE / (SIDE - 2.0 * _BORDER)
+    half[:, :2] *= SIDE / (SIDE - 2.0 * _BORDER_TEXELS)
     clips = np.zeros((VIEWS, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
     clips[:, 2] *= -0.5  # from 1 near to 0 far
@@ -154,7 +154,7 @@ def make_vertex_sky(device: Device, head: Head, rest_geometry: HeadGeometry) -> 
     """
     count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
     layers = make_layers(device, (SIDE, SIDE), VIEWS, triangles=False)
-    occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDERS))
+    occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_LIMITS))
     sky = VertexSky(layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
     _draw_vertices(commands, sky, views, sky_record(device, views, count), rest_geometry, resting=True)
@@ -213,7 +213,7 @@ def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
 
     vertices : number of vertices of the mesh
     """
-    record = program(device, _VERTICES).record("Sky", vertices=vertices)
+    record = program(device, _VERTEX_SHADER).record("Sky", vertices=vertices)
     members = record["views"]
     members["column"], members["row"], members["depth"] = views.to_map.swapaxes(0, 1)
     members["to_sky"] = views.to_sky
@@ -241,5 +241,5 @@ def _draw_vertices(
         "maps": sky.layers.texture,
         "visibility": sky.visibility,
     }
-    shader = program(graph.device, _VERTICES, (("RESTING", resting),) if resting else ())
+    shader = program(graph.device, _VERTEX_SHADER, (("RESTING", resting),) if resting else ())
     graph.dispatch("occlusion", shader, bindings, workgroup_grid(sky.vertices))

@@ -19,7 +19,9 @@ LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
 TOLERANCE_MM = 2.0
 """Depth by which the mesh around a visible landmark may be in front of it."""
-_ROW = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])  # as in landmarks.wgsl
+_LANDMARK_DTYPE = np.dtype(
+    [("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)]
+)  # as in landmarks.wgsl
 _RESULT_FLOATS = 4  # position, and visibility
 
 
@@ -66,7 +68,7 @@ def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) ->
     Raises DermisError for landmarks that the head does not have.
     """
     sets = {name: landmark_points(head, name) for name in names}
-    rows = np.zeros(sum(len(points.names) for points in sets.values()), _ROW)
+    rows = np.zeros(sum(len(points.names) for points in sets.values()), _LANDMARK_DTYPE)
     rows["corner"] = np.concatenate([points.point for points in sets.values()])
     rows["weight"] = np.concatenate([points.weight for points in sets.values()])
     rows["material"][:, 0] = np.concatenate([points.material for points in sets.values()]) + 1

@@ -63,7 +63,7 @@ def make_light_outputs(
 
     Raises DermisError for outputs that the technique, the lights or the skin do not have.
     """
-    requested, cached, pairs = set(request.outputs), memo.get, _pairs(request, translucency)
+    requested, cached, pairs = set(request.outputs), memo.get, _translucent_pairs(request, translucency)
     if "visibility" in requested and not request.light_part_counts:
         refuse("output visibility", "a scene with lights", "it has none", "Add one, or leave the output out")
     transmitted: tuple[Texture, ...] = ()
@@ -157,7 +157,9 @@ def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBin
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}
 
 
-def _pairs(request: FrameRequest, translucency: Sequence[Translucency | None]) -> PairBuffers | None:
+def _translucent_pairs(
+    request: FrameRequest, translucency: Sequence[Translucency | None]
+) -> PairBuffers | None:
     """Return the translucent pairs of the first layout, None if no requested output depends on them."""
     culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
     if culprit is None:
@@ -179,7 +181,7 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
     maps = request.head.maps
     if request.painted_side and request.albedo_from_map and maps.colour is None and maps.roughness is None:
         return None
-    parameters = _parameters(request.skin)
+    parameters = _pigment_parameters(request.skin)
     if parameters is None:
         culprit = next(name for name in request.outputs if name in _PIGMENT_OUTPUTS)
         skins = ", ".join(SKINS)
@@ -189,7 +191,7 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
     return parameters.melanin, parameters.blood
 
 
-def _parameters(skin: Skin) -> SkinParameters | None:
+def _pigment_parameters(skin: Skin) -> SkinParameters | None:
     """Return the pigments of a profile, None if it is not made of pigments."""
     try:
         return skin_tissue(skin).parameters

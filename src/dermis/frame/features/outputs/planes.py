@@ -14,7 +14,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder
 from dermis.scene.outputs import OUTPUTS
 
-_WORD = 4  # bytes
+_WORD_BYTES = 4  # bytes
 PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 """Array of an output: float32, int32 or uint8, see `OUTPUTS`."""
 
@@ -45,7 +45,7 @@ class Planes:
 
     def byte_range(self, name: str) -> tuple[int, int]:
         """Return the offset of an output in the buffer, and its length [byte]."""
-        plane = _WORD * self.size[0] * self.size[1]
+        plane = _WORD_BYTES * self.size[0] * self.size[1]
         return plane * self._first_channels()[name], plane * self.channels[name]
 
     def arrays(self, raw: NDArray[np.uint8]) -> dict[str, PlaneArray]:
@@ -86,14 +86,14 @@ def make_planes(
     Raises DermisError if they do not fit in one buffer of the device.
     """
     pixels, count = size[0] * size[1], max(1, sum(number for _, number in channels))
-    if _WORD * count * pixels > device.max_storage_bytes:
-        most = device.max_storage_bytes // (_WORD * count)
+    if _WORD_BYTES * count * pixels > device.max_storage_bytes:
+        most = device.max_storage_bytes // (_WORD_BYTES * count)
         limit = f"at most {most} pixels with {', '.join(name for name, _ in channels)}"
         actual = f"there are {pixels}"
         refuse(
             "size", f"{limit} at once from {device.adapter.name}", actual, "Ask for fewer, or a smaller one"
         )
-    return Planes(stage, dict(channels), size, device.storage_buffer(_WORD * count * pixels, "outputs"))
+    return Planes(stage, dict(channels), size, device.storage_buffer(_WORD_BYTES * count * pixels, "outputs"))
 
 
 def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> ComputeProgram:

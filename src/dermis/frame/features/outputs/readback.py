@@ -21,7 +21,7 @@ from dermis.scene.settings import Settings
 PictureArray = NDArray[Any]  # callers choose the dtype
 """(h, w, 3) or (h, w, 4) array of sRGB bytes or linear floats."""
 _ROW = 1024  # invocations of a row, as in the shaders
-_WORD = 4  # bytes
+_WORD_BYTES = 4  # bytes
 _PIXELS, _WORDS = 4, 3  # that an invocation of pack.wgsl reads and writes
 
 
@@ -53,7 +53,7 @@ class Readback:
 
         Call either this method or `image`, and only once.
         """
-        raw, start, arrays = self.fetched.array(), _WORD * self.words, dict[str, PlaneArray]()
+        raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
             return self._image(raw), {}, {}
         for planes in self.outputs.planes:
@@ -100,7 +100,7 @@ def start_readback(
     else:
         count = -(-pixels // _PIXELS)
         shader, words, bindings["bytes"] = program(device, "outputs/pack.wgsl"), _WORDS * count, picture.bytes
-    _check_size(device, _WORD * words, device.max_storage_bytes, pixels)
+    _check_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
     packed = _packed_buffer(device, picture, words)
     buffers = [packed, *(outputs.buffers if outputs else ())]
     _check_size(

@@ -56,18 +56,18 @@ def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
 
-def _geometry(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_geometry(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     shader = stage_program(graph.device, planes)
     draw_planes(graph, planes, shader, inputs.bindings(shader))
 
 
-def _surface(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_surface(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANTS)
     shader = stage_program(graph.device, planes, constants)
     draw_planes(graph, planes, shader, inputs.bindings(shader))
 
 
-def _motion(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_motion(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
     if previous.motion is not None:
@@ -83,11 +83,11 @@ def _motion(graph: Graph, planes: Planes, resources: Resources, inputs: StageInp
     draw_planes(graph, planes, shader, bindings)
 
 
-def _alpha(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_alpha(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     draw_planes(graph, planes, stage_program(graph.device, planes), {"exposed": inputs.picture.exposed})
 
 
-def _label(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_label(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     assert resources.labels is not None
     draw_labels(graph, planes, resources.labels, inputs)
 
@@ -99,15 +99,15 @@ def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs]
 STAGES: Registry[Stage] = Registry(
     "stage of outputs",
     {
-        "geometry": _geometry,
-        "surface": _surface,
-        "motion": _motion,
-        "alpha": _alpha,
+        "geometry": _draw_geometry,
+        "surface": _draw_surface,
+        "motion": _draw_motion,
+        "alpha": _draw_alpha,
         "light": _light_stage(light.draw_light),
         "visibility": _light_stage(light.draw_visibility),
         "pigments": _light_stage(light.draw_pigments),
         "thickness": _light_stage(light.draw_thickness),
-        "label": _label,
+        "label": _draw_label,
     },
 )
 """Stages by the names of their shaders, features/outputs/STAGE.wgsl."""
@@ -116,10 +116,10 @@ STAGES: Registry[Stage] = Registry(
 def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
     """Return the outputs of each stage, which `//#each` lines of features/outputs/STAGE.wgsl expand."""
     stages = {one.stage for one in OUTPUTS.values()}
-    return {f"{stage}_outputs": partial(_members, stage) for stage in sorted(stages)}
+    return {f"{stage}_outputs": partial(_stage_members, stage) for stage in sorted(stages)}
 
 
-def _members(stage: str) -> list[Member]:
+def _stage_members(stage: str) -> list[Member]:
     return [Member(one.name, one.shader, _wgsl_type(one)) for one in OUTPUTS.values() if one.stage == stage]
 
 

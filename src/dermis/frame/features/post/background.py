@@ -10,7 +10,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
-_KINDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
+_BACKGROUNDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def draw(
     record = shader.record(
         "Background",
         rays=ray_record(shader, view),
-        kind=1 + _KINDS.index(background) if isinstance(background, str) else 0,
+        kind=1 + _BACKGROUNDS.index(background) if isinstance(background, str) else 0,
         colour=(0.0, 0.0, 0.0) if isinstance(background, str) else background,
         exposure=exposure,
         blur=settings.background_blur,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.programs import program
 from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 
-_LAST_HALVINGS = 4  # that are left out: the widest Gaussian spans a sixteenth of the picture
+_OMITTED_HALVINGS = 4  # that are left out: the widest Gaussian spans a sixteenth of the picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class BloomTextures:
 
 def make_bloom(device: Device, size: tuple[int, int]) -> BloomTextures:
     """Allocate the textures of the bloom for a picture of size (width, height)."""
-    count = max(1, int(math.log2(min(size))) - _LAST_HALVINGS) if min(size) > 1 else 1
+    count = max(1, int(math.log2(min(size))) - _OMITTED_HALVINGS) if min(size) > 1 else 1
     sides = [(max(1, size[0] >> k), max(1, size[1] >> k)) for k in range(1, count + 1)]
     halved, sums = ([make_texture(device, side, "rgba32float") for side in sides] for _ in range(2))
     return BloomTextures(halved, sums[:-1], make_texture(device, size, "rgba32float"))
@@ -37,17 +37,17 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: 
     """
     source = picture
     for halved in textures.halved:
-        _step(graph, 0, source, source, halved, 0.0, 0.0)
+        _draw_step(graph, 0, source, source, halved, 0.0, 0.0)
         source = halved
     for own, total in zip(reversed(textures.halved[:-1]), reversed(textures.sums), strict=True):
-        _step(graph, 1, own, source, total, 1.0, 1.0)
+        _draw_step(graph, 1, own, source, total, 1.0, 1.0)
         source = total
     weight = scattered / len(textures.halved)
-    _step(graph, 1, picture, source, textures.result, 1.0 - scattered, weight)
+    _draw_step(graph, 1, picture, source, textures.result, 1.0 - scattered, weight)
     return textures.result
 
 
-def _step(
+def _draw_step(
     graph: Recorder, widen: int, own: Texture, smaller: Texture, target: Texture, *factors: float
 ) -> None:
     shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widen),))

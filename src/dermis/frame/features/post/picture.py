@@ -9,7 +9,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Buffer, Device, MutableBindings, Recorder, Texture, make_texture
 from dermis.scene.settings import Settings
 
-_TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
+_TONE_CURVES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,4 +53,4 @@ def draw(
 
 def encoding_members(settings: Settings) -> dict[str, int]:
     """Return the members of shader records that choose the tone curve and the sRGB encoding."""
-    return {"tone": _TONES.index(settings.tone), "encoded": int(settings.gamma == "right")}
+    return {"tone": _TONE_CURVES.index(settings.tone), "encoded": int(settings.gamma == "right")}

@@ -40,7 +40,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     """
     needed = SHADOW_BYTES * layers * size**2
     check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
-    side = _squares(size)
+    side = _square_count(size)
     bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
@@ -61,11 +61,11 @@ def draw(
             "maps_sampler": graph.device.sampler(),
             "bounds": maps.bounds,
         }
-        groups = _squares(maps.layers.size[0]) // 16
+        groups = _square_count(maps.layers.size[0]) // 16
         shader = program(graph.device, "shadows/shadow_bounds.wgsl")
         graph.dispatch("shadows", shader, bound, (groups, groups, len(views.clips)))
 
 
-def _squares(size: int) -> int:
+def _square_count(size: int) -> int:
     """Return the number of squares of 4 x 4 texels along a shadow map, rounded up to a multiple of 16."""
     return 16 * -(-size // 64)

@@ -57,7 +57,7 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
     }
     smoothed, scratch = (device.buffer(np.zeros(count, np.float32), "STORAGE") for _ in range(2))
     buffers = {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
-    return Curvature(smoothed, scratch, buffers, _steps(mesh, pairs, both), count)
+    return Curvature(smoothed, scratch, buffers, _smoothing_steps(mesh, pairs, both), count)
 
 
 def placeholder_curvature(device: Device) -> Buffer:
@@ -65,7 +65,7 @@ def placeholder_curvature(device: Device) -> Buffer:
     return device.cached("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
 
-def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:
+def _smoothing_steps(mesh: Mesh, pairs: Index, both: Index) -> int:
     """Return the number of smoothing steps that have a standard deviation of `SMOOTH_MM` together.
 
     pairs : (e, 2) points of the edges of the mesh

@@ -22,8 +22,8 @@ VERTICES_PER_ROW = 512
 """Vertices per row of the vertex texture; each has four texels."""
 VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 """Names of the vertices in geometry.wgsl and texel_stretch.wgsl."""
-_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
-_VERTEX = np.dtype(list(_MEMBERS))  # struct of shape_vertices.wgsl
+_VERTEX_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
+_VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of shape_vertices.wgsl
 MIN_TANGENT = 1e-3
 """Least length of dpdu without its part along the normal, relative to dpdu; shorter ones are replaced."""
 
@@ -83,9 +83,9 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
     rig, mesh = head.control, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
-        morphs=_buffers(device, _morph_tables(rig)) if moves else {},
-        stencils=_buffers(device, _stencil_tables(rig.stencils)) if rig.stencils else {},
-        surface=_buffers(device, _surface_tables(mesh)),
+        morphs=_upload_tables(device, _morph_tables(rig)) if moves else {},
+        stencils=_upload_tables(device, _stencil_tables(rig.stencils)) if rig.stencils else {},
+        surface=_upload_tables(device, _surface_tables(mesh)),
         control=len(rig.positions_mm),
         points=int(mesh.point.max()) + 1,
         vertices=len(mesh.positions),
@@ -101,33 +101,36 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
     tables : constant buffers of the head, from `shape_tables`
     moves : False for a shape at rest, without the pass of morph targets and bones
     """
-    rest, morphs, stencils = _points(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
-    weights, matrices = _floats(device, max(1, tables.targets)), _floats(device, 12 * max(1, tables.bones))
+    rest, morphs, stencils = _point_buffer(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
+    weights, matrices = (
+        _float_buffer(device, max(1, tables.targets)),
+        _float_buffer(device, 12 * max(1, tables.bones)),
+    )
     points = rest
     if moves and tables.morphs:
-        points = _points(device, tables.control)
+        points = _point_buffer(device, tables.control)
         moving = {"rest": rest, "weights": weights, "matrices": matrices, "posed": points}
         morphs = tables.morphs | moving
     if tables.stencils:
-        finer = _points(device, tables.points)
+        finer = _point_buffer(device, tables.points)
         stencils, points = tables.stencils | {"control": points, "points": finer}, finer
-    surface = tables.surface | {"points": points} | _vertices(device, tables.vertices)
+    surface = tables.surface | {"points": points} | _vertex_resources(device, tables.vertices)
     return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
 
 
-def _points(device: Device, count: int) -> Buffer:
-    return _floats(device, 3 * count)
+def _point_buffer(device: Device, count: int) -> Buffer:
+    return _float_buffer(device, 3 * count)
 
 
-def _floats(device: Device, count: int) -> Buffer:
+def _float_buffer(device: Device, count: int) -> Buffer:
     return device.buffer(np.zeros(count, np.float32), "STORAGE")
 
 
-def _buffers(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
+def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
     return {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
 
 
-def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
+def _vertex_resources(device: Device, count: int) -> dict[str, Texture | Buffer]:
     """Create the vertex resources: a buffer for GPUs or a texture for software, and a placeholder."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
@@ -135,7 +138,7 @@ def _vertices(device: Device, count: int) -> dict[str, Texture | Buffer]:
     return dict(
         zip(
             VERTEX_RESOURCES,
-            (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)),
+            (table, device.buffer(words, "STORAGE"), _float_buffer(device, 4 * count)),
             strict=True,
         )
     )
@@ -145,10 +148,10 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
     """Return the tables of shape_pose.wgsl: displacements, bone weights and contacts of each point."""
     count = len(rig.positions_mm)
     return {
-        "first": _starts(rig.targets.point, count),
+        "first": _run_offsets(rig.targets.point, count),
         "displacements": displacements(rig.targets, rig.targets),
-        "influences": _influences(rig.skeleton, count),
-        "contacts": _contacts(rig.contact, count),
+        "influences": _bone_influences(rig.skeleton, count),
+        "contacts": _contact_words(rig.contact, count),
     }
 
 
@@ -165,7 +168,7 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
     return table
 
 
-def _influences(skeleton: Skeleton | None, count: int) -> Words:
+def _bone_influences(skeleton: Skeleton | None, count: int) -> Words:
     """Return (p, 8) words: the indices of four bones per point, and their weights as float bits.
 
     count : number of points
@@ -176,7 +179,7 @@ def _influences(skeleton: Skeleton | None, count: int) -> Words:
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
 
 
-def _contacts(contact: LidContact | None, count: int) -> Words:
+def _contact_words(contact: LidContact | None, count: int) -> Words:
     """Return (p, 3) words that keep points outside the eyeballs, zeros for points without contact.
 
     The words are the indices of the front and back point of the eyeball, and the least distance from it as
@@ -202,7 +205,7 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     Corners are ordered by point and then by vertex, so that those of a vertex are a range.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
-    table = np.zeros(count, _VERTEX)
+    table = np.zeros(count, _VERTEX_DTYPE)
     table["uv"], table["point"] = mesh.uv, mesh.point
     table["normal"] = normals_in_vertex_frames(mesh)
     # by point, then by vertex: the corners of a vertex are a range within those of its point
@@ -240,7 +243,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
     return np.asarray(np.einsum("vkc,vc->vk", frame, mesh.normals.astype(np.float64)))
 
 
-def _starts(index: NDArray[np.integer], count: int) -> Words:
+def _run_offsets(index: NDArray[np.integer], count: int) -> Words:
     """Return (count + 1,) offsets: where the runs of 0, 1, 2, ... start in a sorted array, and its length."""
     return np.concatenate([[0], np.cumsum(np.bincount(index, minlength=count))]).astype(np.uint32)
 
@@ -274,7 +277,7 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
         graph.write("shape", shape.matrices, motion.matrices)
     if motion.displacements:
         graph.write("shape", shape.morphs["displacements"], motion.displacements)
-    graph.repeat(_evaluate, shape)
+    graph.repeat(_evaluate_surface, shape)
 
 
 def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
@@ -302,18 +305,18 @@ def rest_motion(rig: Rig) -> MotionBytes:
     return MotionBytes(positions, weights, matrices, own.tobytes())
 
 
-def _evaluate(graph: Recorder, shape: Shape) -> None:
+def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
     tables = shape.tables
     if shape.morphs:
         constants = ("HAS_BONES", tables.bones > 0), ("HAS_CONTACTS", tables.has_contacts)
-        _each(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
+        _dispatch(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
-        _each(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
+        _dispatch(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
     limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_TANGENT))
-    _each(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
+    _dispatch(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 
-def _each(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
+def _dispatch(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
     """Declare a pass of the shape with one shader invocation for each of `count` elements.
 
     bound : resources of the shader

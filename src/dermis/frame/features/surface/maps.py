@@ -52,13 +52,13 @@ def upload_maps(
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
-        return UploadedMaps(_from_files(device, head, use_colour, decoded), None)
+        return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded), None)
     if not decoded and use_colour and maps.colour is None:  # only a picture can be taken for linear
         found = paint.paint_arrays(device, _painted_surface(head), maps.look, side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
     painted, expression_maps = _paint_maps(device, head, maps, use_colour, (side, animated))
-    return UploadedMaps(_from_files(device, head, use_colour, decoded) | painted, expression_maps)
+    return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded) | painted, expression_maps)
 
 
 def detail_bindings(device: Device, fine: bool) -> MutableBindings:
@@ -96,7 +96,7 @@ def _painted_surface(head: Head) -> PaintedSurface:
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
-def _from_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> MutableBindings:
+def _upload_file_maps(device: Device, head: Head, use_colour: bool, decoded: bool) -> MutableBindings:
     maps = head.maps
     white = np.ones((1, 1, 3), np.float32)
     colour = (

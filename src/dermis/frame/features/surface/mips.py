@@ -24,7 +24,7 @@ from dermis.gpu.textures import make_view, texture_from_array
 from dermis.images.filters import mip_chain
 
 Floats = NDArray[np.float32]
-_ROWS = 32  # rows per invocation of relief.wgsl
+_ROWS_PER_INVOCATION = 32  # rows per invocation of relief.wgsl
 _BAND_BYTES = 96 << 20  # heights per pass: every device can bind as many
 
 
@@ -58,7 +58,7 @@ def upload_slopes(device: Device, image: Floats | None) -> Texture:
     image : slopes along u and v, None for a flat texture
     """
     if image is None:
-        return _flat(device)
+        return _flat_relief(device)
     mipped, frame = empty_map(device, image.shape), CommandList(device, timed=False)
     bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": mipped.levels[0]}
     shader = program(device, "surface/map_moments.wgsl", store=HALVES)
@@ -93,9 +93,9 @@ def make_relief(device: Device, height: Floats | None) -> Texture:
     Heights are extrapolated linearly beyond the edges.
     """
     if height is None or height.size == 1:
-        return _flat(device)
+        return _flat_relief(device)
     padded = np.pad(height, 1, "reflect", reflect_type="odd")
-    band = max(_BAND_BYTES // padded[:1].nbytes // _ROWS, 1) * _ROWS
+    band = max(_BAND_BYTES // padded[:1].nbytes // _ROWS_PER_INVOCATION, 1) * _ROWS_PER_INVOCATION
     bands = (device.buffer(padded[top : top + band + 2], "STORAGE") for top in range(0, len(height), band))
     return relief_from_buffers(device, bands, height.shape, band)
 
@@ -138,11 +138,11 @@ def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top
         "stored": relief.levels[0],
         "halved": relief.levels[1],
     }
-    size = -(-relief.size[0] // 2), -(-rows // _ROWS)
+    size = -(-relief.size[0] // 2), -(-rows // _ROWS_PER_INVOCATION)
     recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALVES), bound, size)
 
 
-def _flat(device: Device) -> Texture:
+def _flat_relief(device: Device) -> Texture:
     return device.cached("no relief", lambda: make_texture(device, (1, 1), HALVES, use="map"))
 
 

@@ -80,10 +80,10 @@ def skin_record(
     """
     members = struct_dtype(program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return program.record("Skin", **values, **_derived(skin, maps, profile), light_count=light_count)
+    return program.record("Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count)
 
 
-def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
+def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members of the struct `Skin` that are not fields or properties of the Python class."""
     energy, usual = ENERGY_SCHEMES[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
@@ -94,7 +94,7 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLik
         "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
         "relief_band": _relief_band(maps),
-        **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
+        **(_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
 
 
@@ -109,7 +109,7 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
     return colour, 1.0 if skin.specular == "none" else SKIN_ETA
 
 
-def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
+def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members that direction.wgsl reads: reflectance and transmittance by the direction of light.
 
     They are those of a half-space with the mean colour of the skin.

@@ -34,7 +34,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH, _MAX_REACH_MM = 4.0, 40.0  # of the tables, in standard deviations of the widest Gaussian
+_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # of the tables, in standard deviations of the widest Gaussian
 _STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # of rounded widths
 _CACHE_SIZE = 4
 _UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
@@ -70,7 +70,7 @@ def _level_tables(
     total : (3,) sums of the weights of all Gaussians of the profile [-]
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
     """
-    reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
+    reach = min(_REACH_DEVIATIONS * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
     blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT)
     scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT))[:, None]

@@ -18,14 +18,21 @@ from dermis.optics.thin_parts import THICKNESS_ROWS, ThinParts
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
 
-_TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
-_SINGLE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # barriers are slow on software adapters
+_GPU_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
+_SOFTWARE_CONSTANTS: Constants = (
+    ("SIZE", 128),
+    ("TEAM", 1),
+    ("ROUND", 1),
+)  # barriers are slow on software adapters
 _SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 Floats = NDArray[np.float64]
 # Least variance of a Gaussian over the squared spacing of its samples, for a sum that is even to 1e-6.
 _MIN_VARIANCE_RATIO = 0.72
-_ROW, _SIZE = 1024, 64  # pairs of a row, and of a workgroup in it, as in translucency_weights.wgsl
-_SMOOTH = 0.45  # least standard deviation of the light that sources sample, over their spacing
+_PAIRS_PER_ROW, _PAIRS_PER_GROUP = (
+    1024,
+    64,
+)  # pairs of a row, and of a workgroup in it, as in translucency_weights.wgsl
+_MIN_SMOOTHNESS = 0.45  # least standard deviation of the light that sources sample, over their spacing
 
 
 def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
@@ -135,7 +142,7 @@ def sum_pairs(
         "source_light": source_light,
         "transmitted": target,
     }
-    team = dict((_SINGLE if device.adapter.kind == "CPU" else _TEAMS) + constants)
+    team = dict((_SOFTWARE_CONSTANTS if device.adapter.kind == "CPU" else _GPU_CONSTANTS) + constants)
     shader = program(device, "translucency/translucency.wgsl", tuple(team.items()))
     receivers_per_group = int(team["SIZE"]) // int(team["TEAM"])
     graph.dispatch(stage, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
@@ -156,7 +163,7 @@ def draw_weights(graph: Recorder, thin: Translucency) -> None:
         "weights": thin.weights,
     }
     shader = _weights_program(graph.device, thin.gaussian_count, thin.uses_tables)
-    groups = _ROW // _SIZE, max(1, -(-pairs.count // _ROW)), 1
+    groups = _PAIRS_PER_ROW // _PAIRS_PER_GROUP, max(1, -(-pairs.count // _PAIRS_PER_ROW)), 1
     graph.dispatch("pairs", shader, {**bindings, **thin.loss_bindings}, groups)
     sum_pairs(graph, thin, thin.unit_light, pairs.lost, stage="pairs")
     graph.dispatch("pairs", shader, {**bindings, **thin.weight_bindings}, groups)
@@ -168,7 +175,7 @@ def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:
     spacing_mm : distance between sources [mm]
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     """
-    smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * spacing_mm) ** 2)
+    smooth = np.flatnonzero(variance_mm2 >= (_MIN_SMOOTHNESS * spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
@@ -197,11 +204,13 @@ def weight_bindings(
         min_variance_ratio=_MIN_VARIANCE_RATIO,
         gaussian=gaussian,
     )
-    table = _table(len(weight), tables, transmittance)
+    table = _transmittance_table(len(weight), tables, transmittance)
     return {"pair_profile": record, "transmittance": device.buffer(table, "STORAGE")}
 
 
-def _table(gaussians: int, tables: ThinParts | None, transmittance: Floats | None) -> NDArray[np.float32]:
+def _transmittance_table(
+    gaussians: int, tables: ThinParts | None, transmittance: Floats | None
+) -> NDArray[np.float32]:
     """Return the (rows k, 4) transmittance by thickness and Gaussian, with the directionality as alpha.
 
     Only the first Gaussian of each thickness holds the directionality. Without tables, it is a row of zeros.

@@ -32,11 +32,11 @@ from dermis.gpu import (
 from dermis.gpu.program import Program
 from dermis.gpu.textures import make_view
 
-_GROUPS = 2048  # workgroups that occupy a GPU; each takes more triangles where there are more
+_TARGET_GROUPS = 2048  # workgroups that occupy a GPU; each takes more triangles where there are more
 _GROUP_TRIANGLES = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
-_RUN = 16  # of them that are consecutive in the mesh, where triangles are many and small
+_RUN_TRIANGLES = 16  # of them that are consecutive in the mesh, where triangles are many and small
 _GROUPS_PER_ROW = 32768
-_TILE = (64, 32)  # pixels, as in tiles.wgsl
+_TILE_PIXELS = (64, 32)  # pixels, as in tiles.wgsl
 _DEPTH, _TRIANGLE, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
 _MAX_DEPTH_STEP_MM = 0.1  # at which the depth and the triangle of a sample fit in one word
 
@@ -128,7 +128,7 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     device, triangles, (clips, positions) = graph.device, head.triangles, views
     name = "resolve_triangles" if layers.triangles else "resolve_depth"
     resolve = program(device, f"visibility/{name}.wgsl")
-    record, passes = _views_record(resolve, layers, clips, head), _passes(layers, triangles, clips)
+    record, passes = _views_record(resolve, layers, clips, head), _pass_modes(layers, triangles, clips)
     record["sample"][: len(positions), :2] = positions
     across, down = positions.T.tolist()
     record["sample_bounds"] = min(across), min(down), max(across), max(down)
@@ -153,7 +153,7 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     graph.dispatch(stage, resolve, resources, (*_tile_counts(layers.size), layers.count))
 
 
-def _passes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int, ...]:
+def _pass_modes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int, ...]:
     """Return the modes of visibility_buffer.wgsl: one pass if depth and triangle fit in a word, else two.
 
     triangles : number of triangles
@@ -217,14 +217,14 @@ def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, in
     triangles, views, samples : number of triangles, of views, and of samples per pixel
     """
     fewest, most = _GROUP_TRIANGLES
-    per_group = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
+    per_group = min(most, max(fewest, 1 << (triangles * views // _TARGET_GROUPS).bit_length() >> 1))
     many = per_group == most  # many triangles are small ones
     threads = 256 if many or samples > 1 else 128
-    run, small = (_RUN, 32) if many else (1, 16)
+    run, small = (_RUN_TRIANGLES, 32) if many else (1, 16)
     constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)
     return constants, -(-triangles // per_group)
 
 
 def _tile_counts(size: tuple[int, int]) -> tuple[int, int]:
     """Return the number of tiles of the compute pass across and down a picture of size (width, height)."""
-    return -(-size[0] // _TILE[0]), -(-size[1] // _TILE[1])
+    return -(-size[0] // _TILE_PIXELS[0]), -(-size[1] // _TILE_PIXELS[1])

@@ -50,7 +50,7 @@ from dermis.human.skin.textures import (
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import DEFAULT_RHO_S
 
-_NAMES: dict[str, Sequence[str]] = {
+_LIST_NAMES: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
     "dots": [dots.name for dots in DOT_LAYERS],
     "amounts": list(ZONE_AMOUNTS),
@@ -59,26 +59,26 @@ _NAMES: dict[str, Sequence[str]] = {
 SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
 _MAX_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
 _PADDING = (0, 0), (0, 2)  # from two to four columns
-_FOLDER = "painted"
+_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
-_MAPS = ("colour", "specular", "roughness")
-_FOLDING = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
+_MAP_NAMES = ("colour", "specular", "roughness")
+_FOLDING_FLOATS = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
 
 
 def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
     """Return the names of noises, dot layers, zone amounts and noise regions, in the order of shaders."""
-    return {name: _members(names) for name, names in _NAMES.items()}
+    return {name: _as_members(names) for name, names in _LIST_NAMES.items()}
 
 
 def painting_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the painting shaders, by name."""
-    counts = {name: len(names) for name, names in _NAMES.items()} | table_sizes()
+    counts = {name: len(names) for name, names in _LIST_NAMES.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
     return sizes | counts | rows | {"folding": FOLD_MOVEMENTS, "wander_rows": ZONE_BORDER_NOISES}
 
 
-def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
+def _as_members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
     return lambda: [Member(name, Path()) for name in names]
 
 
@@ -164,14 +164,14 @@ def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: b
     """
     if device.adapter.kind != "CPU":
         return paint_rest_maps(device, inputs, side)
-    key, names = cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"), [*_MAPS, "heights"]
+    key, names = cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"), [*_MAP_NAMES, "heights"]
     names += ["deltas"] if animated else []
-    arrays = load_arrays(_FOLDER, key, names)
+    arrays = load_arrays(_CACHE_FOLDER, key, names)
     if arrays is not None:
-        return _from_arrays(device, arrays, side)
+        return _upload_arrays(device, arrays, side)
     maps = paint_rest_maps(device, inputs, side)
     if device.cached("first painted", lambda: key) == key:
-        load_or_make(_FOLDER, key, names, lambda: _to_arrays(device, maps, animated))
+        load_or_make(_CACHE_FOLDER, key, names, lambda: _download_maps(device, maps, animated))
     return maps
 
 
@@ -182,13 +182,13 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
     side : side of the maps [texels]
     """
     surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
-    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
+    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
     deltas = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
-        "colour_tables": _colours(device, inputs),
+        "colour_tables": _upload_colour_tables(device, inputs),
         "heights": heights,
         "expression_deltas": deltas,
     }
@@ -218,7 +218,7 @@ def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str
     return sides[side]
 
 
-def _colours(device: Device, inputs: PaintInputs) -> Texture:
+def _upload_colour_tables(device: Device, inputs: PaintInputs) -> Texture:
     nodes = inputs.colours.shape[1]
     texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(inputs.colours), use="map")
     for layer, table in enumerate(inputs.colours):
@@ -226,16 +226,16 @@ def _colours(device: Device, inputs: PaintInputs) -> Texture:
     return texture
 
 
-def _to_arrays(device: Device, maps: RestMaps, animated: bool) -> Arrays:
-    arrays = {name: download(device, getattr(maps, name).texture) for name in _MAPS}
+def _download_maps(device: Device, maps: RestMaps, animated: bool) -> Arrays:
+    arrays = {name: download(device, getattr(maps, name).texture) for name in _MAP_NAMES}
     arrays["heights"] = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
     if animated and maps.deltas is not None:
         arrays["deltas"] = np.stack([download(device, maps.deltas, layer=layer) for layer in range(2)])
     return arrays
 
 
-def _from_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
-    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAPS}
+def _upload_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
+    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
     for name, one in maps.items():
         upload(device, one.texture, arrays[name])
     deltas = None
@@ -267,8 +267,8 @@ def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.floa
     amounts : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
-    folding = amounts[:_FOLDING].reshape(2, 4)
-    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING], side=side)
+    folding = amounts[:_FOLDING_FLOATS].reshape(2, 4)
+    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING_FLOATS], side=side)
     graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
     graph.repeat(_fill_maps, maps)
 

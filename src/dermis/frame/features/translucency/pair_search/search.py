@@ -21,7 +21,7 @@ Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
 _MAX_BLOCKS = 40  # along a side
 _BOUNDS_BYTES = 48  # as in bounds.wgsl
-_COPIES = 8  # of a source in gutters, at most, as in map_positions.wgsl
+_MAX_GUTTER_COPIES = 8  # of a source in gutters, at most, as in map_positions.wgsl
 _PAIR_BYTES = 12
 
 
@@ -226,7 +226,7 @@ def draw_gutter_copies(passes: SearchPasses, cells: Cells, source: Index, bindin
         first = cells.gutter_copy_first[begin + np.maximum(x - 1, 0)]
         end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
-    copies = make_buffer(passes.device, _COPIES * len(source))
+    copies = make_buffer(passes.device, _MAX_GUTTER_COPIES * len(source))
     resources = {**bindings, "rows": passes.upload(*ranges), "copies": copies}
     passes.add("gutter_copies", len(source), resources)
     return copies
