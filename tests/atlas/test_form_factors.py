@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.atlas.interreflection import SAMPLES, SIDE, FormFactors, compute_form_factors
+from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, compute_form_factors
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
@@ -51,12 +51,14 @@ def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
 def test_the_faces_of_a_room() -> None:
     form_factors = found(room())
     given = np.zeros((6, 6))
-    y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
-    face = face_of(x, y, SIDE)
+    y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
+    face = face_of(x, y, CELLS_PER_SIDE)
     held = face < 6
     patch = face[(y % 2 == 0) & (x % 2 == 0) & held]  # in the order of patches
     assert len(patch) == form_factors.patch_count
-    row = np.repeat(np.arange(SIDE * SIDE), np.diff(form_factors.cell_first.astype(np.int64)))
+    row = np.repeat(
+        np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), np.diff(form_factors.cell_first.astype(np.int64))
+    )
     np.add.at(given, (face[row], patch[form_factors.cell_target]), form_factors.cell_factor)
     given /= np.bincount(face[held])[:, None]
     opposite = np.array([1, 0, 3, 2, 5, 4])
@@ -72,7 +74,10 @@ def test_places_lie_on_their_patch() -> None:
     w = np.stack([form_factors.sample_weights & 0xFFFF, form_factors.sample_weights >> 16], axis=1) / 65535.0
     w = np.column_stack([1.0 - w.sum(axis=1), w])
     uv = np.einsum("nk,nkc->nc", w, mesh.uv[mesh.triangles[form_factors.sample_triangle]])
-    patch = np.floor(SIDE // 2 * uv.reshape(-1, SAMPLES, 2) - 1e-4 * (uv.reshape(-1, SAMPLES, 2) == 1.0))
+    patch = np.floor(
+        CELLS_PER_SIDE // 2 * uv.reshape(-1, SAMPLES_PER_PATCH, 2)
+        - 1e-4 * (uv.reshape(-1, SAMPLES_PER_PATCH, 2) == 1.0)
+    )
     apart = np.abs(patch - np.median(patch, axis=1, keepdims=True))
     assert (apart.max(axis=(1, 2)) < 1.0).mean() > 0.99  # weights are rounded at a patch's edge
 

@@ -1,1 +1,1 @@
-"""Atlases: uv layouts as surfaces, with stitched seams, form factors and cells for translucency."""
+"""Atlases: uv layouts in which light is diffused, with stitched seams, form factors and thin parts."""

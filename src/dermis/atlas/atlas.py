@@ -1,4 +1,4 @@
-"""The atlas: the point of the surface at each texel of a uv map."""
+"""Atlas of a mesh: the surface point at each texel of a uv layout, and the metric of the uv coordinates."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.mesh.mesh import Mesh
 
 _ALL_ROWS = slice(None)
-GUTTER_TEXELS = 3  # around each chart of the mesh's own layout, so that interpolation at its edge finds light
-GUTTER_MM = 8.0  # of stitched charts: 3.4 standard deviations of the widest incremental blur [dEonLuebke2007]
+GUTTER_TEXELS = 3  # gutter width in the mesh's own layout, so that interpolation at chart edges finds light
+GUTTER_MM = (
+    8.0  # in stitched layouts: 3.4 standard deviations of the widest incremental blur [dEonLuebke2007]
+)
 MAX_SHEAR = 0.9  # larger shear is clipped to this in the blur
 
 
@@ -20,21 +22,26 @@ MAX_SHEAR = 0.9  # larger shear is clipped to this in the blur
 class Atlas:
     """Map from the texels of a uv layout to the surface; row 0 is the top of the map (v = 0).
 
-    triangle : (n, n) int32 triangle at the texel's centre, -1 for none; in gutters the nearest triangle of
-        the chart or, in a stitched layout, the triangle across the seam
+    triangle : (n, n) int32 index of the triangle at the texel's centre, -1 for none; in gutters the nearest
+        triangle of the chart or, in a stitched layout, the triangle across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
-    stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]; outside a chart that of the chart's edge
+    stretch : (n, n, 2) float16 texels per mm along u and v; outside a chart, the stretch at the chart's
+        nearest edge [1/mm]
     shear : (n, n) float16 cosine of the angle between the directions of u and v on the surface
     edge_distance : (n, n, 4) uint16 distance to the edge of the chart, or to the end of its gutter, to the
         left, right, up and down [texel]
     corner_uv : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
-    gutter : (a, 2) uint16 gutter texels (x, y), which copy the light of other texels
-    source : (a, 2) float32 position that each of them copies [texel], integers at texel centres
-    outside : (r, 2) uint16 texels (x, y) outside the triangles, which get the stretch of the nearest edge
-    border_triangle : (r,) int32 triangle at that edge
-    border_weights : (r, 2) uint16 weights of its second and third corner at that point [1/65535]
-    texels_per_uv : (f,) float32 texels per unit of uv
-    mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
+    gutter : (a, 2) uint16 gutter texels (x, y), into which the light of other texels is copied
+    source : (a, 2) float32 position from which the light of each gutter texel is copied, integer at texel
+        centres [texel]
+    outside : (r, 2) uint16 texels (x, y) outside their chart, whose stretch is that of the chart's nearest
+        edge
+    border_triangle : (r,) int32 index of the triangle at the nearest edge of each texel in `outside`
+    border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the nearest point
+        [1/65535]
+    texels_per_uv : (f,) float32 texels per unit of the mesh's own uv in each triangle
+    mapped : (f,) mask of triangles that own texels; light on the other triangles (opaque, collapsed,
+        overlapped in uv) is not diffused
     """
 
     triangle: Ints
@@ -53,32 +60,38 @@ class Atlas:
 
     @property
     def size(self) -> int:
-        """Return the number of texels along each side."""
+        """Return the number n of texels along each side of the map."""
         return len(self.triangle)
 
     @property
     def coverage(self) -> Mask:
-        """Return the (n, n) mask of texels that map to the surface, gutters included."""
+        """Return the (n, n) mask of texels that show a point of the surface, gutters included."""
         return np.asarray(self.triangle >= 0)
 
     @property
     def lit(self) -> Mask:
-        """Return the (n, n) mask of texels whose light is computed, not copied from other texels."""
+        """Return the (n, n) mask of texels whose light is computed instead of copied from other texels."""
         lit = self.coverage
         lit[self.gutter[:, 1], self.gutter[:, 0]] = False
         return lit
 
     def unscattered_fraction(self, mesh: Mesh) -> float:
-        """Return the fraction of the skin's triangles that own no texels [0..1]."""
+        """Return the fraction of skin triangles without texels, whose light is not diffused [-]."""
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 
     def weights(self, rows: slice = _ALL_ROWS) -> Doubles:
-        """Return the (n, n, 3) barycentric weights of the three corners, of all or some rows."""
+        """Return the (n, n, 3) barycentric weights of all three corners at each texel.
+
+        rows : rows of the map for which the weights are computed
+        """
         bc = self.barycentric[rows] / 65535.0
         return np.concatenate([1.0 - bc.sum(axis=-1, keepdims=True), bc], axis=-1)
 
     def interpolate(self, mesh: Mesh, values: NDArray[np.floating], rows: slice = _ALL_ROWS) -> Doubles:
-        """Return a (v, c) vertex attribute interpolated at the texels (n, n, c), of all or some rows."""
+        """Interpolate a vertex attribute (v, c) at the surface points of the texels, (n, n, c).
+
+        rows : rows of the map for which the attribute is interpolated
+        """
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
         return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))

@@ -1,4 +1,4 @@
-"""Construction of the atlas of a mesh in one of its uv layouts, with a cache on disk."""
+"""Construction of atlases in one of three uv layouts, with a cache on disk."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from dermis.mesh.mesh import Mesh
 
 LAYOUTS = ("mesh", "stitched", "unwrapped")
 MIN_SIZE = 64
-_CACHE_VERSION = 7  # increment when `build_atlas` gives other results for the same mesh
+_CACHE_VERSION = 7  # increment when the result of `build_atlas` for a mesh changes
 
 
 def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
-    """Build the atlas of a mesh.
+    """Build the atlas of a mesh in one of three uv layouts.
 
-    size : texels along each side
-    layout : "mesh" is the mesh's own uv; "stitched" moves its charts apart and adds gutters that continue the
-        surface across their seams, unless there are too many charts for that; "unwrapped" has other seams
-    gutter_mm : width of the gutters [mm]
+    size : texels along each side of the map
+    layout : "mesh" is the mesh's own uv; "stitched" moves the mesh's charts apart and adds gutters that
+        continue the surface across the seams, unless there are too many charts for that; "unwrapped" replaces
+        the mesh's uv by new charts
+    gutter_mm : width of the gutters of a stitched layout [mm]
 
-    Raises DermisError for a size under 64.
+    Raises DermisError for a size under 64 and for an unknown layout.
     """
     if size < MIN_SIZE:
         expected = f"a size of {MIN_SIZE} texels or more"
@@ -47,7 +48,7 @@ def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = 
 
 
 def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
-    """Return `build_atlas` with these arguments, cached on disk; works without a disk too."""
+    """Return the atlas that `build_atlas` builds, cached on disk if a cache folder is writable."""
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")
@@ -55,21 +56,21 @@ def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float =
         atlas = build_atlas(mesh, size, layout, gutter_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**load_or_make("atlas", _key(mesh, size, layout, gutter_mm), names, make))
+    return Atlas(**load_or_make("atlas", _atlas_key(mesh, size, layout, gutter_mm), names, make))
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, key: str, bake: Callable[[], Array]) -> Array:
-    """Return `bake()` for a mesh and its atlas, cached on disk.
+    """Return the occlusion that `bake` computes for the texels of an atlas, cached on disk.
 
-    key : text that identifies everything else that the result depends on
+    key : text that identifies all inputs of `bake` except the mesh and the atlas
     """
-    digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {key}".encode())
+    digest = hashlib.sha256(f"{_atlas_key(mesh, atlas.size)} {key}".encode())
     for array in (mesh.positions, mesh.normals, atlas.corner_uv, np.packbits(atlas.lit)):
         digest.update(np.ascontiguousarray(array).tobytes())
     return load_or_make("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})["open"]
 
 
-def _key(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> str:
+def _atlas_key(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> str:
     digest = hashlib.sha256(f"{_CACHE_VERSION} {GUTTER_TEXELS} {size} {layout} {gutter_mm}".encode())
     digest.update(repr([material.kind for material in mesh.materials]).encode())
     for array in (mesh.material, mesh.positions, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv, mesh.point):

@@ -1,4 +1,4 @@
-"""Form factors between patches of a surface that face each other through the air."""
+"""Form factors between patches of skin that face each other through the air, for interreflection."""
 
 from __future__ import annotations
 
@@ -16,31 +16,34 @@ from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
 
-SIDE = 128
-"""Cells along each side of the uv square, which receive light; 2 x 2 cells are a patch, which emits it."""
-SAMPLES = 8
-"""Sample points of a patch at which its light is computed."""
-BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; bounds of the lines along a bundle's side
-_FEW_BUNDLES, _FEW_LINES = 12, 64  # to find out whether any part of the surface faces another
+CELLS_PER_SIDE = 128
+"""Cells along each side of the uv square. A cell receives light; a patch of 2 x 2 cells emits it."""
+SAMPLES_PER_PATCH = 8
+"""Number of sample points of a patch, at which its radiosity is computed."""
+# Number of directions of parallel lines; fewest and most lines along a bundle's side.
+LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
+_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # to find out whether any skin faces other skin
 _CACHE_VERSION = 4  # increment when `compute_form_factors` gives other results
-_MIN_FORM_FACTOR = 1e-3  # smaller ones are dropped, and the others of their cell scaled up
+_MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
-_LINES_PER_ROW = 4096  # for line indices: more than a bundle has along its side
+_LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
 
 
 @dataclass(frozen=True, eq=False)
 class FormFactors:
-    """Form factors between cells of the uv square, or patches, and the patches that they face.
+    """Form factors from the cells and patches of the uv square to the patches that they face.
 
-    Both are sparse matrices by rows: the entries of row k start at `first[k]` and end at `first[k + 1]`.
+    A cell receives light; a patch of 2 x 2 cells emits it. The form factors of cells and of patches are two
+    sparse matrices by rows: the entries of row k start at `first[k]` and end at `first[k + 1]`.
 
-    cell_first, cell_target, cell_factor : (SIDE^2 + 1,), (k,) and (k,) float32 rows of the cells: patches
-        that each cell faces, and their form factors [0..1]
-    nearest_patch : (SIDE^2,) patch that each cell belongs to, or the nearest one
-    confidence : (SIDE^2,) float32 number of lines that left a cell, over the median, at most 1
-    patch_first, patch_target, patch_factor : the same rows for patches
-    sample_triangle, sample_weights : (p * SAMPLES,) uint32 sample points of the patches: triangle, and packed
-        weights of its second and third corner
+    cell_first : (CELLS_PER_SIDE^2 + 1,) start of each cell's entries
+    cell_target, cell_factor : (k,) index of the patch that the cell faces, and (k,) float32 form factor, 0 to
+        1 [-]
+    nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
+    confidence : (CELLS_PER_SIDE^2,) float32 number of lines leaving each cell, over the median, at most 1 [-]
+    patch_first, patch_target, patch_factor : sparse matrix of the form factors from patches to patches
+    sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle index of the sample points
+    sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner
     """
 
     cell_first: Words
@@ -61,9 +64,10 @@ class FormFactors:
 
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
-    """Return `compute_form_factors` with these arguments, cached on disk."""
+    """Return the form factors that `compute_form_factors` computes, cached on disk."""
     digest = hashlib.sha256(
-        f"{_CACHE_VERSION} {SIDE} {SAMPLES} {BUNDLES} {LINES} {_MIN_FORM_FACTOR}".encode()
+        f"{_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
+        f"{LINE_BUNDLES} {LINES_PER_SIDE} {_MIN_FORM_FACTOR}".encode()
     )
     for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped)):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -78,44 +82,53 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFact
 
 
 def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
-    """Compute form factors between cells and patches with bundles of parallel lines [Sbert1993].
+    """Compute form factors of skin from bundles of random parallel lines [Sbert1993].
 
-    Lines are distributed uniformly over all directions and positions: of those that leave one patch, the
-    fraction that meets another one next is its form factor.
+    The lines are distributed uniformly over all directions and positions. The form factor from one patch to
+    another is the fraction of the lines leaving the first patch that meet the second one next.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) triangles that have texels; the others block light and emit none
+    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none
     """
-    facing, left = _trace_lines(mesh, corner_uv, mapped, _FEW_BUNDLES, _FEW_LINES)
+    facing, left = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
     if len(facing):
-        lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES))
-        facing, left = _trace_lines(mesh, corner_uv, mapped, BUNDLES, lines)
+        lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE))
+        facing, left = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
     return _form_factors(facing, left, mesh, corner_uv, mapped)
 
 
 def _trace_lines(
     mesh: Mesh, corner_uv: Floats, mapped: Mask, bundles: int, lines: int
 ) -> tuple[Index, Doubles]:
-    """Return pairs of cells (m, 2) that lines connect, and the number of lines that left each cell."""
+    """Return pairs of cells (m, 2) that lines connect through the air, and how many lines left each cell.
+
+    bundles : number of bundles of parallel lines, one per direction
+    lines : number of lines along each side of a bundle
+    """
     used, corner = np.unique(mesh.triangles, return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
-    rng, left, facing = np.random.default_rng(_SEED), np.zeros(SIDE * SIDE), [np.zeros((0, 2), np.int64)]
+    rng, left, facing = (
+        np.random.default_rng(_SEED),
+        np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE),
+        [np.zeros((0, 2), np.int64)],
+    )
     for direction in _hemisphere_directions(bundles):
-        axes = per_mm * _axes(direction, rng.uniform(0.0, 2.0 * np.pi))
+        axes = per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi))
         points = vertices @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
         line, depth, outward, triangle, weights = intersect_lines(points[corner])
         cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
-        left += np.bincount(cell[cell >= 0], minlength=SIDE * SIDE)
+        left += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
         facing.append(_facing_cells(line, depth, outward, cell))
     return np.concatenate(facing), left
 
 
 def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
-    """Intersect the lines parallel to z through all integers x, y with triangles.
+    """Intersect triangles with all lines parallel to z whose x and y are integers.
 
-    Returns line index, z, whether the surface faces +z, triangle, and (n, 3) weights of its corners.
+    Returns, for each of n intersections, the line index, z, whether the surface faces +z, the triangle index,
+    and the barycentric weights (n, 3) of its corners.
 
     points : (f, 3, 3) corners of the triangles
     """
@@ -138,17 +151,17 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
 
 
 def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
-    """Return the lowest integer between the corners (3, f) of each triangle, and the number of integers."""
+    """Return the lowest integer between each triangle's corners (3, f), and the number of integers."""
     low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
     high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
     return low, np.maximum(high - low + 1, 0).astype(np.int64)
 
 
 def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> Index:
-    """Return pairs of cells (m, 2): the one that a line leaves, and the one that it meets next.
+    """Return pairs of cells (m, 2): the cell that a line leaves, and the cell that it meets next.
 
-    Each line is followed in both directions; lines that meet nothing more are left out. The second cell is -1
-    where the surface has no texels.
+    Each line is followed in both directions; a segment that leads to no other surface is omitted. The second
+    cell is -1 where the surface has no texels.
     """
     order = np.lexsort((depth, line))
     line, outward, cell = line[order], outward[order], cell[order]
@@ -160,8 +173,8 @@ def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> In
 
 def _cell_index(corner_uv: Floats, weights: Doubles) -> Index:
     uv = np.einsum("nk,nkc->nc", weights, corner_uv)
-    x, y = np.clip((SIDE * uv).astype(np.int64), 0, SIDE - 1).T
-    return np.asarray(y * SIDE + x)
+    x, y = np.clip((CELLS_PER_SIDE * uv).astype(np.int64), 0, CELLS_PER_SIDE - 1).T
+    return np.asarray(y * CELLS_PER_SIDE + x)
 
 
 def _hemisphere_directions(count: int) -> Doubles:
@@ -172,8 +185,8 @@ def _hemisphere_directions(count: int) -> Doubles:
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
 
-def _axes(direction: Doubles, angle: float) -> Doubles:
-    """Return the (3, 3) axes right, up and along a direction, rotated about it by an angle [rad]."""
+def _line_axes(direction: Doubles, angle: float) -> Doubles:
+    """Return the right, up and forward axes (3, 3) along a direction, rotated about it by an angle [rad]."""
     right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     right /= np.linalg.norm(right)
     up = np.cross(direction, right)
@@ -182,13 +195,13 @@ def _axes(direction: Doubles, angle: float) -> Doubles:
 
 
 def _form_factors(facing: Index, left: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
-    """Return the form factors from the cells at the ends of lines.
+    """Return the form factors that result from counts of lines between cells.
 
-    facing : (m, 2) from `_trace_lines`
-    left : (SIDE^2,) number of lines that left each cell
+    facing : (m, 2) pairs of cells that lines connect
+    left : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
-    patch_of, triangle, weights = _patches(mesh, corner_uv, mapped)
-    count = len(triangle) // SAMPLES
+    patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
+    count = len(triangle) // SAMPLES_PER_PATCH
     has_texels = (facing >= 0).all(axis=1)
     cell, target = facing[has_texels, 0], patch_of[facing[has_texels, 1]]
     patch, known = patch_of[cell], target >= 0
@@ -206,21 +219,23 @@ def _form_factors(facing: Index, left: Doubles, mesh: Mesh, corner_uv: Floats, m
 
 
 def _nearest_patch(patch_of: Index) -> Words:
-    """Return the patch of each cell (SIDE^2,); for cells without one, the patch of the nearest cell in uv."""
+    """Return the patch that contains each cell (CELLS_PER_SIDE^2,), or the patch nearest to it in uv."""
     from scipy.ndimage import distance_transform_edt
 
-    known = patch_of.reshape(SIDE, SIDE)
+    known = patch_of.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
     if not (known >= 0).any():
-        return np.zeros(SIDE * SIDE, np.uint32)
+        return np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE, np.uint32)
     nearest = distance_transform_edt(known < 0, return_distances=False, return_indices=True)
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
 def _sparse_rows(row: Index, target: Index, left: Doubles, patches: int) -> tuple[Words, Words, Floats]:
-    """Return the rows of a sparse matrix of form factors: start of each row, columns, and factors.
+    """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
 
-    row, target : (m,) cell or patch that each line left, and the patch that it met
-    left : number of lines that left each cell or patch
+    row : (m,) index of the cell or patch that each line left
+    target : (m,) index of the patch that the line met next
+    left : (r,) number of lines that left each cell or patch
+    patches : number of patches
     """
     entry, lines = np.unique(row * max(patches, 1) + target, return_counts=True)
     row, column = entry // max(patches, 1), entry % max(patches, 1)
@@ -232,31 +247,37 @@ def _sparse_rows(row: Index, target: Index, left: Doubles, patches: int) -> tupl
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
-def _patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
-    """Return the patch of each cell (SIDE^2,), -1 for none, and random sample points of all patches."""
+def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
+    """Return the patch of each cell, and triangles and weights of all patches' sample points.
+
+    The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels.
+    """
     triangle, weights, rank = _sample_points(mesh, mapped)
-    half, cell = SIDE // 2, _cell_index(corner_uv[triangle], weights)
-    patch = (cell // SIDE // 2) * half + cell % SIDE // 2
+    half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)
+    patch = (cell // CELLS_PER_SIDE // 2) * half + cell % CELLS_PER_SIDE // 2
     order = np.lexsort((rank, patch))
     occupied, first, size = np.unique(patch[order], return_index=True, return_counts=True)
     number = np.full(half * half, -1, np.int64)
     number[occupied] = np.arange(len(occupied))
-    chosen = order[(first[:, None] + np.arange(SAMPLES) % np.maximum(size, 1)[:, None]).ravel()]
+    chosen = order[(first[:, None] + np.arange(SAMPLES_PER_PATCH) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
-    y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
     patch_of = number[(y // 2) * half + x // 2]
     words = packed[:, 1] | (packed[:, 2] << np.uint32(16))
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 
 
 def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
-    """Return random points, at least one on each triangle with texels: triangle, weights and rank.
+    """Return random points on the triangles that have texels: triangle index, weights and rank.
 
-    The points with the lowest ranks are uniformly distributed over the surface.
+    Each triangle has at least one point. The points with the lowest ranks are uniformly distributed over the
+    surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
-    each = 1 + np.floor(SIDE * SIDE * SAMPLES * area / max(area.sum(), 1e-30)).astype(np.int64)
+    each = 1 + np.floor(
+        CELLS_PER_SIDE * CELLS_PER_SIDE * SAMPLES_PER_PATCH * area / max(area.sum(), 1e-30)
+    ).astype(np.int64)
     triangle = np.repeat(np.flatnonzero(mapped), each[mapped])
     rng, count = np.random.default_rng(_SEED), each[triangle]
     u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))

@@ -1,4 +1,4 @@
-"""Rasterisation of uv layouts: charts, texels of triangles, and the atlas of a mesh's own layout."""
+"""Rasterisation of triangles in uv: charts, texels of triangles, and the atlas of a mesh's own layout."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from dermis.mesh.geometry import MIN_UV_CROSS, components, cross_2d, edges, expa
 from dermis.mesh.mesh import Mesh
 
 _EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
-_MIN_CHART_TEXELS = 4.0  # area of a chart; smaller ones are too small to be blurred
+_MIN_CHART_TEXELS = 4.0  # area of the smallest chart in which light can be blurred
 
 
 def find_charts(mesh: Mesh) -> Ints:
-    """Return the chart of each triangle (f,), numbered from 0; a chart is connected in space and in uv."""
+    """Return the chart index of each triangle (f,), numbered from 0.
+
+    A chart is a set of triangles connected by edges that are shared both in space and in uv.
+    """
     # vertices are compared by position and uv, as one that is split only for its normal is no seam
     corner = weld(np.hstack((mesh.positions, mesh.uv)))
     _, edge_of_side, _ = edges(corner[mesh.triangles])
@@ -36,18 +39,18 @@ def triangle_uv_area(mesh: Mesh) -> Doubles:
 def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
     """Return the unsigned uv area of each chart (c,), as a fraction of the map.
 
-    chart : (f,) from `find_charts`
+    chart : (f,) chart index of each triangle
     """
     return np.asarray(np.bincount(chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
 
 
 def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> Mask:
-    """Return the mask (f,) of triangles that can be processed in texture space.
+    """Return the mask (f,) of triangles large enough in uv for the diffusion of light in texture space.
 
-    Triangles without uv area and all triangles of a collapsed chart cannot.
+    It excludes triangles without uv area and all triangles of charts with less than `min_texels` texels.
 
-    size : width and height of the map [texel]
-    min_texels : a chart with less uv area than this is collapsed [texel]
+    size : texels along each side of the map
+    min_texels : smallest uv area of a chart [texel]
     """
     chart = find_charts(mesh)
     large_enough = chart_uv_area(mesh, chart) * size**2 >= min_texels
@@ -55,12 +58,19 @@ def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXEL
 
 
 def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Doubles:
-    """Return the uv of some triangles' corners (t, 3, 2) in texels, integers at texel centres."""
+    """Return the uv of the selected triangles' corners in texels (t, 3, 2), integers at texel centres.
+
+    triangle : (t,) indices of the triangles
+    """
     return np.asarray(mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5)
 
 
 def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Return the texels whose centres some triangles cover, as flat indices, and the triangle of each."""
+    """Rasterise triangles in uv; return flat texel indices and the triangle that covers each centre.
+
+    size : texels along each side of the map
+    triangle : (t,) indices of the triangles
+    """
     texel, which = covered_texels(texel_corners(mesh, size, triangle), (size, size))
     return texel, triangle[which].astype(np.int64)
 
@@ -68,11 +78,11 @@ def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Ind
 def covered_texels(
     p: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
 ) -> tuple[Index, Index]:
-    """Return the texels of a grid whose centres triangles cover, as flat indices, and their row in `p`.
+    """Return the flat indices of texels whose centres triangles cover, and the triangles' rows in `p`.
 
-    p : (t, 3, 2) corners [texel], integers at texel centres
-    shape : height and width of the grid
-    margin : distance that a centre must be inside the edges, along rows and columns [texel]
+    p : (t, 3, 2) corners of the triangles [texel], integers at texel centres
+    shape : height and width of the grid of texels
+    margin : smallest distance of a covered centre from the edges, along rows and columns [texel]
     """
     height, width = shape
     low, high = p[..., 1].min(axis=1), p[..., 1].max(axis=1)
@@ -84,13 +94,18 @@ def covered_texels(
 
 
 def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> tuple[Index, Index]:
-    """Return the first and last integer between two bounds, within 0 .. size - 1."""
+    """Return the first and last integer from low + margin to high - margin, limited to 0 .. size - 1."""
     first = np.clip(np.ceil(low + margin), 0, size).astype(np.int64)
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
 def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]:
-    """Return the x interval in which each row y intersects its triangle."""
+    """Return the lowest and highest x at which each row y of texels intersects its triangle.
+
+    p : (t, 3, 2) corners of the triangles [texel]
+    which : (n,) triangle index of each row
+    y : (n,) row index
+    """
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
     sign = np.where(cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) >= 0, 1.0, -1.0)[:, None]
@@ -108,7 +123,7 @@ def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]
 
 
 def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
-    """Build the atlas whose texels are those of the mesh's own maps."""
+    """Build the atlas of a mesh's own uv layout, so that its texels are those of the mesh's maps."""
     chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
     usable = usable_triangles(mesh, size) & skin[mesh.material]
@@ -142,7 +157,10 @@ def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
 
 
 def _overlapped_charts(chart: NDArray[np.integer], texel: Index, triangle: Index, size: int) -> Mask:
-    """Return the mask (f,) of triangles in charts that are mostly covered by a larger chart."""
+    """Return the mask (f,) of triangles in charts whose texels are mostly covered by a larger chart.
+
+    texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
+    """
     count = int(chart.max()) + 1
     area = np.bincount(chart[triangle], minlength=count)
     order = np.argsort(area[chart[triangle]], kind="stable")  # the largest chart writes last and wins
@@ -154,10 +172,11 @@ def _overlapped_charts(chart: NDArray[np.integer], texel: Index, triangle: Index
 
 
 def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size: int) -> tuple[Ints, Mask]:
-    """Return the triangle of each texel, and the mask of triangles mostly covered by others of their chart.
+    """Return the triangle that owns each texel, and the mask (f,) of triangles that own few of their texels.
 
-    Where two mirrored halves are folded onto each other in one chart, the half that is not mirrored in uv
-    wins.
+    Where two halves of a chart are folded onto each other, the half that is not mirrored in uv wins.
+
+    texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
     is_mapped = mapped[triangle]
     texel, triangle = texel[is_mapped], triangle[is_mapped]
@@ -182,7 +201,10 @@ def _dilate(owner: Ints) -> Ints:
 
 
 def _interpolable(mesh: Mesh, size: int, owner: Ints) -> Mask:
-    """Return the mask (f,) of triangles whose corners can be interpolated; slivers may have no texels."""
+    """Return the mask (f,) of triangles around whose corners all four texels are owned.
+
+    Only such corners can be interpolated bilinearly; slivers may have no texels.
+    """
     low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
     for offset in ((0, 0), (1, 0), (0, 1), (1, 1)):
@@ -192,7 +214,10 @@ def _interpolable(mesh: Mesh, size: int, owner: Ints) -> Mask:
 
 
 def _barycentric(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
-    """Return the weights at each texel centre; in gutters those of the nearest point of the triangle."""
+    """Return the barycentric weights at each texel centre, (n, n, 2) [1/65535].
+
+    A gutter texel has those of the nearest point of its triangle.
+    """
     y, x = np.nonzero(owner >= 0)
     weights = barycentric_weights(texel_corners(mesh, size, owner[y, x]), np.column_stack((x, y)))
     packed = np.zeros((size, size, 2), dtype=np.uint16)
@@ -201,10 +226,12 @@ def _barycentric(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
 
 
 def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
-    """Return the weights (n, 2) of the second and third corner at points, clipped to the triangles.
+    """Return the barycentric weights (n, 2) of the second and third corner at points.
 
-    corners : (n, 3, 2)
-    points : (n, 2)
+    Points outside their triangle are moved to its border.
+
+    corners : (n, 3, 2) corners of one triangle per point
+    points : (n, 2) points
     """
     e1, e2, offset = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
     area = cross_2d(e1, e2)
@@ -216,7 +243,10 @@ def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
 def _texel_metric(
     mesh: Mesh, size: int, owner: Ints, barycentric: NDArray[np.uint16]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """Return texels per mm along u and v, and the cosine between u and v, from interpolated derivatives."""
+    """Return texels per mm along u and v, and the cosine of the angle between them, at each texel.
+
+    They are interpolated from the derivatives dp/du and dp/dv at the vertices.
+    """
     y, x = np.nonzero(owner >= 0)
     corners = mesh.triangles[owner[y, x]]
     b = barycentric[y, x] / np.float32(65535)
@@ -233,16 +263,16 @@ def _texel_metric(
 
 
 def _edge_distance(chart: Ints) -> NDArray[np.uint16]:
-    """Return the number of texels of the same chart to the left, right, up and down of each texel."""
+    """Return the number of texels (n, n, 4) to the left, right, up and down before the chart changes."""
     left, right = run_lengths(np.pad(chart[:, 1:] == chart[:, :-1], ((0, 0), (1, 0))))
     up, down = run_lengths(np.pad(chart.T[:, 1:] == chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)
 
 
 def run_lengths(joined: Mask) -> tuple[Ints, Ints]:
-    """Return the number of connected texels before and after each texel of a row (h, w).
+    """Return the number of connected texels before and after each texel of its row, (h, w) each.
 
-    joined : (h, w) whether each texel is connected to the one before it
+    joined : (h, w) mask of texels that are connected to the texel before them in the row
     """
     after = np.zeros_like(joined)
     after[:, :-1] = joined[:, 1:]

@@ -31,10 +31,8 @@ _DEEP_ENOUGH = (
     10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
 )
 _UNIFORM_NODES = 8  # number of discrete directions for uniform light
-_MIN_DEPTHS, _DOUBLINGS = (
-    1e-4 * np.array([1.0, 2.0**0.5]),
-    25,
-)  # thinnest slabs that are solved [mean free paths], and how often they are doubled
+# Thickness of the thinnest slabs that are solved [mean free paths], and how often they are doubled.
+_MIN_DEPTHS, _DOUBLINGS = 1e-4 * np.array([1.0, 2.0**0.5]), 25
 _DEPTHS = (_MIN_DEPTHS * 2.0 ** np.arange(_DOUBLINGS + 1)[:, None]).ravel()
 _MIN_TRANSMITTANCE = 1e-300  # replaces the transmittance 0 of thick black slabs in divisions
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a profile [1/mean free path]

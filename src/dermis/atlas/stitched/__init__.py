@@ -1,1 +1,1 @@
-"""Stitched uv layouts: charts with gutters that continue the surface across seams."""
+"""Stitched uv layouts: charts with gutters that continue the surface across the seams."""

@@ -1,4 +1,4 @@
-"""Construction of the stitched atlas: pieces, cuts, packing and gutters."""
+"""Construction of the stitched atlas: division of charts into pieces, packing and gutters."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.mesh import Mesh
 
-_MIN_DENSITY = 0.05  # of a piece, relative to the mesh's mean; what has less is too small to be blurred
-_SPECK_MM2 = 1.0  # smaller mirrored parts stay in the chart around them
-_DENSITY_RANGE = (0.5, 1.4)  # relative to the mean; the density of charts outside is moved towards it
-_MAX_GUTTER = 1 / 8  # width of gutters as a fraction of the map's side
+_MIN_DENSITY = 0.05  # uv density of a piece over the mean; light is not blurred in pieces with less
+_SPECK_MM2 = 1.0  # mirrored parts of a chart with less area are no pieces of their own
+_DENSITY_RANGE = (0.5, 1.4)  # uv density over the mean; pieces outside this range are scaled towards it
+_MAX_GUTTER = 1 / 8  # largest width of gutters as a fraction of the map's side
 
 
 def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
-    """Return the piece of each triangle (f,), -1 for none, and uv scales (f,) that even out density.
+    """Divide charts into pieces; return piece indices (f,) and uv scales (f,) that even out texel density.
 
-    A piece is a chart or a mirrored part of one.
+    A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
     """
     mirrored = (surface.area_uv < 0).astype(np.int64)
     neighbour = surface.uv_neighbour
@@ -47,13 +47,13 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
 
 
 def renumbered(piece: Index) -> Index:
-    """Return pieces (f,) renumbered from 0 without gaps; -1 is kept."""
+    """Renumber piece indices (f,) from 0 without gaps; the index -1 for no piece is kept."""
     numbers, index = np.unique(piece, return_inverse=True)
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
 def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
-    """Return pieces with small ones merged into the largest of their chart."""
+    """Merge pieces of less than 1 mm2 into the largest piece of their chart."""
     area = np.bincount(piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[piece], kind="stable")
     largest = np.zeros(int(chart.max()) + 1, np.int64)
@@ -62,7 +62,10 @@ def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
 
 
 def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
-    """Return the length in uv per mm on the surface for each triangle's piece (f,), and its mean."""
+    """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
+
+    The density is the square root of uv area over surface area, the length in uv of 1 mm on the surface.
+    """
     inside, index = piece >= 0, np.maximum(piece, 0)
     uv = np.bincount(index, np.abs(surface.area_uv) * inside)
     mm2 = np.bincount(index, surface.area_mm2 * inside)
@@ -71,10 +74,12 @@ def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
 
 
 def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
-    """Build the atlas in which charts are apart, with gutters that show the surface across their seams.
+    """Build the atlas of a stitched layout, in which gutters show the surface across the seams of each chart.
 
-    Returns None if there are too many charts for the texels.
+    Charts are moved apart to make space for the gutters. The result is None if the charts do not fit into the
+    texels.
 
+    size : texels along each side of the map
     gutter_mm : width of the gutters [mm]
     """
     surface = flat_surface(mesh)
@@ -89,10 +94,10 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     own = np.flatnonzero(piece >= 0)
     border = find_border(surface, piece, own)
     coverage = compute_coverage(surface, piece, own, border, packing, width, (size, size))
-    return _atlas(surface, packing, coverage, piece >= 0)
+    return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 
-def _atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:
+def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:
     size = len(coverage.triangle)
     metric = texel_metric(surface, packing, coverage)
     distances = edge_distances(surface, packing, coverage)

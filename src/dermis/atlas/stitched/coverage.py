@@ -1,4 +1,4 @@
-"""Surface points at the texels of pieces and gutters, with their stretch and the distance to chart edges."""
+"""Surface points at the texels of pieces and gutters, with texel stretch and the distance to chart edges."""
 
 from __future__ import annotations
 
@@ -24,16 +24,18 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 
 @dataclass(frozen=True)
 class Coverage:
-    """Surface points that the texels of a grid show.
+    """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of its own piece: in the piece itself, or on its border for
-    gutters.
+    The anchor of a texel is the nearest point of the piece to which it belongs: for a texel of the piece its
+    own point, for a gutter texel a point on the border.
 
-    triangle, weights : (h, w) triangle, -1 for none, and (h, w, 2) weights of its second and third corner
-    anchor_triangle, anchor_weights : the same for the anchor
-    piece : (h, w) piece, -1 for none
-    gutter : (h, w) texels that copy others
-    distance_mm : (h, w) distance from the piece
+    triangle : (h, w) index of the triangle that the texel shows, -1 for none
+    weights : (h, w, 2) barycentric weights of that triangle's second and third corner
+    anchor_triangle : (h, w) index of the anchor's triangle, -1 for none
+    anchor_weights : (h, w, 2) barycentric weights of the anchor
+    piece : (h, w) piece to which the texel or gutter belongs, -1 for none
+    gutter : (h, w) mask of gutter texels, which copy light
+    distance_mm : (h, w) distance from the piece on the surface [mm]
     """
 
     triangle: Ints
@@ -54,9 +56,12 @@ def compute_coverage(
     width: GutterWidth,
     shape: tuple[int, int],
 ) -> Coverage:
-    """Compute the coverage of packed pieces and their gutters.
+    """Compute the surface points that the texels of packed pieces and their gutters show.
 
-    piece, own, border : pieces (f,), triangles to cover, and their border, see `find_border`
+    piece : (f,) piece of each triangle, -1 for none
+    own : (t,) indices of the triangles to rasterise
+    border : border of the pieces, see `find_border`
+    shape : height and width of the grid of texels
     """
     owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), shape)
     weights = centre_weights(packing.corners, owner)
@@ -75,7 +80,7 @@ def compute_coverage(
 
 
 def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
-    """Add rims and gutters to a coverage of pieces only."""
+    """Enter rim and gutter texels into the coverage of rasterised pieces."""
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
     coverage.anchor_triangle[y, x] = texels.anchor_triangle
@@ -95,30 +100,36 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
 
 
 def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Mask:
-    """Return the mask (f,) of triangles whose texels belong mostly to other triangles of their piece."""
+    """Return the mask (f,) of triangles most of whose texels are owned by other triangles of their piece."""
     own = np.flatnonzero(piece >= 0)
     owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), (size, size))
     return mostly_hidden(packing.corners, own, owner)
 
 
 def _drawing_order(surface: FlatSurface, piece: Index, own: Index) -> Index:
-    """Return the triangles with those first that are mirrored within their piece, and so overwritten."""
+    """Return triangle indices sorted so that triangles mirrored within their piece are overwritten.
+
+    own : (t,) indices of the triangles
+    """
     return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
 
 
 def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Mask:
-    """Return the mask of triangles `own` that are mirrored relative to most of their piece."""
+    """Return the mask of triangles whose uv orientation is opposite to that of most of their piece.
+
+    piece, own : (t,) piece and index of each triangle
+    """
     total = np.bincount(piece, surface.area_uv[own])
     return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[own]))
 
 
 def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Index) -> None:
-    """Copy neighbouring texels to gutter texels just beyond the end of the surface.
+    """Copy neighbouring texels to gutter texels just beyond an edge where the surface ends.
 
-    A blur along the edge then reads the same from a gutter as from the rim of a piece.
+    A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
-    ended : (h, w) texels beyond the end of the surface
-    y, x : (n,) those of them that are in gutters
+    ended : (h, w) mask of texels beyond the end of the surface
+    y, x : (n,) row and column of the gutter texels among them
     """
     last = np.array(ended.shape) - 1
     own, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
@@ -132,7 +143,10 @@ def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Ind
 
 
 def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Floats:
-    """Return texels per mm along u and v, and the cosine between them (h, w, 3); in gutters of the anchor."""
+    """Return texels per mm along u and v, and the cosine of the angle between them, (h, w, 3).
+
+    A gutter texel has the metric of its anchor.
+    """
     covered = coverage.anchor_triangle >= 0
     anchor, weights = coverage.anchor_triangle[covered], coverage.anchor_weights[covered]
     metric = np.zeros((*covered.shape, 3), np.float32)
@@ -144,10 +158,10 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return the texels (h, w, 4) of the same piece to the left, right, up and down, up to the next gap.
+    """Return the number of texels (h, w, 4) of one piece to the left, right, up and down before a gap.
 
-    There is a gap between two texels if their points are farther apart than `gap_limit_mm` and their anchors
-    are farther apart than either texel is from its anchor.
+    There is a gap between two texels if their surface points are farther apart than `gap_limit_mm` and their
+    anchors are farther apart than either texel is from its anchor.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -167,7 +181,11 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
 def _has_gap(
     surface: FlatSurface, packing: Packing, coverage: Coverage, first: Index, second: Index, axis: int
 ) -> Mask:
-    """Return whether there is a gap between pairs of texels, given by flat indices."""
+    """Return the mask of pairs of adjacent texels with a gap on the surface between them.
+
+    first, second : (n,) flat indices of the texels
+    axis : 0 for pairs along x, 1 along y
+    """
     one, other = (_anchored(surface, packing, coverage, texel) for texel in (first, second))
     triangle, weights = coverage.triangle.ravel(), coverage.weights.reshape(-1, 2)
     points = [surface.points(triangle[texel], weights[texel]) for texel in (first, second)]

@@ -1,4 +1,4 @@
-"""Geodesics on a triangle mesh: straight lines that are continued across edges by unfolding triangles."""
+"""Geodesics on a triangle mesh: straight lines that continue across edges by unfolding the next triangle."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 Complex = NDArray[np.complex128]
 
 START_SHIFT = 1e-3
-"""Fraction by which starts are moved towards an inner point, so that those at a corner are inside."""
+"""Fraction of the way by which start points move to an inner point, so that none is at a corner."""
 
 INNER_WEIGHTS = 0.3547, 0.3141, 0.3312
-"""Barycentric weights of the inner point: from the centroid, more geodesics would hit corners."""
+"""Barycentric weights of that inner point; the centroid would let more geodesics hit corners."""
 
 _MAX_STEPS = 4096
 
 
 class Geodesics(NamedTuple):
-    """Geodesics that have not ended yet.
+    """State of the geodesics that have not reached their end.
 
-    Points are complex numbers in the plane of the first triangle, with the start at 0.
+    Points are complex numbers in the plane of a geodesic's first triangle, with the start at 0.
 
-    ray : index of each geodesic
-    triangle, side : current triangle, and the side through which it is left
-    a, b : ends of that side
-    direction : from the start to the target
-    orientation : 1, or -1 in triangles that face the other way than the first
+    ray : index of each geodesic in the arrays of `trace_geodesics`
+    triangle : index of the current triangle
+    side : side (0, 1, 2) through which the geodesic leaves it
+    a, b : end points of that side
+    direction : vector from the start to the target
+    orientation : 1, or -1 in triangles that face opposite to the first triangle
     """
 
     ray: Index
@@ -42,16 +43,16 @@ class Geodesics(NamedTuple):
     orientation: Doubles
 
     def select(self, chosen: Mask) -> Geodesics:
-        """Return the chosen geodesics."""
+        """Return the geodesics for which a mask is true."""
         return Geodesics._make(part[chosen] for part in self)
 
 
 class GeodesicEnds(NamedTuple):
-    """Ends of geodesics (n,).
+    """End points of n geodesics on the surface.
 
-    triangle : triangle of the end
-    weights : (n, 2) weights of its second and third corner
-    complete : whether the target was reached before the surface ended
+    triangle : (n,) index of the triangle that contains the end
+    weights : (n, 2) barycentric weights of that triangle's second and third corner
+    complete : (n,) mask of geodesics that reached their target before the surface ended
     """
 
     triangle: Ints
@@ -59,10 +60,12 @@ class GeodesicEnds(NamedTuple):
     complete: Mask
 
     def set_ends(self, rays: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
-        """Set the ends of some geodesics.
+        """Store the ends of the selected geodesics.
 
-        first : corner of the triangle that is weighted 1 - b - c
-        b, c : weights of the two corners after it
+        rays : geodesics that end in their current triangle
+        first : corner (0, 1, 2) of the triangle with the weight 1 - b - c
+        b, c : weights of the two corners that follow it
+        complete : whether the geodesics reached their target
         """
         weights = np.column_stack((1.0 - b - c, b, c))
         order = (np.arange(3) - first[:, None]) % 3
@@ -74,11 +77,11 @@ class GeodesicEnds(NamedTuple):
 def trace_geodesics(
     adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles
 ) -> GeodesicEnds:
-    """Trace geodesics from a point of each triangle towards a target in its plane.
+    """Trace a geodesic from a point of each triangle towards a target in the triangle's plane.
 
-    triangle : (n,) first triangle
-    start : (n, 2) point in the triangle or on its border [mm]
-    target : (n, 2) [mm]
+    triangle : (n,) index of the first triangle
+    start : (n, 2) point in this triangle or on its border, in the triangle's plane [mm]
+    target : (n, 2) target in the same plane, usually outside the triangle [mm]
     """
     ends = GeodesicEnds(
         np.array(triangle, np.int32), np.full((len(triangle), 2), 1 / 3), np.zeros(len(triangle), bool)
@@ -96,7 +99,7 @@ def trace_geodesics(
 def _leave_first_triangle(
     adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
 ) -> Geodesics:
-    """Return the geodesics that leave their first triangle, and set the ends of the others."""
+    """Return the geodesics that leave their first triangle, and store the ends of those that do not."""
     corners = _complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT * (corners @ np.array(INNER_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
@@ -114,7 +117,7 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Return the geodesics that leave the next triangle too, and set the ends of the others."""
+    """Continue geodesics into the next triangle; store the ends of those that do not leave it."""
     neighbour = adjacency.neighbour[rays.triangle, rays.side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
@@ -143,7 +146,7 @@ def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Ge
 
 
 def _complex(points: Doubles) -> Complex:
-    """Return (..., 2) points as (...) complex numbers."""
+    """Convert points (..., 2) to complex numbers (...)."""
     return np.ascontiguousarray(points, np.float64).view(np.complex128)[..., 0]
 
 
@@ -152,13 +155,13 @@ def _cross(a: Complex, b: Complex) -> Doubles:
 
 
 def _exit_fraction(rays: Geodesics) -> Doubles:
-    """Return the fraction of the side from a to b at which each geodesic leaves it [0..1]."""
+    """Return the fraction of the way from a to b at which each geodesic crosses the side, 0 to 1 [-]."""
     here, there = _cross(rays.direction, rays.a), _cross(rays.direction, rays.b)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
 def _weights(a: Complex, b: Complex, c: Complex, point: Complex) -> tuple[Doubles, Doubles]:
-    """Return the barycentric weights of b and c at a point, clipped to the triangle."""
+    """Return the barycentric weights of b and c at a point, clipped to the triangle a b c."""
     area = _cross(b - a, c - a)
     second = np.clip(_cross(point - a, c - a) / area, 0.0, 1.0)
     third = np.clip(_cross(b - a, point - a) / area, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Borders of pieces, and the gutters around them that continue the surface."""
+"""Borders of packed pieces, and gutter texels around them that continue the surface."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_bo
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-_MAX_STRETCH = 2.0  # largest texels per mm at a border, relative to its piece's mean, that widens a gutter
+_MAX_STRETCH = 2.0  # largest texels per mm at a border over the mean of its piece, for the width of a gutter
 
 
 class Border(NamedTuple):
-    """Sides of triangles at the border of pieces.
+    """Triangle sides that form the borders of pieces.
 
-    triangle, side : (k,) triangle and index of its side
-    seam : (k,) whether the surface continues across it
+    triangle : (k,) index of the triangle
+    side : (k,) side of the triangle: 0 for corners 01, 1 for 12, 2 for 20
+    seam : (k,) mask of sides across which the surface continues
     """
 
     triangle: Index
@@ -29,11 +30,11 @@ class Border(NamedTuple):
 
 
 class Packing(NamedTuple):
-    """Positions of triangles on a grid.
+    """Positions of f triangles on the texel grid of the atlas.
 
     corners : (f, 3, 2) corners [texel], integers at texel centres
-    texels_per_uv : (f,) texels per unit of uv
-    texels_per_mm : (f,) texels per mm on the surface, the mean over the piece
+    texels_per_uv : (f,) texels per unit of the mesh's uv
+    texels_per_mm : (f,) texels per mm on the surface, averaged over the triangle's piece
     """
 
     corners: Doubles
@@ -49,10 +50,10 @@ class GutterWidth(NamedTuple):
 
 
 def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
-    """Return the border of pieces.
+    """Return the triangle sides beyond which there is no triangle of the same piece.
 
     piece : (f,) piece of each triangle, -1 for none
-    own : triangles of which the border is searched, each in a piece
+    own : (t,) indices of the triangles whose sides are examined, each in a piece
     """
     neighbour = surface.uv_neighbour[own]
     row, index = np.nonzero((neighbour == own[:, None]) | (piece[own, None] != piece[neighbour]))
@@ -62,7 +63,7 @@ def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
 
 
 def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> BorderSides:
-    """Return the sides of a border on the grid."""
+    """Return positions, surface metric and gutter width of the border sides on the texel grid."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
@@ -82,7 +83,11 @@ def needed_texels(
     width: GutterWidth,
     shape: tuple[int, int],
 ) -> Mask:
-    """Return the mask (h, w) of texels that pieces, rims and gutters may need."""
+    """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
+
+    own : (t,) indices of the triangles of the pieces
+    shape : height and width of the grid of texels
+    """
     found = np.zeros(shape, np.bool_)
     found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
     found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
@@ -90,15 +95,15 @@ def needed_texels(
 
 
 class GutterTexels(NamedTuple):
-    """Texels (n,) outside pieces that belong to a gutter or rim.
+    """Gutter and rim texels (n,) outside the triangles of a piece, with the surface points that they show.
 
     y, x : row and column
-    rim : texels that interpolation within the piece reads
-    distance_mm : distance from the piece
-    anchor_triangle, anchor_weights : nearest point on the border: triangle, weights of its second and third
-        corner
-    triangle, weights : end of the geodesic from there to the texel
-    complete : whether the surface extends to that end
+    rim : mask of texels that bilinear interpolation within the piece reads
+    distance_mm : distance from the piece on the surface [mm]
+    anchor_triangle, anchor_weights : nearest point on the border: triangle index, and weights of its second
+        and third corner
+    triangle, weights : end of the geodesic from the anchor to the texel: triangle index, and weights
+    complete : mask of texels that the geodesic reached before the surface ended
     """
 
     y: Index
@@ -115,9 +120,9 @@ class GutterTexels(NamedTuple):
 def trace_gutter(
     surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints
 ) -> GutterTexels:
-    """Return the gutter texels of a border, with the surface points that they show.
+    """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
 
-    owner : (h, w) triangle of each texel of the pieces, -1 outside
+    owner : (h, w) index of the triangle that owns each texel of the pieces, -1 outside
     """
     nearest = nearest_border_points(sides := border_sides(surface, border, packing, width), owner >= 0)
     texels = np.column_stack(np.divmod(nearest.texel, owner.shape[1])[::-1])
@@ -130,9 +135,13 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from the nearest border points to texels; return their ends and the points' weights.
+    """Trace geodesics from nearest border points to texels; return their ends and the points' weights.
 
-    texels : (n, 2) x and y
+    The weights (n, 2) are those of the second and third corner of the border triangle.
+
+    sides : border sides on the texel grid
+    nearest : nearest border point of each texel
+    texels : (n, 2) x and y of the texels
     """
     t, anchor_triangle = nearest.fraction[:, None], border.triangle[nearest.side]
     first, rows = border.side[nearest.side], np.arange(len(anchor_triangle))
@@ -147,13 +156,13 @@ def trace_from_border(
 
 
 def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the nearest border points (n, 2) [texel]."""
+    """Return the positions (n, 2) of nearest border points on the texel grid [texel]."""
     first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
     return _lerp(first, second, nearest.fraction[:, None])
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) at border points of one texel to the right and one down [mm]."""
+    """Return the surface vectors (n, 2, 2) of a texel step to the right and down at border points [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _lerp(first, second, nearest.fraction[:, None, None])
 

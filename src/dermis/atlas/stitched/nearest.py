@@ -1,4 +1,4 @@
-"""Nearest point on a border for each texel near it."""
+"""Search for the nearest border point of each texel around a piece."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _TEXEL = 1.001  # a texel, with a margin for rounding
 
 
 class BorderSides(NamedTuple):
-    """Sides of a border on a grid.
+    """Border sides (k,) on the texel grid, with surface metric and gutter width.
 
-    ends : (k, 2, 2) [texel]
-    steps : (k, 2, 2, 2) surface vectors at both ends of one texel to the right and one down [mm]
-    gutter_mm : (k,) width of the gutter on the surface
+    ends : (k, 2, 2) positions of both end points [texel]
+    steps : (k, 2, 2, 2) surface vectors of a texel step to the right and down, at both end points [mm]
+    gutter_mm : (k,) width of the gutter on the surface [mm]
     max_texels : (k,) largest width of the gutter on the grid [texel]
     """
 
@@ -28,12 +28,13 @@ class BorderSides(NamedTuple):
 
 
 class NearestPoints(NamedTuple):
-    """Texels (n,) outside pieces, and the nearest border point of each.
+    """Nearest border points of n texels that are outside pieces.
 
-    texel : flat index
-    side, fraction : side of the border, and fraction of its length [0..1]
-    distance_mm : distance by the surface metric at the side
-    rim : whether interpolation at some point of the border reads the texel
+    texel : flat index of the texel
+    side : index of the border side
+    fraction : position of the point along the side, 0 to 1 [-]
+    distance_mm : distance from texel to point by the surface metric at the side [mm]
+    rim : mask of texels that bilinear interpolation reads at some point of the border
     """
 
     texel: Index
@@ -44,11 +45,11 @@ class NearestPoints(NamedTuple):
 
 
 class _SideMetric(NamedTuple):
-    """Surface metric at the sides (k,) of a border.
+    """Surface metric at the border sides (k,), by which texel offsets are measured in mm.
 
-    x, y, down : the step (dx, dy) [texel] has the length of the vector (x dx + y dy, down dy) [mm]
-    along : (k, 2) fraction of the side per texel step along x and y
-    half_extent : (k, 2) half the size of the box around a side in which its gutter is [texel]
+    x, y, down : a step (dx, dy) [texel] has the length of the vector (x dx + y dy, down dy) [mm]
+    along : (k, 2) fraction of the side's length that a texel step along x and along y covers
+    half_extent : (k, 2) margin around the side's bounding box that contains its gutter [texel]
     """
 
     x: Doubles
@@ -59,9 +60,11 @@ class _SideMetric(NamedTuple):
 
 
 def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
-    """Return the nearest border point of each texel within the gutter, by the surface metric at the side.
+    """Return the nearest border point of each texel that is in a gutter or at a rim.
 
-    inside : (h, w) texels of pieces
+    Distances are measured by the surface metric at each side.
+
+    inside : (h, w) mask of texels that pieces cover
     """
     metric = _side_metric(sides)
     k, x, y = _candidate_texels(sides, metric, inside.shape)
@@ -103,7 +106,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return sides (n,), and the x and y of all texels that may be in their gutters."""
+    """Return candidate gutter texels as border side (n,), x and y: all texels around the sides."""
     height, width = shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)
@@ -115,7 +118,7 @@ def _candidate_texels(
 
 
 def _within_a_texel(offset: Doubles, along: Doubles) -> Mask:
-    """Return whether the segment from 0 to `along` is within a texel of `offset`, both (2, n)."""
+    """Return the mask of offsets (2, n) that are within a texel of the segment from 0 to `along` (2, n)."""
     low, high = np.minimum(along, 0.0), np.maximum(along, 0.0)
     found = np.asarray(((offset > low - _TEXEL) & (offset < high + _TEXEL)).all(axis=0))
     offset, along = offset[:, found], along[:, found]

@@ -1,4 +1,4 @@
-"""Cuts through charts whose gutters would overlap each other."""
+"""Cuts through pieces whose gutters would otherwise overlap each other."""
 
 from __future__ import annotations
 
@@ -31,27 +31,29 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import components
 
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
-_MAX_TEXELS = 100_000  # of a piece on such a grid
-_MAX_GRID_CELLS = 600_000  # of the grid
-_CONFLICT_RANGE = 0.6  # fraction of the gutter width in which conflicts count
+_MAX_TEXELS = 100_000  # largest number of texels of a piece on such a grid
+_MAX_GRID_CELLS = 600_000  # largest number of texels of the whole grid
+_CONFLICT_RANGE = 0.6  # fraction of the gutter width within which conflicts are counted
 _CLUSTER_CELL = 0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
 _CELLS_PER_GUTTER = 8  # cells of the grid for distances, per gutter width
 _MIN_LENGTH = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
 _MIN_BENEFIT = 0.2  # fewest separated conflicts per texel of a cut
-_ANGLES, _OFFSETS = 8, 16
-_LENGTH_BIAS = 1.0  # times the number of conflicts, is added to a cut's length against too short cuts
-_MIN_PART = 0.1  # area of a part that is not merged, in squared gutter widths
-_MAX_DEPTH = 4
+_ANGLES, _OFFSETS = 8, 16  # number of directions and offsets of lines that are tried
+_LENGTH_BIAS = (
+    1.0  # texels per conflict that are added to a cut's length, so that very short cuts are not preferred
+)
+_MIN_PART = 0.1  # area of the smallest part that stays separate, in squared gutter widths
+_MAX_DEPTH = 4  # largest number of successive cuts
 _MAX_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along cuts
 
 
 class Conflicts(NamedTuple):
-    """Texels at which gutters of one piece overlap.
+    """Pairs of border points of one piece whose gutters meet, although the points are apart on the surface.
 
-    one, other : (n, 2) the two points of the piece whose gutters overlap [texel]
+    one, other : (n, 2) both border points of each pair, at the scale of the grid [texel]
     inside : (m, 2) texels of the piece
     texels_per_uv : texels per unit of uv
-    texel_mm : side of a texel on the surface
+    texel_mm : side of a texel on the surface [mm]
     """
 
     one: Doubles
@@ -62,17 +64,18 @@ class Conflicts(NamedTuple):
 
     @property
     def length_mm(self) -> float:
-        """Return the length along which the gutters overlap."""
+        """Return the length of the line along which gutters meet [mm]."""
         return len(self.one) * self.texel_mm
 
 
-class _Grid(NamedTuple):
-    """A piece and its gutters on a grid.
+class _PieceGrid(NamedTuple):
+    """Texel grid with one piece and its gutters.
 
-    owner : (h, w) triangle of the piece, -1 in gutters, -2 elsewhere
-    row : (h, w) row of each texel in `anchored`, where the texels of the piece are first
-    packing, border, sides : of the piece
-    nearest : gutter texels
+    owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
+    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede those of the gutters
+    anchored : texels of piece and gutters with their anchors
+    packing, border, sides : position, border and border sides of the piece on the grid
+    nearest : nearest border points of the gutter texels
     """
 
     owner: Ints
@@ -85,10 +88,10 @@ class _Grid(NamedTuple):
 
 
 def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Conflicts:
-    """Return the conflicts of one piece, found on a grid of its own.
+    """Find where gutters of one piece meet, by drawing the piece on a texel grid of its own.
 
-    mapped : (f,) triangles that belong to a piece
-    own : triangles of this piece
+    mapped : (f,) mask of triangles that belong to any piece
+    own : (t,) indices of the triangles of this piece
     """
     mm2, area_uv = surface.area_mm2[own].sum(), np.abs(surface.area_uv[own]).sum()
     low, high = surface.uv[own].min(axis=(0, 1)), surface.uv[own].max(axis=(0, 1))
@@ -103,7 +106,7 @@ def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: fl
     piece = np.where(mapped, 1, -1)
     piece[own] = 0
     packing, shape = Packing(corners, texels_per_uv * ones, ones / texel_mm), (int(rows), int(columns))
-    grid = _grid(
+    grid = _draw_grid(
         surface, find_border(surface, piece, own), packing, width, rasterise_owners(corners, own, shape)
     )
     one, other = (grid.anchored.select(found) for found in _gap_pairs(surface, mapped, grid))
@@ -112,7 +115,9 @@ def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: fl
     return Conflicts(one.anchors + origin, other.anchors + origin, inside, texels_per_uv, texel_mm)
 
 
-def _grid(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints) -> _Grid:
+def _draw_grid(
+    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints
+) -> _PieceGrid:
     sides = border_sides(surface, border, packing, width)
     sides = sides._replace(gutter_mm=_CONFLICT_RANGE * sides.gutter_mm)
     nearest, own = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
@@ -124,11 +129,11 @@ def _grid(surface: FlatSurface, border: Border, packing: Packing, width: GutterW
     anchors = np.concatenate((texels[: len(own)], border_points(sides, nearest)))
     steps = surface.uv_metric[f, 0, :2] / packing.texels_per_uv[f, None]
     step_mm = np.concatenate((steps, np.linalg.norm(border_steps(sides, nearest), axis=2)))
-    return _Grid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
+    return _PieceGrid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
 
 
-def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _Grid) -> tuple[Index, Index]:
-    """Return pairs (n,), (n,) of adjacent texels with a gap between them."""
+def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
+    """Return pairs of adjacent texels, (n,) each, whose surface points are apart."""
     found = []
     for axis in (0, 1):
         a, b = (grid.row.ravel()[texel] for texel in unconnected_pairs(surface, grid.owner, axis))
@@ -142,8 +147,11 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _Grid) -> tuple[Index, 
     return one[gap], other[gap]
 
 
-def _texel_points(surface: FlatSurface, mapped: Mask, grid: _Grid, chosen: Index) -> Doubles:
-    """Return the surface points (n, 3) of chosen texels [mm]; NaN for others and beyond the surface's end."""
+def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
+    """Return the surface points (n, 3) of the texels in `chosen`; those of other texels are NaN [mm].
+
+    Texels beyond the end of the surface are NaN too.
+    """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
     is_chosen[chosen] = True
@@ -158,7 +166,7 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _Grid, chosen: Index
 
 
 def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
-    """Return pieces (f,) that are cut along lines until their gutters hardly overlap.
+    """Cut pieces along straight lines until few of their gutters overlap; return piece indices (f,).
 
     gutter_mm : width of the gutters [mm]
     """
@@ -169,7 +177,7 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     budget_mm2 = _MAX_GROWTH * surface.area_mm2[order].sum()
     while queue:
         own, depth = queue.pop()
-        parts = _cut(surface, piece >= 0, own, gutter_mm) if depth < _MAX_DEPTH else None
+        parts = _cut_piece(surface, piece >= 0, own, gutter_mm) if depth < _MAX_DEPTH else None
         cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_length_mm(surface, own, parts)
         if parts is None or cost_mm2 > budget_mm2:
             done[own] = count
@@ -181,7 +189,10 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
 
 
 def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
-    """Return the length of all sides between parts of the triangles `own` [mm]."""
+    """Return the length of all triangle sides between different parts of a piece [mm].
+
+    own, part : (t,) indices of the piece's triangles, and the part of each
+    """
     part_of = np.full(len(surface.uv), -1, np.int64)
     part_of[own] = part
     other = part_of[surface.uv_neighbour[own]]
@@ -189,12 +200,12 @@ def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
 
-def _cut(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Index | None:
-    """Return the part of each triangle of a piece, or None if it needs no cut."""
+def _cut_piece(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Index | None:
+    """Cut one piece to separate conflicts; return the part of each triangle (t,), or None without a cut."""
     found = find_conflicts(surface, mapped, own, gutter_mm)
     reach = gutter_mm / found.texel_mm
     part = np.zeros(len(own), np.int64)
-    for row, cluster in enumerate(_clusters(found, reach), start=1):
+    for row, cluster in enumerate(_conflict_clusters(found, reach), start=1):
         if len(cluster) * found.texel_mm < _MIN_LENGTH * gutter_mm:
             continue
         overlap = found._replace(one=found.one[cluster], other=found.other[cluster])
@@ -206,12 +217,15 @@ def _cut(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> In
             continue
         if across <= around:
             return _connected_parts(surface, own, half.astype(np.int64), gutter_mm)
-        part[_strip(surface, own, overlap, half, reach) & (part == 0)] = row
+        part[_conflict_strip(surface, own, overlap, half, reach) & (part == 0)] = row
     return _connected_parts(surface, own, part, gutter_mm)
 
 
-def _clusters(found: Conflicts, reach: float) -> list[Index]:
-    """Return clusters of nearby conflicts, as their indices."""
+def _conflict_clusters(found: Conflicts, reach: float) -> list[Index]:
+    """Group conflicts that are close to each other; return the indices of each group.
+
+    reach : gutter width [texel]
+    """
     cells = np.floor((found.one + found.other) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
@@ -220,7 +234,7 @@ def _clusters(found: Conflicts, reach: float) -> list[Index]:
 
 
 def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
-    """Return whether each of the points (..., 2) is about within `reach` of any of the others (n, 2)."""
+    """Return the mask of points (..., 2) within about `reach` of any of the other points (n, 2)."""
     cell = reach / _CELLS_PER_GUTTER
     low = np.floor(others.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
@@ -234,8 +248,14 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
     return np.asarray(found[index[..., 0], index[..., 1]])  # cell 0 is always empty
 
 
-def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
-    """Return the mask of triangles along the side of an overlap on which they have less area."""
+def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
+    """Return the mask (t,) of triangles near an overlap that are on one side of the cutting line.
+
+    Of both sides the one is chosen on which such triangles have less area.
+
+    half : (t,) mask of triangles on one side of the line
+    reach : gutter width [texel]
+    """
     corners = surface.uv[own] * overlap.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(_within_reach(points, np.concatenate((overlap.one, overlap.other)), reach).any(axis=1))
@@ -244,7 +264,7 @@ def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, rea
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts for its length: normal, offset, number of conflicts."""
+    """Return normal and offset of the line that separates most conflicts for its length, and their number."""
     close = overlap.inside[_within_reach(overlap.inside, np.concatenate((overlap.one, overlap.other)), reach)]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
@@ -263,7 +283,10 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
 
 
 def _connected_parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> Index | None:
-    """Return connected parts, small ones merged into the largest adjacent part; None if there is only one."""
+    """Divide parts into connected ones and merge small ones; return the part of each triangle (t,).
+
+    A small part is merged into the largest adjacent part. The result is None if only one part remains.
+    """
     index = np.full(len(surface.uv), -1, np.int64)
     index[own] = np.arange(len(own))
     there = index[surface.uv_neighbour[own]]

@@ -1,4 +1,4 @@
-"""Packing of charts with their gutters into a square."""
+"""Packing of pieces with their gutters into a square map."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Mask
 
 Span = tuple[int, int, int]
-"""Run of cells: row, first and last column."""
-_MAX_CELLS = 512  # along each side of the square
-_COARSENING = 4  # cells per coarse cell along each axis, with which the best order is searched
-_BISECTIONS = 8  # in the search for the scale
-_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # in the search with fine cells, and its largest factor of the scale
-_ORDERS = 6  # by area, height and width, each by rows and by columns
-_MIN_GAIN = 1.003  # factor of the scale for which an order is worth a search
-_MAX_MASKS = 4  # attempts with masks of different scales
-_MASK_RATIO = 0.65  # found scale over that of the masks, below which they are computed again
-_MASK_EXCESS = 1.15  # scale of the next masks over the found one
+"""Run of cells in a row: row, first and last column."""
+_MAX_CELLS = 512  # largest number of cells along each side of the square
+_COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
+_BISECTIONS = 8  # number of trials in the search for the scale
+_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest gain of scale by them
+_ORDERS = 6  # number of packing orders: by area, height and width, each by rows and by columns
+_MIN_GAIN = 1.003  # gain of scale for which the search is repeated with another order
+_MAX_MASKS = 4  # number of attempts with masks of different scales
+_MASK_RATIO = 0.65  # found scale over the scale of the masks, below which the masks are computed again
+_MASK_EXCESS = 1.15  # scale of the next masks over the found scale
 
 
 def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
-    """Return the column and row of each shape on n x n cells, or None if one does not fit.
+    """Return the column and row of each shape on n x n cells, or None if they do not all fit.
 
-    Each shape is placed at the first free position by rows.
+    Each shape is placed at the first free position, searched row by row.
 
-    shapes : runs of cells of each shape, from row and column 0
+    shapes : cells of each shape as runs, from row and column 0
     """
     occupied, corners = 0, []
     for spans in shapes:
@@ -47,7 +47,10 @@ def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, in
 
 
 def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
-    """Return the free positions for the upper left cell of a shape, as a bit mask."""
+    """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
+
+    occupied : bit mask of the occupied cells
+    """
     height = 1 + max(row for row, _, _ in spans)
     width = 1 + max(last for _, _, last in spans)
     if max(height, width) > n:
@@ -65,19 +68,19 @@ def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
 
 @cache
 def _row_starts(n: int) -> int:
-    """Return a bit mask of the first cell of each row."""
+    """Return a bit mask of n x n cells in which the first cell of each row is set."""
     return ((1 << n * n) - 1) // ((1 << n) - 1)
 
 
 class _Piece(NamedTuple):
-    """A piece of the layout, prepared for packing.
+    """Piece of the layout, prepared for packing.
 
     surface : triangles of the piece
-    uv : (t, 3, 2) scaled corners, with the lowest at 0
-    extent : (2,) largest coordinates of the corners
-    scale : scale of the uv
-    uv_per_mm : scaled uv per mm on the surface
-    border : border, by the indices of triangles within the piece
+    uv : (t, 3, 2) uv of the corners, scaled and moved so that the lowest coordinates are 0
+    extent : (2,) largest u and v of the scaled uv
+    scale : factor of the mesh's uv
+    uv_per_mm : scaled uv per mm on the surface [1/mm]
+    border : border of the piece, with triangle indices within the piece
     """
 
     surface: FlatSurface
@@ -88,12 +91,12 @@ class _Piece(NamedTuple):
     border: Border
 
 
-class _Mask(NamedTuple):
-    """Cells that a piece with its gutter occupies at some scale.
+class _PieceMask(NamedTuple):
+    """Cells that a piece with its gutter occupies at one scale.
 
-    spans : (m, 3) row, first and last column of runs of cells
+    spans : (m, 3) row, first and last column of each run of cells
     margin : (2,) distance from the first cell to the origin of the piece's uv [cell]
-    scale : cells per unit of scaled uv
+    scale : cells per unit of the piece's scaled uv
     """
 
     spans: Index
@@ -102,9 +105,9 @@ class _Mask(NamedTuple):
 
 
 class _Layout(NamedTuple):
-    """Packed pieces.
+    """Positions of packed pieces on the grid of cells.
 
-    scale : cells per unit of scaled uv
+    scale : cells per unit of the pieces' scaled uv
     origins : (p, 2) position of the origin of each piece's uv [cell]
     """
 
@@ -115,10 +118,10 @@ class _Layout(NamedTuple):
 def pack_pieces(
     surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
 ) -> Packing | None:
-    """Pack pieces with their gutters as large as possible; return None if they do not fit at any scale.
+    """Pack pieces with their gutters at the largest common scale; return None if they do not fit.
 
-    piece : (f,) numbered from 0, -1 for triangles in no piece
-    scale : (f,) scale of each triangle's uv that evens out density
+    piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
+    scale : (f,) factor of each triangle's uv that evens out texel density
     size : texels along each side of the map
     """
     cells = min(size, _MAX_CELLS)
@@ -151,35 +154,38 @@ def _single_piece(surface: FlatSurface, piece: Index, own: Index, scale: float) 
 
 
 def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layout | None:
-    """Return the layout with the largest scale that is found, or None."""
+    """Return the layout with the largest scale that the search finds, or None if the pieces never fit."""
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASKS):
-        found = _largest_scale([_mask(one, top, width) for one in pieces], cells, top)
+        found = _largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
         if found is None or found.scale > _MASK_RATIO * top:
             return found
         top = _MASK_EXCESS * found.scale
     return None
 
 
-def _largest_scale(masks: list[_Mask], cells: int, top: float) -> _Layout | None:
-    """Return the layout with the largest scale below `top`, in the order that is best with coarse cells."""
+def _largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
+    """Return the layout with the largest scale below `top`, for the best of several orders of the pieces.
+
+    The best order is searched with coarse cells.
+    """
     coarse, best = None, 0
     for order in range(_ORDERS):
         lower = coarse.scale if coarse else 0.0
         if order == 0 or (coarse and _try_scale(masks, lower * _MIN_GAIN, cells // _COARSENING, order)):
-            found = _bisect(masks, (lower, top / _COARSENING), cells // _COARSENING, order, _BISECTIONS)
+            found = _bisect_scale(masks, (lower, top / _COARSENING), cells // _COARSENING, order, _BISECTIONS)
             coarse, best = (found, order) if found else (coarse, best)
     if coarse is None:
-        return _bisect(masks, (0.0, top), cells, 0, _BISECTIONS)
+        return _bisect_scale(masks, (0.0, top), cells, 0, _BISECTIONS)
     same = _Layout(_COARSENING * coarse.scale, _COARSENING * coarse.origins)
-    return _bisect(masks, (same.scale, same.scale * _FINE_GAIN), cells, best, _FINE_BISECTIONS) or same
+    return _bisect_scale(masks, (same.scale, same.scale * _FINE_GAIN), cells, best, _FINE_BISECTIONS) or same
 
 
-def _bisect(
-    masks: list[_Mask], bounds: tuple[float, float], cells: int, order: int, bisections: int
+def _bisect_scale(
+    masks: list[_PieceMask], bounds: tuple[float, float], cells: int, order: int, bisections: int
 ) -> _Layout | None:
-    """Return the layout with the largest scale between two bounds, or None."""
+    """Return the layout with the largest scale between two bounds, or None if no trial fits."""
     (low, high), best = bounds, None
     for _ in range(bisections):
         middle = (low + high) / 2
@@ -191,11 +197,12 @@ def _bisect(
     return best
 
 
-def _try_scale(masks: list[_Mask], scale: float, cells: int, order: int) -> _Layout | None:
-    """Return the layout at a scale, or None if the pieces do not fit.
+def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) -> _Layout | None:
+    """Return the layout of the pieces at one scale, or None if they do not fit.
 
-    scale : cells per unit of scaled uv
-    order : index of the sort key of the pieces, and whether they are placed by rows or by columns
+    scale : cells per unit of the pieces' scaled uv
+    order : index of the packing order: order // 2 selects the sort key (area, height, width), odd orders
+        place by columns
     """
     shapes, low = zip(*(_scaled_mask(one, scale / one.scale) for one in masks), strict=True)
     if order % 2 == 1:
@@ -212,8 +219,8 @@ def _try_scale(masks: list[_Mask], scale: float, cells: int, order: int) -> _Lay
     return _Layout(scale, corners + low)
 
 
-def _scaled_mask(mask: _Mask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a mask touches at another scale, and its margin there."""
+def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
+    """Return the mask (h, w) of all cells that a piece touches at another scale, and its margin there."""
     row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
@@ -226,8 +233,8 @@ def _scaled_mask(mask: _Mask, scale: float) -> tuple[Mask, Doubles]:
     return np.cumsum(steps, axis=1)[:, :-1] > 0, -low.astype(np.float64)
 
 
-def _mask(one: _Piece, scale: float, width: GutterWidth) -> _Mask:
-    """Return the mask of all cells in which the piece may need a texel."""
+def _piece_mask(one: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
+    """Return the cells in which a piece with its gutter may need a texel, at one scale."""
     margin = np.ceil(_gutter_extent(one, scale, width)) + 2
     columns, rows = np.ceil(one.extent * scale + 2 * margin).astype(int) + 1
     ones = np.ones(len(one.uv))
@@ -241,18 +248,18 @@ def _mask(one: _Piece, scale: float, width: GutterWidth) -> _Mask:
     mask[:-1] |= mask[1:].copy()
     mask[:, 1:] |= mask[:, :-1].copy()
     mask[:, :-1] |= mask[:, 1:].copy()
-    return _Mask(_spans(mask), margin, scale)
+    return _PieceMask(_spans(mask), margin, scale)
 
 
 def _spans(mask: Mask) -> Index:
-    """Return runs of true cells (m, 3): row, first and last column."""
+    """Return the runs of true cells of a mask, (m, 3): row, first and last column."""
     step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)
     return np.column_stack((row, begin, np.nonzero(step < 0)[1] - 1))
 
 
 def _gutter_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:
-    """Return the largest extent (2,) of gutters along u and v [cell]."""
+    """Return the largest width (2,) of a piece's gutters along u and v [cell]."""
     steps = one.surface.uv_steps[one.border.triangle] / (one.scale * scale)
     if not len(steps):
         return np.ones(2)

@@ -1,4 +1,4 @@
-"""Triangles of a mesh flattened one by one, with their neighbours in space and in uv."""
+"""Triangles of a mesh in their own planes, with their neighbours in space and in uv, for stitching."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ _MIN_LENGTH_MM = 1e-9
 
 
 class Adjacency(NamedTuple):
-    """Adjacency of triangles for geodesics; sides are 01, 12 and 20 of each triangle.
+    """Adjacency of triangles, by which geodesics cross edges; sides are 01, 12 and 20 of each triangle.
 
     planar_corners : (f, 3, 2) corners in the triangle's own plane, counter-clockwise from outside [mm]
-    neighbour : (f, 3) triangle across each side, -1 for none
-    neighbour_side : (f, 3) side of that triangle at this edge
-    flipped : (f, 3) whether that triangle faces the other way
-    apex : (f, 3, 2) third corner relative to each side, along it and to its left, in lengths of the side
-    passable : (f,) triangles that geodesics may cross
+    neighbour : (f, 3) index of the triangle across each side, -1 for none
+    neighbour_side : (f, 3) side of the neighbour at the shared edge
+    flipped : (f, 3) mask of neighbours that face the opposite way
+    apex : (f, 3, 2) third corner relative to each side: coordinate along the side and to its left, in lengths
+        of the side
+    passable : (f,) mask of triangles that geodesics may cross
     """
 
     planar_corners: Doubles
@@ -37,18 +38,19 @@ class Adjacency(NamedTuple):
 
 @dataclass(frozen=True)
 class FlatSurface:
-    """Triangles of a surface in their own planes; sides are 01, 12 and 20 of each triangle.
+    """Triangles of a mesh with their planar corners, uv metric and neighbours; sides are 01, 12 and 20.
 
-    corners : (f, 3, 3) positions [mm]
-    uv : (f, 3, 2)
-    area_mm2, area_uv : (f,) areas, the latter negative where uv is mirrored as seen from outside
-    skin : (f,) triangles that light may cross
-    valid : (f,) skin triangles with an area in space and in uv
-    adjacency : adjacency for geodesics
-    uv_neighbour : (f, 3) triangle across each side, or itself at a seam of the uv layout
-    uv_steps : (f, 3, 2, 2) surface vectors at each corner per unit of u and of v, in the triangle's plane
+    corners : (f, 3, 3) positions of the corners [mm]
+    uv : (f, 3, 2) uv of the corners in the mesh's own layout
+    area_mm2 : (f,) area on the surface [mm2]
+    area_uv : (f,) area in uv, negative where uv is mirrored as seen from outside
+    skin : (f,) mask of skin triangles, which light may cross
+    valid : (f,) mask of skin triangles with an area in space and in uv
+    adjacency : neighbours in space, for geodesics
+    uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
+    uv_steps : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
         [mm]
-    uv_metric : (f, 3, 3) lengths of both vectors at each corner, and the cosine between them
+    uv_metric : (f, 3, 3) lengths of these two vectors [mm], and the cosine of the angle between them [-]
     """
 
     corners: Doubles
@@ -63,11 +65,15 @@ class FlatSurface:
     uv_metric: Doubles
 
     def points(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
-        """Return the points (n, 3) in triangles, by weights (n, 2) of their second and third corner [mm]."""
+        """Return the surface points (n, 3) with given barycentric weights [mm].
+
+        triangle : (n,) triangle indices
+        weights : (n, 2) barycentric weights of the second and third corner
+        """
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
     def subset(self, own: Index) -> FlatSurface:
-        """Return some triangles, without geodesics: their adjacency keeps the old indices."""
+        """Return the triangles with the given indices; their adjacency is not valid for geodesics."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[own] for name in names})
 
@@ -75,9 +81,10 @@ class FlatSurface:
 def interpolate_corners(
     corners: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> NDArray[Any]:
-    """Interpolate values (f, 3, c) of triangles' corners at points; return (n, c).
+    """Interpolate data (f, 3, c) at triangle corners to points on the triangles, (n, c).
 
-    weights : (n, 2) weights of the second and third corner
+    triangle : (n,) triangle index of each point
+    weights : (n, 2) barycentric weights of the second and third corner
     """
     second, third = weights[:, :1], weights[:, 1:]
     found = (1.0 - second - third) * corners[:, 0][triangle]
@@ -87,7 +94,7 @@ def interpolate_corners(
 
 
 def flat_surface(mesh: Mesh) -> FlatSurface:
-    """Return the flattened triangles of a mesh."""
+    """Flatten each triangle of a mesh into its plane, and compute uv metric and neighbours."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     uv = mesh.uv[mesh.triangles].astype(np.float64)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
@@ -114,7 +121,7 @@ def flat_surface(mesh: Mesh) -> FlatSurface:
 
 
 def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the corners (f, 3, 2) in the triangles' planes, and the axes (f, 2, 3) of these.
+    """Return each triangle's corners in its plane (f, 3, 2) [mm], and the axes of the plane (f, 2, 3).
 
     The first corner is at 0 and the second to its right.
     """
@@ -127,9 +134,9 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
-    """Return the triangle across each side (f, 3), its side of this edge, and whether it is flipped.
+    """Return the neighbour across each side: triangle, side of the shared edge, and flip, (f, 3) each.
 
-    The triangle is -1 where there is none.
+    The triangle is -1 without a neighbour. The flip is true if the neighbour faces the opposite way.
     """
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
@@ -146,7 +153,10 @@ def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
 
 
 def _apexes(flat: Doubles) -> Doubles:
-    """Return the third corner (f, 3, 2) along and to the left of each side, in lengths of the side."""
+    """Return the third corner relative to each side (f, 3, 2), along and to the left of the side.
+
+    The coordinates are in lengths of the side.
+    """
     side = np.roll(flat, -1, axis=1) - flat
     third = np.roll(flat, -2, axis=1) - flat
     square = np.maximum((side**2).sum(axis=2), _MIN_LENGTH_MM**2)
@@ -158,9 +168,11 @@ def _apexes(flat: Doubles) -> Doubles:
 def _uv_steps(
     mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Return `uv_steps` and `uv_metric` of a `FlatSurface`.
+    """Return the fields `uv_steps` and `uv_metric` of `FlatSurface`.
 
-    They are the mean over the triangles of a corner that are mirrored alike in uv.
+    They are averaged over the triangles around a vertex that have the same orientation in uv.
+
+    flat, axes : planar corners and axes from `_planar_corners`
     """
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
@@ -181,7 +193,7 @@ def _uv_steps(
 
 
 def _triangle_steps(flat: Doubles, uv: Doubles) -> Doubles:
-    """Return the steps (f, 2, 2) per unit of u and of v from each triangle alone [mm]."""
+    """Return the surface vectors (f, 2, 2) per unit of u and of v, constant over each triangle [mm]."""
     e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
     cross = cross_2d(d[:, 0], d[:, 1])
     cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]

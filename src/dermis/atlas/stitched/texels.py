@@ -1,4 +1,4 @@
-"""Texels of triangles, and runs of texels without a gap on the surface."""
+"""Rasterised triangles, and tests whether adjacent texels are also adjacent on the surface."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from dermis.atlas.raster import barycentric_weights, covered_texels
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
-_GAP_STEPS, _GAP_SLACK_MM = (
-    2.0,
-    0.5,
-)  # neighbours farther apart than so many texel steps plus the slack have a gap
-_INNER_MARGIN = 1e-3  # texel centres this far from an edge are in no other triangle at this edge
+# Texels have a gap if their surface points are farther apart than so many texel steps plus the slack.
+_GAP_STEPS, _GAP_SLACK_MM = 2.0, 0.5
+_INNER_MARGIN = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
 
 
 def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int]) -> Ints:
-    """Return the last triangle that covers the centre of each texel (h, w), -1 for none.
+    """Draw triangles; return the index of the last one that covers each texel centre (h, w), -1 for none.
 
-    corners : (f, 3, 2) [texel]
-    triangles : triangles in drawing order
+    corners : (f, 3, 2) corners of all triangles [texel]
+    triangles : (t,) indices in drawing order
     """
     owner = np.full(shape, -1, np.int32)
     texel, which = covered_texels(corners[triangles], shape)
@@ -30,7 +28,12 @@ def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int])
 
 
 def mostly_hidden(corners: Doubles, triangles: Index, owner: Ints) -> Mask:
-    """Return the mask (f,) of triangles whose texels mostly belong to others; see `rasterise_owners`."""
+    """Return the mask (f,) of triangles most of whose texels are owned by other triangles.
+
+    corners : (f, 3, 2) corners of all triangles [texel]
+    triangles : (t,) indices of the drawn triangles
+    owner : (h, w) triangle that owns each texel, from `rasterise_owners`
+    """
     texel, which = covered_texels(corners[triangles], owner.shape, _INNER_MARGIN)
     drawn, count = triangles[which], len(corners)
     owned = np.bincount(drawn[owner.ravel()[texel] == drawn], minlength=count)
@@ -38,7 +41,11 @@ def mostly_hidden(corners: Doubles, triangles: Index, owner: Ints) -> Mask:
 
 
 def centre_weights(corners: Doubles, owner: Ints) -> Floats:
-    """Return the weights (h, w, 2) of the second and third corner at the centre of each covered texel."""
+    """Return the barycentric weights (h, w, 2) of the second and third corner at each texel centre.
+
+    corners : (f, 3, 2) corners of all triangles [texel]
+    owner : (h, w) triangle that owns each texel, -1 for none
+    """
     y, x = np.nonzero(owner >= 0)
     weights = np.zeros((*owner.shape, 2), np.float32)
     weights[y, x] = barycentric_weights(corners[owner[y, x]], np.column_stack((x, y)))
@@ -46,11 +53,11 @@ def centre_weights(corners: Doubles, owner: Ints) -> Floats:
 
 
 class AnchoredTexels(NamedTuple):
-    """Texels (n,) and their anchors, the nearest points of their piece.
+    """Texels (n,) of a piece and its gutter with their anchors, the nearest points of the piece.
 
-    texels : (n, 2) x and y
-    anchors : (n, 2) [texel]
-    step_mm : (n, 2) length of a texel step along x and y on the surface
+    texels : (n, 2) x and y of the texel
+    anchors : (n, 2) x and y of the anchor [texel]
+    step_mm : (n, 2) length on the surface of a texel step along x and along y [mm]
     """
 
     texels: Doubles
@@ -58,14 +65,15 @@ class AnchoredTexels(NamedTuple):
     step_mm: Doubles
 
     def select(self, chosen: Index) -> AnchoredTexels:
-        """Return the chosen texels."""
+        """Return the texels at the given indices."""
         return AnchoredTexels._make(part[chosen] for part in self)
 
 
 def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:
-    """Return flat indices of texels adjacent along x (0) or y (1) whose triangles share no side.
+    """Return flat indices of adjacent texels whose triangles share no side in uv, as pairs, (n,) each.
 
-    owner : (h, w) triangle of a piece, -1 in its gutters, -2 elsewhere
+    owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
+    axis : 0 for texels adjacent along x, 1 along y
     """
     step = 1 if axis == 0 else owner.shape[1]
     pair = (owner[:, :-1], owner[:, 1:]) if axis == 0 else (owner[:-1], owner[1:])
@@ -80,13 +88,16 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
 
 
 def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
-    """Return whether the anchors of two texels are farther apart than either texel is from its anchor."""
+    """Return the mask of texel pairs whose anchors are farther apart than both texels are from them."""
     distance2 = np.maximum(_square(one.texels - one.anchors), _square(other.texels - other.anchors))
     return np.asarray(_square(one.anchors - other.anchors) > distance2)
 
 
 def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance (n,) on the surface above which there is a gap between adjacent texels [mm]."""
+    """Return the distance (n,) of the surface points of adjacent texels above which they have a gap [mm].
+
+    axis : 0 for texels adjacent along x, 1 along y
+    """
     return _GAP_STEPS * np.maximum(one.step_mm[:, axis], other.step_mm[:, axis]) + _GAP_SLACK_MM
 
 

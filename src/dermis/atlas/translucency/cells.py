@@ -1,4 +1,4 @@
-"""Coarse cells of an atlas as sources and receivers of the light through thin parts."""
+"""Coarse cells of an atlas, between which light through thin parts is transported, grouped into tiles."""
 
 from __future__ import annotations
 
@@ -13,37 +13,42 @@ from dermis.mesh.geometry import expand_runs
 
 Words = NDArray[np.uint32]
 TILE_CELLS = 4
-"""Cells along each side of a tile."""
+"""Number of cells along each side of a tile."""
 
 TILE_MARGIN_TEXELS = 0.7
-"""Margin around a tile within which triangles are listed, as a tile shows more than it covers [texel]."""
+"""Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
 
 _PAIR_RADIUS = 3.2  # largest distance of a pair, in standard deviations of the widest Gaussian
-_CELL_SIZE = 0.36  # side of a cell in the same unit; light interpolated between cells is smooth
-_MAX_SIGMA_MM = 10.0  # in wax, which spreads light farther, there would be too many pairs
-_MAX_TEXELS = 1024  # texels examined along each side, if there are fewer cells
-_SAME_POINT = 0.1  # texels within this distance of their point are not gutters [texel]
+_CELL_SIZE = 0.36  # side of a cell in the same unit, so small that light interpolated between cells is smooth
+_MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs
+_MAX_TEXELS = 1024  # largest number of texels per side whose light is averaged, if there are fewer cells
+_SAME_POINT_TEXELS = (
+    0.1  # distance of a texel from the atlas position of its surface point, below which it shows itself
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """An atlas divided into side x side cells, numbered row by row, and the cells into tiles.
+    """Division of an atlas into side x side cells, and of the cells into tiles, for light through thin parts.
 
-    The shape of the surface matters only for the size of the cells. Arrays that list items by tile have a
-    second array `..._first`: the items of tile k start at `first[k]` and end at `first[k + 1]`.
+    Cells are numbered row by row. Arrays that are sorted by tile have an array `..._first`: the entries of
+    tile k start at `first[k]` and end at `first[k + 1]`. The shape of the surface only affects the size of
+    the cells.
 
     size : texels along each side of the atlas
     side : cells along each side of the atlas
-    max_sigma_mm : standard deviation of the widest Gaussian
-    cell_mm : median side of a cell on the surface
-    stride : distance of the texels whose light a source averages [texel]
-    receiver_mask : (side, side) cells that receive light: those with lit texels and their neighbours
-    receivers, receiver_first : (m,) uint32 packed x and y of the receivers by tile
-    receiver_points : (m, 2) uint32 triangle at the centre of each receiver, and packed weights
-    sources, source_first : (n,) indices of the cells with lit texels by tile
-    triangles, triangle_first : (k,) uint32 triangles by the tiles that they overlap
-    gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of gutter texels, and of the texels that
-        they copy, by cell
+    max_sigma_mm : standard deviation of the widest Gaussian [mm]
+    cell_mm : median side of a cell on the surface [mm]
+    stride : distance between the texels over which a source cell averages light [texel]
+    receiver_mask : (side, side) mask of the cells that receive light: cells with lit texels, and their
+        neighbours
+    receivers, receiver_first : (m,) uint32 packed x and y of the receiving cells, sorted by tile
+    receiver_points : (m, 2) uint32 triangle at the centre of each receiving cell, and packed barycentric
+        weights
+    sources, source_first : (n,) indices of the cells with lit texels, sorted by tile
+    triangles, triangle_first : (k,) uint32 indices of the triangles that overlap each tile
+    gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of gutter texels and of the texels that
+        they copy, sorted by cell
     """
 
     size: int
@@ -64,7 +69,7 @@ class Cells:
 
     @property
     def radius_mm(self) -> float:
-        """Return the largest distance between the two cells of a translucent pair [mm]."""
+        """Return the largest distance between the entry and the exit cell of a translucent pair [mm]."""
         return _PAIR_RADIUS * self.max_sigma_mm
 
     @property
@@ -77,7 +82,8 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -
     """Divide an atlas into cells for the light that Gaussians spread through thin parts.
 
     max_sigma_mm : standard deviation of the widest Gaussian, clipped so that pairs are at most 32 mm apart
-    coarser : factor of the usual cell size
+        [mm]
+    coarser : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
     side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIZE * sigma_mm * coarser)))
@@ -87,9 +93,9 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -
     centre = _centre_texels(atlas.size, side)
     lit = _cells_with(atlas.lit[::stride, ::stride], atlas.size, side, stride)
     triangle = atlas.triangle[np.ix_(centre, centre)]
-    receiver = _dilated(lit) & (triangle >= 0)
+    receiver = _dilate_cells(lit) & (triangle >= 0)
     weights = atlas.barycentric[np.ix_(centre, centre)][receiver]
-    points = np.column_stack([triangle[receiver].astype(np.uint32), _pack(*weights.T)])
+    points = np.column_stack([triangle[receiver].astype(np.uint32), _pack_words(*weights.T)])
     order, first = _sort_by_tile(_tile_of(atlas, points, side, tiles), tiles)
     return Cells(
         atlas.size,
@@ -98,7 +104,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -
         texel_mm * atlas.size / side,
         stride,
         receiver,
-        _pack(*np.nonzero(receiver)[::-1])[order],
+        _pack_words(*np.nonzero(receiver)[::-1])[order],
         points[order],
         first,
         *_source_cells(lit, tiles),
@@ -108,7 +114,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -
 
 
 def _texel_mm(atlas: Atlas) -> float:
-    """Return the median side of a texel on the surface [mm]."""
+    """Return the median side of a lit texel on the surface [mm]."""
     step = max(1, atlas.size // _MAX_TEXELS)
     lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]
@@ -121,46 +127,54 @@ def _centre_texels(size: int, side: int) -> Index:
 
 
 def _cells_with(texels: Mask, size: int, side: int, stride: int) -> Mask:
-    """Return the (side, side) mask of cells with marked texels, of which every `stride`-th is given."""
+    """Return the (side, side) mask of cells that contain a marked texel.
+
+    texels : mask of every `stride`-th texel of the map along each axis
+    """
     first = -(-np.arange(side) * size // (side * stride))
     rows = np.logical_or.reduceat(texels, first, axis=0)
     return np.asarray(np.logical_or.reduceat(rows, first, axis=1))
 
 
-def _dilated(cells: Mask) -> Mask:
-    """Return a mask of cells extended by the eight neighbours of each."""
+def _dilate_cells(cells: Mask) -> Mask:
+    """Return a mask of cells dilated by one cell in all eight directions."""
     padded = np.pad(cells, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
     return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
 def _sort_by_tile(tile: NDArray[np.integer], tiles: int) -> tuple[Index, Index]:
-    """Return the order of items by tile, and the start of each tile (t + 1,)."""
+    """Return the order that sorts array entries by tile, and the start of each tile's entries (t + 1,)."""
     order = np.argsort(tile, kind="stable")
     return order, np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=tiles * tiles))])
 
 
 def _source_cells(lit: Mask, tiles: int) -> tuple[Index, Index]:
-    """Return the indices of the lit cells by tile, and the start of each tile."""
+    """Return the indices of the lit cells sorted by tile, and the start of each tile's entries."""
     y, x = np.nonzero(lit)
     order, first = _sort_by_tile((y // TILE_CELLS * tiles + x // TILE_CELLS).astype(np.int32), tiles)
     return (y * len(lit) + x)[order], first
 
 
 def _tile_of(atlas: Atlas, points: Words, side: int, tiles: int) -> Ints:
-    """Return the tile (m,) of points on triangles, for gutter texels that of the point which they copy."""
+    """Return the index of the tile (m,) in which the atlas contains each surface point.
+
+    A point that a gutter texel shows is in the tile of the texel that the gutter copies.
+
+    points : (m, 2) triangle index, and packed barycentric weights
+    """
     uv = np.stack(_atlas_uv(atlas, points[:, 0], points[:, 1]))
     column, row = np.clip(uv * np.float32(side), 0, side - 1).astype(np.int32) // TILE_CELLS
     return np.asarray(row * tiles + column, np.int32)
 
 
-def _pack(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
-    """Return two 16-bit integers packed into each word."""
+def _pack_words(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
+    """Pack pairs of 16-bit integers into 32-bit words."""
     return np.asarray(low.astype(np.uint32) | (high.astype(np.uint32) << 16), np.uint32)
 
 
 def _tile_triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
-    """Return the start of each tile, and the triangles whose bounding boxes overlap it."""
+    """Return the start of each tile's entries, and the triangles whose uv bounding boxes overlap the tile."""
     index = np.flatnonzero(atlas.mapped)
     uv, margin = atlas.corner_uv[index].astype(np.float64), TILE_MARGIN_TEXELS / atlas.size
     low, high = uv.min(axis=1) - margin, uv.max(axis=1) + margin
@@ -173,33 +187,38 @@ def _tile_triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
 
 
 def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
-    """Return the start of each cell, and its gutter texels with the texels that they copy."""
+    """Return the start of each cell's entries, and its gutter texels with the texels that they copy."""
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, uv])), 0, atlas.size - 1).astype(np.int64).T
     cell = y * side // atlas.size * side + x * side // atlas.size
     order = np.argsort(cell, kind="stable")
     first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=side * side))])
-    return first, np.column_stack([_pack(*texel[order].T), _pack(x[order], y[order])])
+    return first, np.column_stack([_pack_words(*texel[order].T), _pack_words(x[order], y[order])])
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return lit texels (r, 2) at the rim of charts that show points elsewhere, and these points [texel]."""
+    """Return lit texels (r, 2) at chart rims whose surface point is elsewhere in the atlas, and where.
+
+    The second array has the position (r, 2) of the point in the atlas [texel]. Such texels are outside the
+    triangles of their chart, but interpolation reads them.
+    """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):
         inner = np.logical_and.reduce(view(inner, 2 * GUTTER_TEXELS + 1, axis), -1)
     y, x = np.nonzero(atlas.lit & ~inner)
-    texel, weights = np.stack([x, y], axis=-1), _pack(*atlas.barycentric[y, x].T)
+    texel, weights = np.stack([x, y], axis=-1), _pack_words(*atlas.barycentric[y, x].T)
     uv = np.stack(_atlas_uv(atlas, atlas.triangle[y, x], weights), axis=-1)
     uv = uv * np.float32(atlas.size) - np.float32(0.5)
-    elsewhere = np.abs(uv - texel).max(axis=1, initial=0.0) > _SAME_POINT
+    elsewhere = np.abs(uv - texel).max(axis=1, initial=0.0) > _SAME_POINT_TEXELS
     return texel[elsewhere].astype(np.uint16), uv[elsewhere]
 
 
 def _atlas_uv(atlas: Atlas, triangle: NDArray[np.integer], weights: Words) -> list[Floats]:
     """Return u and v in the atlas of points on triangles, v down.
 
-    weights : packed weights of the second and third corner
+    triangle : (m,) triangle indices
+    weights : (m,) packed weights of the second and third corner
     """
     corner = atlas.corner_uv[triangle].reshape(-1, 6)
     b, c = (part.astype(np.float32) / np.float32(65535) for part in (weights & 0xFFFF, weights >> 16))

@@ -1,1 +1,1 @@
-"""Unwrapping of a mesh: charts that are flattened with little stretch and packed into one uv map."""
+"""Unwrapping of a mesh into charts that are flattened with little stretch and packed into one uv map."""

@@ -1,4 +1,4 @@
-"""Charts of a mesh: growth from random triangles, smooth borders, connected pieces."""
+"""Division of a mesh into charts: growth from random triangles, smooth borders, connected pieces."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
 
 _SMOOTHING_STEPS = 4
-_BEND_PENALTY = 3.0  # extra distance across a right angle, in multiples of the distance
+_BEND_PENALTY = 3.0  # extra length of a step across a right angle, over the length of the step
 
 
 def opposite_sides(triangles: Index) -> Index:
-    """Return the neighbouring triangle's side for each side (3 f,), or itself without exactly one neighbour.
+    """Return the index of the neighbour's side at the edge of each triangle side, (3 f,).
 
-    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20.
+    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. A side without exactly one
+    neighbour has its own index.
     """
     _, of_side, counts = edges(triangles)
     side = np.argsort(of_side, kind="stable")
@@ -26,17 +27,20 @@ def opposite_sides(triangles: Index) -> Index:
 
 
 def neighbours(triangles: Index) -> Index:
-    """Return the triangles across the sides 01, 12 and 20 of each triangle (f, 3), or itself for none."""
+    """Return the index of the triangle across each side 01, 12 and 20, (f, 3).
+
+    Without exactly one neighbour it is the triangle itself.
+    """
     return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
 
 def smooth_charts(chart: Index, triangles: Index) -> Index:
-    """Return charts (f,) with smoothed borders, each in one connected piece."""
+    """Smooth the borders of charts (f,), and reduce each chart to one connected piece."""
     return merge_strays(_smooth_borders(chart, triangles), triangles)
 
 
 def merge_strays(chart: Index, triangles: Index) -> Index:
-    """Return charts (f,) with all but the largest connected piece of each merged into adjacent charts."""
+    """Reduce each chart (f,) to its largest connected piece; merge other pieces into adjacent charts."""
     adjacent = neighbours(triangles)
     is_stray = _stray_triangles(chart, adjacent)
     while is_stray.any():
@@ -53,7 +57,7 @@ def merge_strays(chart: Index, triangles: Index) -> Index:
 
 
 def _smooth_borders(chart: Index, triangles: Index) -> Index:
-    """Return charts (f,) in which each triangle belongs to the prevailing chart of its neighbourhood."""
+    """Assign each triangle to the prevailing chart among the triangles around it, (f,)."""
     corner = triangles.ravel()
     triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
     weight = np.eye(int(chart.max()) + 1)[chart]
@@ -64,9 +68,10 @@ def _smooth_borders(chart: Index, triangles: Index) -> Index:
 
 
 def connected_pieces(chart: Index, adjacent: Index) -> Index:
-    """Return the number (f,) of each triangle's connected piece, where a piece is within one chart.
+    """Return the index of each triangle's connected piece (f,), where a piece is part of one chart.
 
-    adjacent : (f, 3) from `neighbours`
+    chart : (f,) chart of each triangle
+    adjacent : (f, 3) neighbours of each triangle, from `neighbours`
     """
     here, there = np.repeat(np.arange(len(chart)), 3), adjacent.ravel()
     same = (chart[here] == chart[there]) & (here < there)
@@ -74,7 +79,7 @@ def connected_pieces(chart: Index, adjacent: Index) -> Index:
 
 
 def _stray_triangles(chart: Index, adjacent: Index) -> Mask:
-    """Return the mask (f,) of triangles outside the largest piece of their chart."""
+    """Return the mask (f,) of triangles outside the largest connected piece of their chart."""
     piece = connected_pieces(chart, adjacent)
     size = np.bincount(piece)
     owner = np.zeros(len(size), dtype=np.int64)
@@ -85,10 +90,14 @@ def _stray_triangles(chart: Index, adjacent: Index) -> Mask:
 
 
 def grow_charts(positions: Doubles, triangles: Index, count: int, seed: int = 0) -> Index:
-    """Return about `count` charts (f,) grown from random triangles, with borders along bends.
+    """Grow about `count` charts from random triangles; return the chart of each triangle (f,).
 
-    positions : (n, 3) [mm]
-    triangles : (f, 3)
+    Distances increase across bends, so that borders tend to follow them.
+
+    positions : (n, 3) vertices [mm]
+    triangles : (f, 3) vertex indices
+    count : number of charts; each connected component of the mesh has at least one
+    seed : seed of the random triangles
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
@@ -102,13 +111,15 @@ def grow_charts(positions: Doubles, triangles: Index, count: int, seed: int = 0)
     bend = 1 - np.einsum("fi,fi->f", normal[here], normal[there])
     distance = np.linalg.norm(centre[here] - centre[there], axis=1) * (1 + _BEND_PENALTY * bend)
     graph = coo_array((distance, (here, there)), shape=(len(triangles),) * 2).tocsr()
-    seeds = _seeds(corners, connected_pieces(np.zeros(len(triangles), dtype=np.int64), adjacent), count, seed)
+    seeds = _seed_triangles(
+        corners, connected_pieces(np.zeros(len(triangles), dtype=np.int64), adjacent), count, seed
+    )
     source = dijkstra(graph, indices=seeds, min_only=True, return_predecessors=True)[2]
     return np.unique(source, return_inverse=True)[1].astype(np.int64)
 
 
-def _seeds(corners: Doubles, piece: Index, count: int, seed: int) -> Index:
-    """Return triangles chosen at random by their area, with at least one from each piece."""
+def _seed_triangles(corners: Doubles, piece: Index, count: int, seed: int) -> Index:
+    """Return random triangles, drawn in proportion to area, with at least one in each connected piece."""
     area = triangle_areas(corners)
     drawn = np.random.default_rng(seed).choice(
         len(area), min(count, len(area)), replace=False, p=area / area.sum()

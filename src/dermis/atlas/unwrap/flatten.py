@@ -1,4 +1,4 @@
-"""Flattening of charts with little stretch, and removal of mirrored triangles."""
+"""Flattening of charts with little stretch, and repair of mirrored triangles."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, edges, uv_cross
 
 Complexes = NDArray[np.complex128]
-_MAX_RINGS = 5  # of triangles around mirrored ones whose points may move
-_REWEIGHTINGS, _ITERATIONS = 6, 8  # changes of the weights, and iterations after each
+_MAX_RINGS = 5  # number of rings of triangles around mirrored ones whose points may move
+_REWEIGHTINGS, _ITERATIONS = 6, 8  # number of updates of the weights, and of iterations after each
 
 
 def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
@@ -20,7 +20,7 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 
     The first corner is at 0 and the second on the positive real axis, as seen from outside.
 
-    corners : (f, 3, 3) [mm]
+    corners : (f, 3, 3) positions of the corners [mm]
     """
     a, b, c = (np.asarray(corners[:, k], dtype=np.float64) for k in range(3))
     length = np.linalg.norm(b - a, axis=1)
@@ -30,12 +30,12 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 
 
 def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
-    """Return a and b (f,) of the maps z -> a z + b conj(z) + c that take `shapes` to `positions`.
+    """Return a and b (f,) of the maps z -> a z + b conj(z) + c from `shapes` to `positions`.
 
-    |a| + |b| and |a| - |b| are the map's singular values, the latter negative where it mirrors the triangle;
-    a / |a| is the nearest rotation.
+    The singular values of a map are |a| + |b| and |a| - |b|, the latter negative where it mirrors the
+    triangle. The nearest rotation is a / |a|.
 
-    shapes, positions : (f, 3) corners of the triangles
+    shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
     """
     e1, e2 = shapes[:, 1] - shapes[:, 0], shapes[:, 2] - shapes[:, 0]
     d1, d2 = positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]
@@ -44,12 +44,12 @@ def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Comple
 
 
 def singular_values(corners: NDArray[np.floating], uv: NDArray[np.floating]) -> Doubles:
-    """Return the largest and smallest length in uv of 1 mm on the surface (f, 2) [1/mm].
+    """Return the largest and smallest length in uv of 1 mm on the surface, per triangle, (f, 2) [1/mm].
 
-    The smallest value is negative for triangles that are mirrored as seen from outside.
+    The smallest length is negative for triangles that are mirrored as seen from outside.
 
-    corners : (f, 3, 3) [mm]
-    uv : (f, 3, 2), v down
+    corners : (f, 3, 3) positions of the corners [mm]
+    uv : (f, 3, 2) uv of the corners, v down
     """
     positions = np.asarray(uv[..., 0] - 1j * uv[..., 1], dtype=np.complex128)
     a, b = affine_coefficients(planar_triangles(corners), positions)
@@ -57,13 +57,14 @@ def singular_values(corners: NDArray[np.floating], uv: NDArray[np.floating]) -> 
 
 
 def untangle(positions: Doubles, triangles: Index) -> Doubles:
-    """Return positions (n, 2) with few or no mirrored triangles; the border is unchanged.
+    """Move inner points of a flat mesh until few or no triangles are mirrored; return positions (n, 2).
 
     Points around mirrored triangles are moved to the mean of their neighbours, which mirrors no triangle
-    within a convex outline [Tutte1963]. More and more points are moved until no triangle is mirrored.
+    within a convex outline [Tutte1963]. More and more points are moved until no triangle is mirrored. Points
+    of the border do not move.
 
-    positions : (n, 2) x to the right, y up
-    triangles : (f, 3)
+    positions : (n, 2) points, x to the right, y up
+    triangles : (f, 3) point indices
     """
     ends, _, counts = edges(triangles)
     inner = np.ones(len(positions), dtype=bool)
@@ -81,7 +82,11 @@ def untangle(positions: Doubles, triangles: Index) -> Doubles:
 
 
 def _average_neighbours(positions: Doubles, ends: Index, free: Mask) -> Doubles:
-    """Return the positions with each free point at the mean of its neighbours."""
+    """Place all free points at the mean of their neighbours; return positions (n, 2).
+
+    ends : (e, 2) point indices of the edges
+    free : (n,) mask of the points that may move
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import laplacian
     from scipy.sparse.linalg import spsolve
@@ -97,14 +102,14 @@ def _average_neighbours(positions: Doubles, ends: Index, free: Mask) -> Doubles:
 
 
 def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles) -> Doubles:
-    """Return the positions (n, 2) of a surface flattened to the plane [mm times density].
+    """Flatten a surface into the plane with little stretch; return positions (n, 2) [mm times density].
 
-    They are as seen from outside, x to the right and y up. Separate connected components are flattened
-    together, each with an origin of its own.
+    The plane is seen from outside, x to the right and y up. Connected components are flattened together, each
+    with its own origin.
 
-    points : (n, 3) [mm]
-    triangles : (f, 3)
-    density : (f,) desired size in the plane relative to that in space [-]
+    points : (n, 3) vertices [mm]
+    triangles : (f, 3) vertex indices
+    density : (f,) desired length in the plane over that on the surface [-]
     weight : (f,) importance of each triangle's stretch [-]
 
     The start is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is then
@@ -122,19 +127,19 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
 
 
 def vertex_components(triangles: Index, n: int) -> Index:
-    """Return the connected component of each vertex (n,)."""
+    """Return the index of each vertex's connected component (n,)."""
     return components(n, triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
 
 
 def _cotangents(shapes: Complexes) -> Doubles:
-    """Return the cotangents of the angles opposite the sides 01, 12, 20 (f, 3)."""
+    """Return the cotangents (f, 3) of the angles opposite to the sides 01, 12 and 20."""
     apex = np.roll(shapes, -2, axis=1)
     product = np.conj(shapes - apex) * (np.roll(shapes, -1, axis=1) - apex)
     return np.asarray(product.real / np.maximum(np.abs(product.imag), 1e-9 * np.abs(product)))
 
 
 def _laplacian(triangles: Index, weights: Doubles, n: int) -> Any:
-    """Return the (n, n) Laplacian with weights (f, 3) on the sides."""
+    """Return the sparse (n, n) Laplacian of a mesh with weights (f, 3) on the triangle sides."""
     from scipy.sparse import coo_array
 
     start, end, weight = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel(), weights.ravel()
@@ -144,7 +149,10 @@ def _laplacian(triangles: Index, weights: Doubles, n: int) -> Any:
 
 
 def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: Complexes) -> Complexes:
-    """Return the positions (n,) with the least change of angles; two points of each component are fixed."""
+    """Return the complex positions (n,) of a least squares conformal map, with the least change of angles.
+
+    Two points of each connected component are fixed.
+    """
     from scipy.sparse import coo_array
 
     n, start, end = len(points), triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -161,7 +169,7 @@ def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: 
 
 
 def _extreme_points(points: Doubles, component: Index) -> tuple[Index, Index]:
-    """Return two points (c,) of each component, at the ends of the axis along which it is longest."""
+    """Return the first and last point (c,) of each component along the axis on which it is longest."""
     count = int(component.max()) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, component, points)
@@ -173,7 +181,7 @@ def _extreme_points(points: Doubles, component: Index) -> tuple[Index, Index]:
 
 
 def _factorise(matrix: Any) -> Any:
-    """Return a solver for a symmetric or Hermitian matrix."""
+    """Return a function that solves linear systems with a symmetric or Hermitian sparse matrix."""
     from scipy.sparse.linalg import splu
 
     if matrix.shape[0] == 0:
@@ -183,7 +191,10 @@ def _factorise(matrix: Any) -> Any:
 
 
 def _stiffness(a: Complexes, b: Complexes) -> Doubles:
-    """Return weights (f,) that are 1 without stretch and larger for compressed and mirrored triangles."""
+    """Return weights (f,) that are 1 for unstretched triangles, larger for compressed and mirrored ones.
+
+    a, b : (f,) coefficients of the affine maps, from `affine_coefficients`
+    """
     total = np.zeros(len(a))
     for value in (np.abs(a) + np.abs(b), np.abs(a) - np.abs(b)):
         sigma = np.clip(value, 0.2, 5.0)
@@ -194,7 +205,11 @@ def _stiffness(a: Complexes, b: Complexes) -> Doubles:
 def _rigid_step(
     z: Complexes, triangles: Index, component: Index, shapes: Complexes, weight: Doubles
 ) -> Complexes:
-    """Return the positions after some iterations towards each triangle's own size and shape."""
+    """Return complex positions after some as-rigid-as-possible iterations with fixed weights.
+
+    shapes : (f, 3) desired shape and size of the triangles
+    weight : (f,) importance of each triangle's stretch [-]
+    """
     n, cot = len(z), _cotangents(shapes) * weight[:, None]
     free = np.ones(n, dtype=bool)
     free[np.unique(component, return_index=True)[1]] = False

@@ -1,4 +1,4 @@
-"""Seams of charts: border edges, vertices split at seams, and charts split until they flatten well."""
+"""Seams of charts: border edges, split vertices, and changes of charts that do not flatten well."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from dermis.atlas.unwrap.flatten import flatten, vertex_components
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, cross_2d, uv_cross
 
-_BLOCK = 256  # edges that are compared with all others at a time
-_MAX_REASSIGNMENTS = 6  # of faulty triangles to neighbouring charts, before charts are split
+_BLOCK = 256  # number of edges that are compared with all other edges at a time
+_MAX_REASSIGNMENTS = 6  # number of moves of faulty triangles to adjacent charts before charts are split
 
 
 def border_edges(corners: Index) -> tuple[Index, Index]:
-    """Return the edges (k, 2) of only one triangle, counter-clockwise around it, and that triangle (k,)."""
+    """Return border edges (k, 2), counter-clockwise around their only triangle, and this triangle (k,)."""
     start, end = corners.T.ravel(), np.roll(corners, -1, axis=1).T.ravel()
     alone = np.flatnonzero(opposite_sides(corners) == np.arange(len(start)))
     return np.column_stack((start, end))[alone], alone % len(corners)
 
 
 def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
-    """Split points at seams: return the vertices (f, 3) of each triangle, and each vertex's point (v,).
+    """Split vertices at seams; return the new vertices (f, 3) of each triangle and their old ones (v,).
 
-    Two triangles share the vertices of an edge if they belong to one chart.
+    Two triangles share the vertices of their common edge only if they belong to one chart.
 
-    triangles : (f, 3) points
-    chart : (f,)
+    triangles : (f, 3) old vertex indices
+    chart : (f,) chart of each triangle
     """
     f, other = len(triangles), opposite_sides(triangles)
     start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
@@ -45,13 +45,13 @@ def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
 
 
 def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Mask:
-    """Return the mask (f,) of mirrored or collapsed triangles, and of those at crossings of a chart's border.
+    """Return the mask (f,) of triangles that are mirrored, collapsed, or at a self-crossing of the border.
 
-    A chart without any does not overlap itself.
+    A chart without such triangles does not overlap itself.
 
-    positions : (v, 2) x to the right, y up
-    corners : (f, 3)
-    chart : (f,) numbered from 0
+    positions : (v, 2) vertices, x to the right, y up
+    corners : (f, 3) vertex indices
+    chart : (f,) chart of each triangle, numbered from 0
     """
     faulty: Mask = uv_cross(positions[corners]) <= 0
     sides, owner = border_edges(corners)
@@ -62,7 +62,10 @@ def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Mask:
 
 
 def crossing_edges(edges: Doubles) -> Mask:
-    """Return the mask (k,) of edges (k, 2, 2) that cross others, other than at their ends."""
+    """Return the mask (k,) of edges that cross another edge between its ends.
+
+    edges : (k, 2, 2) end points of the edges
+    """
     found = np.zeros(len(edges), dtype=bool)
     for k in range(0, len(edges), _BLOCK):
         found[k : k + _BLOCK] = _pairs_cross(edges[k : k + _BLOCK], edges).any(axis=1)
@@ -77,13 +80,13 @@ def _pairs_cross(some: Doubles, edges: Doubles) -> Mask:
 
 
 class FlatCharts(NamedTuple):
-    """Flattened charts.
+    """Charts flattened into the plane, before they are packed.
 
-    corners : (f, 3) vertices of each triangle
-    point : (v,) point of the mesh that each vertex is at
-    uv_mm : (v, 2) x to the right and y up, each chart with an origin of its own [mm]
+    corners : (f, 3) vertex indices of each triangle
+    point : (v,) index of the mesh point at which each vertex is
+    uv_mm : (v, 2) positions, x to the right and y up, each chart with its own origin [mm]
     chart : (f,) connected chart of each triangle, numbered from 0
-    faulty : (f,) triangles that are mirrored, or overlap others where the border crosses itself
+    faulty : (f,) mask of triangles that are mirrored, collapsed, or at a self-crossing of the chart's border
     """
 
     corners: Index
@@ -93,41 +96,43 @@ class FlatCharts(NamedTuple):
     faulty: Mask
 
 
-class Triangles(NamedTuple):
-    """Positions (n, 3) [mm] and triangles (f, 3) that are to be flattened."""
+class ChartMesh(NamedTuple):
+    """Triangles (f, 3) to flatten, and the positions (n, 3) of their vertices [mm]."""
 
     positions: Doubles
     triangles: Index
 
     def flatten(self, chart: Index) -> FlatCharts:
-        """Return the charts (f,) flattened, with or without faults."""
+        """Flatten charts, given as the chart of each triangle (f,), and mark faulty triangles."""
         corners, point = split_at_seams(self.triangles, chart)
         ones = np.ones(len(corners))
         uv_mm = flatten(self.positions[point], corners, ones, ones)
         piece = vertex_components(corners, len(point))[corners[:, 0]]
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
-    def subset(self, chosen: Mask) -> Triangles:
-        """Return the chosen triangles."""
-        return Triangles(self.positions, self.triangles[chosen])
+    def subset(self, chosen: Mask) -> ChartMesh:
+        """Return the triangles for which a mask is true."""
+        return ChartMesh(self.positions, self.triangles[chosen])
 
 
-def flatten_charts(mesh: Triangles, chart: Index) -> FlatCharts:
-    """Return the charts (f,) flattened without faults, with as few changes of the charts as possible."""
+def flatten_charts(mesh: ChartMesh, chart: Index) -> FlatCharts:
+    """Flatten charts (f,) without faulty triangles, changing the charts where necessary."""
     flat = mesh.flatten(chart)
     while flat.faulty.any():
         flat = mesh.flatten(_repair(mesh, flat, 0))
     return flat
 
 
-def _repair(mesh: Triangles, flat: FlatCharts, depth: int) -> Index:
-    """Return charts (f,) that flatten without faults.
+def _repair(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
+    """Return changed charts (f,) that flatten without faulty triangles.
 
-    At first faulty triangles are moved to adjacent charts, later charts are split.
+    Faulty triangles are first moved to adjacent charts; if that does not suffice, charts are split.
+
+    depth : number of changes made so far
     """
     if not flat.faulty.any():
         return flat.chart
-    chart = _give_to_neighbours(mesh, flat) if depth < _MAX_REASSIGNMENTS else _split_faulty(mesh, flat)
+    chart = _reassign_faulty(mesh, flat) if depth < _MAX_REASSIGNMENTS else _split_faulty(mesh, flat)
     changed = flat.faulty | (chart != flat.chart)
     affected = np.isin(flat.chart, flat.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
@@ -135,15 +140,15 @@ def _repair(mesh: Triangles, flat: FlatCharts, depth: int) -> Index:
     return chart
 
 
-def _give_to_neighbours(mesh: Triangles, flat: FlatCharts) -> Index:
-    """Return charts in which faulty triangles belong to an adjacent chart, if there is one."""
+def _reassign_faulty(mesh: ChartMesh, flat: FlatCharts) -> Index:
+    """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
     adjacent = flat.chart[neighbours(mesh.triangles)]
     other = np.where(adjacent == flat.chart[:, None], -1, adjacent).max(axis=1)
     return merge_strays(np.where(flat.faulty & (other >= 0), other, flat.chart), mesh.triangles)
 
 
-def _split_faulty(mesh: Triangles, flat: FlatCharts) -> Index:
-    """Return charts in which each faulty chart is split in two."""
+def _split_faulty(mesh: ChartMesh, flat: FlatCharts) -> Index:
+    """Return charts (f,) in which each chart with faulty triangles is split in two."""
     chart = 2 * flat.chart
     for k in np.unique(flat.chart[flat.faulty]):
         own = np.flatnonzero(flat.chart == k)

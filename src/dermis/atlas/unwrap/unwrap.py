@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh into a uv layout with given or new charts, and packing of charts."""
+"""Unwrapping of a mesh into a uv layout with given or random charts, and packing of charts."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.atlas.unwrap.charts import grow_charts, smooth_charts
-from dermis.atlas.unwrap.seams import FlatCharts, Triangles, border_edges, flatten_charts
+from dermis.atlas.unwrap.seams import ChartMesh, FlatCharts, border_edges, flatten_charts
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import cross_2d, expand_runs, triangle_areas
 from dermis.mesh.mesh import Mesh, build_mesh
 
-_GRID = 512  # columns and rows of cells on the map
-_MAX_PLACEMENTS = 1000  # of charts, in all orders together
-_BISECTIONS = 9  # in the search for the scale
-_MIN_GAIN = 1.004  # factor of the scale for which an order is worth a search
+_GRID_CELLS = 512  # number of cells along each side of the map
+_MAX_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
+_BISECTIONS = 9  # number of trials in the search for the scale
+_MIN_GAIN = 1.004  # gain of scale for which the search is repeated with another order
 PADDING = 1 / 128
 """Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
 UPRIGHT = (0.0, 1.0, -0.1)
-"""Direction in space that points up on a map: up and, for horizontal surfaces, backwards."""
+"""Direction in space that points up on the map: upwards and, for horizontal surfaces, backwards."""
 _MIN_AREA_MM2 = 1e-10
 _CHART_COUNT = 16
 _MIN_CHART_AREA_MM2 = 1e-6
 
 
 def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
-    """Return the scale, and the offset (c, 2) of each chart, that pack charts into the unit square.
+    """Pack charts into the unit square; return their common scale and the offset (c, 2) of each.
 
     Each chart is dropped onto those below at the column where it gets lowest [Levy2002]; the best of several
     orders is returned.
@@ -45,9 +45,9 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     shifted = [edges - low for edges, low in zip(outlines, corner, strict=True)]
     size = np.array([edges.max(axis=(0, 1)) for edges in shifted])
     area = sum(float(cross_2d(edges[:, 0], edges[:, 1]).sum() / 2) for edges in shifted)
-    bound = _GRID / np.sqrt(max(area, (size**2).max()))
+    bound = _GRID_CELLS / np.sqrt(max(area, (size**2).max()))
     best, cells = 0.0, None
-    for order in _orders(size):
+    for order in _packing_orders(size):
         low, high = best, bound
         if cells is not None and _drop_charts(shifted, order, best * _MIN_GAIN, padding) is None:
             continue
@@ -60,11 +60,14 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
                 best, cells, low = scale, found, scale
     if cells is None:
         refuse("charts", "fewer charts", f"got {len(outlines)}", "Cut the mesh into larger charts")
-    return best / _GRID, (cells - best * corner) / _GRID
+    return best / _GRID_CELLS, (cells - best * corner) / _GRID_CELLS
 
 
-def _orders(size: Doubles) -> Iterator[Index]:
-    """Yield orders of the charts: by height, by width, and random ones."""
+def _packing_orders(size: Doubles) -> Iterator[Index]:
+    """Yield orders in which charts are dropped: by height, by width, and random ones.
+
+    size : (c, 2) width and height of each chart
+    """
     yield np.argsort(-size[:, 1], kind="stable")
     yield np.argsort(-size[:, 0], kind="stable")
     random = np.random.default_rng(0)
@@ -73,21 +76,21 @@ def _orders(size: Doubles) -> Iterator[Index]:
 
 
 def _drop_charts(shifted: list[Doubles], order: Index, scale: float, padding: float) -> Doubles | None:
-    """Return the lower left corners (c, 2) of the dropped charts [cell], or None if they do not all fit.
+    """Drop charts in an order; return their lower left corners (c, 2) [cell], or None if they do not fit.
 
-    shifted : outlines with their lower left corner at 0
-    scale : cells per unit of the outlines
+    shifted : border edges of each chart, with the lower left corner of the chart at 0
+    scale : cells per unit of the border edges
     """
-    margin = int(np.ceil(padding * _GRID / 2))
-    horizon, cells = np.zeros(_GRID, dtype=np.int64), np.zeros((len(shifted), 2))
+    margin = int(np.ceil(padding * _GRID_CELLS / 2))
+    horizon, cells = np.zeros(_GRID_CELLS, dtype=np.int64), np.zeros((len(shifted), 2))
     for k in order:
         low, high = _height_profile(shifted[k] * scale, margin)
-        if len(low) > _GRID:
+        if len(low) > _GRID_CELLS:
             return None
         heights = (np.lib.stride_tricks.sliding_window_view(horizon, len(low)) - low).max(axis=1)
         x = int(heights.argmin())
         y = int(heights[x])
-        if y + high.max() >= _GRID:
+        if y + high.max() >= _GRID_CELLS:
             return None
         horizon[x : x + len(low)] = np.maximum(horizon[x : x + len(low)], y + high + 1)
         cells[k] = x + margin, y + margin
@@ -95,9 +98,9 @@ def _drop_charts(shifted: list[Doubles], order: Index, scale: float, padding: fl
 
 
 def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
-    """Return the lowest and highest cell (w,) of a chart in each column, with a margin of empty cells.
+    """Return the lowest and highest cell of a chart in each column (w,), with a margin of empty cells.
 
-    edges : (k, 2, 2) edges of the border [cell]
+    edges : (k, 2, 2) edges of the chart's border [cell]
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -106,7 +109,7 @@ def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
     t = step / steps[which]
     x, y = (edges[which, 0] * (1 - t)[:, None] + edges[which, 1] * t[:, None]).astype(np.int64).T
     width = int(x.max()) + 1 + 2 * margin
-    low, high = np.full(width, _GRID), np.full(width, -_GRID)
+    low, high = np.full(width, _GRID_CELLS), np.full(width, -_GRID_CELLS)
     np.minimum.at(low, x + margin, y)
     np.maximum.at(high, x + margin, y)
     window = 2 * margin + 1
@@ -115,11 +118,11 @@ def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
 
 @dataclass(frozen=True)
 class UvLayout:
-    """Uv layout of a mesh.
+    """Uv layout of a mesh whose vertices are split at seams.
 
-    uv : (v, 2) of each vertex, u to the right, v down
-    triangles : (f, 3) vertices, in the order of the mesh's triangles
-    point : (v,) point of the mesh that each vertex is at
+    uv : (v, 2) uv of each vertex, u to the right, v down
+    triangles : (f, 3) vertex indices, in the order of the mesh's triangles
+    point : (v,) index of the mesh point at which each vertex is
     chart : (f,) chart of each triangle, numbered from 0
     """
 
@@ -137,16 +140,16 @@ def unwrap(
     Where the border of a flattened chart crosses itself, triangles are moved to an adjacent chart; a chart
     that does not flatten even then is split.
 
-    positions : (n, 3) [mm]
-    triangles : (f, 3), each with an area
-    chart : (f,) desired charts; a chart in several pieces becomes several charts
-    upright : (3,), or (f, 3) for each triangle, direction in space that points up on the map
+    positions : (n, 3) points of the mesh [mm]
+    triangles : (f, 3) point indices; each triangle must have an area
+    chart : (f,) desired chart of each triangle; a chart in several pieces becomes several charts
+    upright : (3,), or (f, 3) per triangle, direction in space that points up on the map
     padding : empty space between charts as a fraction of the map's side
 
     Raises DermisError if a triangle has no area or if there are too many charts for one map.
     """
     _check_areas(positions, triangles)
-    flat = flatten_charts(Triangles(positions, triangles), chart)
+    flat = flatten_charts(ChartMesh(positions, triangles), chart)
     up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
     first = np.unique(flat.chart, return_index=True)[1]
     height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.chart])
@@ -161,9 +164,9 @@ def _check_areas(positions: Doubles, triangles: Index) -> None:
 
 
 def _orient(flat: FlatCharts, height: Doubles) -> Doubles:
-    """Return the positions (v, 2) with each chart rotated so that `height` grows upwards.
+    """Rotate each chart so that `height` increases upwards; return positions (v, 2).
 
-    height : (f, 3) at the corners
+    height : (f, 3) coordinate in space along the upright direction, at the corners [mm]
     """
     z = flat.uv_mm[:, 0] + 1j * flat.uv_mm[:, 1]
     z3 = z[flat.corners]
@@ -176,14 +179,14 @@ def _orient(flat: FlatCharts, height: Doubles) -> Doubles:
 
 
 def _vertex_charts(flat: FlatCharts) -> Index:
-    """Return the chart of each vertex (v,)."""
+    """Return the chart index of each vertex (v,)."""
     chart = np.empty(len(flat.point), dtype=np.int64)
     chart[flat.corners] = flat.chart[:, None]
     return chart
 
 
 def _packed_uv(uv_mm: Doubles, flat: FlatCharts, padding: float) -> Doubles:
-    """Return the uv (v, 2) of the packed charts, v down."""
+    """Pack the charts; return the uv (v, 2) of all vertices, v down."""
     edges, triangle = border_edges(flat.corners)
     chart = flat.chart[triangle]
     order = np.argsort(chart, kind="stable")
@@ -194,9 +197,9 @@ def _packed_uv(uv_mm: Doubles, flat: FlatCharts, padding: float) -> Doubles:
 
 
 def unwrap_mesh(mesh: Mesh) -> Mesh:
-    """Return a mesh with the same triangles, unwrapped into about 16 charts that are grown at random.
+    """Return a mesh with a new uv layout of about 16 random charts, independent of its own uv.
 
-    Triangles without an area get uv 0.
+    The triangles and their order are unchanged. Triangles without an area have the uv (0, 0).
     """
     positions = np.zeros((int(mesh.point.max()) + 1, 3))
     positions[mesh.point] = mesh.positions

@@ -95,7 +95,7 @@ def make_interreflection(
     return Interreflection(buffers, albedo)
 
 
-def no_interreflection(device: Device) -> Buffer:
+def placeholder_interreflection(device: Device) -> Buffer:
     """Return a buffer of zeros in place of the light from other skin, for heads without interreflection."""
     return device.cached(
         "no interreflection", lambda: device.storage_buffer(_FLOAT4_BYTES * CELLS_PER_SIDE * CELLS_PER_SIDE)
@@ -146,7 +146,7 @@ def _make_buffers(
         uniform_exitance=uniform,
         bounced_exitance=(bounced[0], bounced[1]),
         from_skin=device.storage_buffer(_FLOAT4_BYTES * CELLS_PER_SIDE * CELLS_PER_SIDE),
-        no_light=no_interreflection(device),
+        no_light=placeholder_interreflection(device),
     )
 
 
