@@ -1,1 +1,1 @@
-"""Modules that all packages share: errors, registries, disk cache, file reading and number checks."""
+"""Modules that all packages use: errors, registries, the disk cache, file reading and checks of numbers."""

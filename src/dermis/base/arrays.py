@@ -1,4 +1,4 @@
-"""Short names for array types.
+"""Short names for NumPy array types.
 
 >>> points: Doubles = np.zeros((4, 3))
 """

@@ -14,10 +14,10 @@ from dermis.base.errors import DermisError, error_text, format_value, refuse
 
 
 def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choose one of them") -> Path:
-    """Check that a file can be written to a path, and return the path; call it before long work.
+    """Check before a long computation that a file can be written to a path, and return the path.
 
     suffixes : allowed suffixes of the name, such as ".png"
-    advice : what to do about another suffix
+    advice : last sentence of the error for another suffix
 
     Raises DermisError for another suffix, and when the folder is missing or not writable.
     """
@@ -44,7 +44,7 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 
 @contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path that replaces `path` after success and is deleted after an error."""
+    """Yield a temporary path; the file there replaces `path` on success and is deleted after an error."""
     try:
         target = Path(os.path.realpath(path))
     except ValueError as fault:  # a NUL in the name
@@ -63,9 +63,10 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
-    """Yield a new empty folder that replaces `path` after success and is deleted after an error.
+    """Yield a new empty folder that replaces `path` on success and is deleted after an error.
 
-    marker : name of a file that an existing folder must contain to be replaced, unless it is empty
+    marker : name of a file by which an existing folder is recognised as output of this package; only such a
+        folder, or an empty one, is replaced
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """
@@ -83,7 +84,7 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(target: Path) -> Iterator[Path]:
-    """Yield a new empty folder next to `target` and delete it with all its content afterwards.
+    """Yield a new empty folder next to `target`, which is deleted with its files at the end of the block.
 
     Raises DermisError when the folder cannot be created, or when writing into it fails.
     """
@@ -103,7 +104,7 @@ def _is_empty(folder: Path) -> bool:
 
 
 def _move_folder(source: Path, target: Path) -> None:
-    """Move a folder to a path; an existing folder there is deleted only after the move."""
+    """Move a folder to a path; an existing folder there is deleted once the move has succeeded."""
     if not target.exists():
         source.replace(target)
         return
@@ -118,7 +119,10 @@ def _move_folder(source: Path, target: Path) -> None:
 
 
 def refuse_output(path: str | Path, fault: Exception) -> NoReturn:
-    """Raise the `DermisError` of a file or folder that cannot be written."""
+    """Raise the `DermisError` for a file or folder that cannot be written.
+
+    fault : error of the system
+    """
     raise DermisError(
         f"{path}: expected a writable path, but it cannot be written ({error_text(fault)}). "
         "Choose a writable folder with space left."
@@ -130,7 +134,7 @@ def _temporary_name(target: Path) -> Path:
 
 
 def check_folder(folder: Path, summary: str) -> None:
-    """Create a folder and check that it is writable; call it before long work.
+    """Create a folder before a long computation and check that it is writable.
 
     summary : name of the .json file that will be written into it
 

@@ -1,6 +1,6 @@
 """Bibliography of the package: BibTeX entries by author-year key.
 
-Entries keep their original text, which libraries that parse BibTeX would change.
+Entries keep their original text; libraries that parse BibTeX would reformat it.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from importlib.resources import files
 
 from dermis.base.errors import refuse
 
-_HEAD = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
+_ENTRY_HEAD = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
 
 
 def citation_keys() -> frozenset[str]:
-    """Return the keys that a docstring may cite."""
+    """Return the keys of the bibliography, which docstrings cite in brackets."""
     return frozenset(_references())
 
 
 def bibtex(keys: Iterable[str]) -> str:
-    """Return the BibTeX entries of works, each once, in the order of their keys.
+    """Return the BibTeX entries with the given keys, without duplicates, in the order of the keys.
 
-    keys : author-year keys, as between the brackets of a docstring
+    keys : author-year keys, such as "Jensen2001"
 
     Raises DermisError for a key that is not in `base/references.bib`.
     """
@@ -41,15 +41,15 @@ def bibtex(keys: Iterable[str]) -> str:
 
 
 def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, str]:
-    """Parse a BibTeX text into a dictionary from keys to the unchanged text of each entry.
+    """Return the text of each entry of a BibTeX file, unchanged, by its key.
 
     source : name of the file, for error messages
 
     Raises DermisError for invalid BibTeX.
     """
     found: dict[str, str] = {}
-    for entry in _split(text, source):
-        head = _HEAD.match(entry)
+    for entry in _bibtex_entries(text, source):
+        head = _ENTRY_HEAD.match(entry)
         if head is None:
             refuse(source, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Mend it")
         if head["key"] in found:
@@ -63,8 +63,8 @@ def _references() -> dict[str, str]:
     return parse_bibtex(files("dermis").joinpath("base/references.bib").read_text(encoding="utf-8"))
 
 
-def _split(text: str, source: str) -> Iterator[str]:
-    """Yield the text of each entry, from an `@` outside braces to its closing brace.
+def _bibtex_entries(text: str, source: str) -> Iterator[str]:
+    """Yield the text of each BibTeX entry, from its `@` to its closing brace.
 
     Text between entries is a comment.
     """

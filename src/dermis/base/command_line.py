@@ -1,4 +1,4 @@
-"""Command-line programs: functions as commands, invalid input as one message and exit status 2."""
+"""Framework of the command-line programs: a function per command, one-line errors with exit status 2."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from cyclopts.exceptions import (
 
 from dermis.base.errors import DermisError, DermisWarning, error_text, format_value, shorten
 
-_MAX_LENGTH = 400  # characters
-_TYPES = {float: "a number", int: "a whole number", NoneType: ""}
+_MAX_TEXT_LENGTH = 400  # characters
+_TYPE_TEXTS = {float: "a number", int: "a whole number", NoneType: ""}
 _OUT_OF_MEMORY_TEXTS = (
     "failed to map segment",
     "allocate memory",
@@ -32,7 +32,7 @@ _OUT_OF_MEMORY_TEXTS = (
 
 
 def make_app(name: str, help_text: str | None) -> App:
-    """Return an empty command-line app that returns exit statuses and prints plain help."""
+    """Return a cyclopts app without commands, with plain text help and exit statuses as return values."""
     return App(
         name=name,
         help=help_text,
@@ -44,9 +44,9 @@ def make_app(name: str, help_text: str | None) -> App:
 
 
 def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit status: 2, with a message on stderr, for invalid input.
+    """Run a command line and return its exit status: 2 for invalid input, with a message on stderr.
 
-    arguments : of the command line; by default those of the process
+    arguments : words after the program's name; by default those of this process
     """
     name = app.name[0]
     try:
@@ -65,9 +65,9 @@ def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
 
 
 def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | None = None) -> NoReturn:
-    """Run the command line of a script, print its docstring as help if asked to, and exit.
+    """Run a script as a command-line program, with its docstring as help, and exit.
 
-    run : function; or summaries of several commands by "module:function"
+    run : function of the program; or for several commands, their summaries by "module:function"
     name : of the program; by default the name of the script's file
     """
     name, help_text = name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
@@ -87,7 +87,11 @@ def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | N
 
 
 def add_command(app: App, name: str, target: str, summary: str) -> None:
-    """Add a command given as "module:function", which is imported only when the user runs that command."""
+    """Add a command to an app; its module is imported only when the user runs this command.
+
+    target : function of the command, "module:function"
+    summary : text in the list of commands
+    """
     chosen = sys.argv[1:2] == [name]
     if chosen:
         module, _, function = target.partition(":")
@@ -97,13 +101,13 @@ def add_command(app: App, name: str, target: str, summary: str) -> None:
 
 
 def print_failure(name: str, message: str) -> int:
-    """Print an error message of a program to stderr and return the exit status 2."""
+    """Print "name: message" to stderr and return the exit status 2."""
     sys.stderr.write(f"{name}: {message}\n")
     return 2
 
 
 def _show_notes() -> None:
-    """Print warnings of this package as notes on stderr, each once."""
+    """Show each `DermisWarning` once, as a note on stderr; other warnings are shown as usual."""
     default = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
@@ -117,9 +121,12 @@ def _show_notes() -> None:
 
 
 def usage_message(error: CycloptsError, name: str) -> str:
-    """Return the error message for an invalid command line: expected, got, and where to find help."""
+    """Return the error message for an invalid command line: what was expected, what was given, where help is.
+
+    name : of the program
+    """
     command = " ".join((name, *(error.command_chain or ())))
-    culprit, expected, actual = (shorten(part, _MAX_LENGTH) for part in _describe_error(error, command))
+    culprit, expected, actual = (shorten(part, _MAX_TEXT_LENGTH) for part in _describe_error(error, command))
     error.verbose = False
     hint = str(error).partition("Did you mean ")[2]
     did_you_mean = f"Did you mean {hint} " if hint else ""
@@ -127,7 +134,10 @@ def usage_message(error: CycloptsError, name: str) -> str:
 
 
 def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
-    """Return the invalid argument, what was expected and what was given."""
+    """Return the invalid argument or option, what was expected, and what was given instead.
+
+    command : program and command, as the user writes them
+    """
     unused = (error.unused_tokens or ["?"])[0]
     match error:
         case UnknownOptionError():
@@ -148,20 +158,20 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
 
 
 def _option_name(error: Any) -> str:
-    """Return the name of the invalid option as the user wrote it, or the name of the argument."""
+    """Return the option of an error as the user wrote it, or the name of the positional argument."""
     token = getattr(error, "token", None)
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")
 
 
 def _type_text(kind: Any) -> str:
-    """Return a type in words, or the choices of a literal."""
+    """Return a type in words, such as "a number", or the choices of a `Literal`."""
     if get_args(kind):
         return " or ".join(filter(None, map(_type_text, get_args(kind))))
-    return _TYPES.get(kind, str(kind))
+    return _TYPE_TEXTS.get(kind, str(kind))
 
 
 def reflow(docstring: str | None) -> str:
-    """Return a docstring with each paragraph joined into one line, so that the terminal can wrap it."""
+    """Join the lines of each paragraph of a docstring, so that the terminal can wrap it."""
     paragraphs: list[str] = []
     for line in cleandoc(docstring or "").splitlines():
         if paragraphs and _continues_paragraph(paragraphs[-1], line):
@@ -172,7 +182,7 @@ def reflow(docstring: str | None) -> str:
 
 
 def _continues_paragraph(before: str, line: str) -> bool:
-    """Return whether a line belongs to the same paragraph as the line before it.
+    """Return whether `line` belongs to the same paragraph as `before`, the line above it.
 
     Blank lines, changes of indent and underlines end a paragraph.
     """

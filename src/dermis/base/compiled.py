@@ -1,4 +1,7 @@
-"""Compilation of loops to machine code, cached on disk. Import it inside a function: it loads numba."""
+"""Compilation of Python loops to machine code by numba, with a disk cache.
+
+Import this module inside a function, because it loads numba.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +25,11 @@ compiler = import_extra("numba.core.compiler", "ground truth")
 serialize = import_extra("numba.core.serialize", "ground truth")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-_FOLDER, _NAME = "machine-code", "code"
+_CACHE_FOLDER, _ARRAY_NAME = "machine-code", "code"
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function with numba and cache its machine code on disk."""
+    """Decorate a function to be compiled by numba; its machine code is cached on disk."""
     dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching") and function.__closure__ is None:
         dispatcher._cache = _CodeCache(function)
@@ -37,7 +40,7 @@ _HOLDS_ADDRESSES = attrgetter("library.has_dynamic_globals")  # addresses of thi
 
 
 class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
-    """Disk cache of compiled functions in place of numba's, which unpickles any file in its folder.
+    """Disk cache of compiled functions, which replaces numba's because that unpickles any file in its folder.
 
     Cached files are read only from private folders, and their hash is checked before they are unpickled.
     """
@@ -49,19 +52,19 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
         self._source_key = f"{identity} {_source_hash(file.parent)} {numba.__version__} {sys.version}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the code compiled for a signature, or None."""
+        """Return the cached machine code for a signature, or None if there is none."""
         target_context.refresh()
-        found = load_arrays(_FOLDER, self._key(sig, target_context.codegen()), [_NAME])
+        found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_ARRAY_NAME])
         if found is None:
             return None
-        return compiler.CompileResult._rebuild(target_context, *pickle.loads(found[_NAME].tobytes()))
+        return compiler.CompileResult._rebuild(target_context, *pickle.loads(found[_ARRAY_NAME].tobytes()))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Cache compiled code unless it is valid in this process only."""
+        """Cache the machine code for a signature, unless it contains addresses of this process."""
         if data.lifted or _HOLDS_ADDRESSES(data):
             return
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
-        try_save_arrays(_FOLDER, self._key(sig, data.codegen), {_NAME: code})
+        try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_ARRAY_NAME: code})
 
     def _key(self, sig: Any, codegen: Any) -> str:
         text = f"{self._source_key} {sig} {codegen.magic_tuple()}"
@@ -70,6 +73,9 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
 
 @cache
 def _source_hash(folder: Path) -> str:
-    """Return a hash of all Python files in a folder, whose functions and constants compiled loops may use."""
+    """Return a hash of all Python files in a folder, as part of the cache key.
+
+    Compiled loops contain the constants and functions that they import from these files.
+    """
     texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

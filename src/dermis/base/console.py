@@ -17,26 +17,30 @@ SHOW_STEP_AFTER_S = 2.0
 
 
 def print_json(value: Any) -> None:
-    """Print one JSON value to stdout; numbers that JSON does not have, such as NaN, become null."""
-    print_lines(json.dumps(_finite(value), indent=2, allow_nan=False))
+    """Print a value as JSON to stdout; numbers that JSON cannot represent, such as NaN, become null."""
+    print_lines(json.dumps(_with_null_for_nonfinite(value), indent=2, allow_nan=False))
 
 
-def _finite(value: Any) -> Any:
+def _with_null_for_nonfinite(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: _with_null_for_nonfinite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [_with_null_for_nonfinite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_lines(*lines: str) -> None:
-    """Print lines to stdout and flush it."""
+    """Print lines to stdout and flush the stream."""
     sys.stdout.write("\n".join(lines) + "\n")
     sys.stdout.flush()
 
 
 def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str]]) -> None:
-    """Print a report as one JSON object, or as the text lines that `lines` returns."""
+    """Print the result of a command as JSON or as text.
+
+    as_json : whether to print `report` as JSON
+    lines : returns the lines of the text
+    """
     if as_json:
         print_json(report)
     else:
@@ -44,7 +48,7 @@ def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str
 
 
 def note(text: str) -> None:
-    """Print a note to stderr."""
+    """Print a line of text to stderr."""
     sys.stderr.write(text + "\n")
 
 
@@ -67,7 +71,7 @@ def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def spinner(task: str) -> Iterator[None]:
-    """Show a spinner with the current preparation step on stderr if it is a terminal."""
+    """Show a spinner on stderr if it is a terminal, with the current preparation step after the task."""
     if not sys.stderr.isatty():
         yield
         return
@@ -85,14 +89,17 @@ def spinner(task: str) -> Iterator[None]:
 
 
 class _SpinnerText(logging.Handler):
-    """Text of a spinner: the task, and its current step once that has taken two seconds."""
+    """Log handler that provides the text of a spinner: the task, and its current step.
+
+    A step is shown once it has taken two seconds.
+    """
 
     def __init__(self, task: str) -> None:
         super().__init__()
         self._task, self._step, self._began = task, "", 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Record the start or the end of a step."""
+        """Set the current step from the log record of its start or end, see `logged_step`."""
         begins = record.levelno >= logging.INFO
         self._step, self._began = record.getMessage() if begins else "", time.monotonic()
 

@@ -1,7 +1,7 @@
-"""Disk cache of arrays, addressed by a hash of their inputs.
+"""Disk cache of arrays; the key of an entry is a hash of the inputs of a computation.
 
 The first line of a file is the SHA-256 of the second. The second line is JSON with the file's key, the types
-and shapes of its arrays and the SHA-256 of each block of the bytes that follow. Files that do not match are
+and shapes of its arrays, and the SHA-256 of each block of the bytes that follow. Files that do not match are
 deleted. Only folders that no other user can write to are used.
 """
 
@@ -28,22 +28,22 @@ from dermis.base.private import cache_folder, make_private_folder, open_private_
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
-_SUFFIX, _UNFINISHED = ".arrays", ".part"
+_SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
 _MAX_FOLDER_BYTES = 2 << 30
-_START_S = 300.0  # longer than a process takes to read all its cached files
+_RECENT_USE_S = 300.0  # longer than a process takes to read all its cached files
 _MAX_WRITE_S = 24 * 3600.0  # older unfinished files are of processes that were killed
 _DAMAGE_ERRORS = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
 _PLAIN_KINDS = "biufcSU"  # NumPy kinds without pointers
-_BLOCK = 2 << 20  # bytes that a thread reads or hashes at once
-_MAX_LINE = 1 << 20  # bytes
+_BLOCK_BYTES = 2 << 20  # bytes that a thread reads or hashes at once
+_MAX_LINE_BYTES = 1 << 20  # bytes
 _MIN_THREADED_BYTES = 4 << 20
 _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
-    """Return the array that `make` computes from other arrays, from the disk cache if it is there.
+    """Return the array that `make` computes from `sources`, from the disk cache if it is there.
 
-    parameters : text with everything that the result depends on besides the content of `sources`
+    parameters : text with everything else that the result depends on, part of the key
     """
     return cached_arrays(sources, parameters, ["array"], lambda: {"array": make()})["array"]
 
@@ -51,7 +51,11 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callab
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the named arrays that `make` computes from other arrays, from the disk cache if possible."""
+    """Return the arrays that `make` computes from `sources`, from the disk cache if they are there.
+
+    parameters : text with everything else that the result depends on, part of the key
+    names : of the arrays in the result
+    """
     sources = [sources] if isinstance(sources, np.ndarray) else sources
     return load_or_make("arrays", array_key(sources, parameters), names, make)
 
@@ -59,7 +63,7 @@ def cached_arrays(
 def array_key(sources: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
-    parameters : text with everything that the result depends on besides the content of `sources`
+    parameters : text with everything else that the result depends on
     """
     digest = hashlib.sha256(parameters.encode())
     for source in sources:
@@ -69,7 +73,11 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
 
 
 def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
-    """Return the named arrays of a cached file, or compute them with `make` and cache them."""
+    """Return arrays from the disk cache; without a valid entry, compute them with `make` and cache them.
+
+    folder : name of a folder of the cache
+    names : of the arrays in the result
+    """
     arrays = load_arrays(folder, key, names)
     if arrays is None:
         arrays = make()
@@ -78,22 +86,22 @@ def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arr
 
 
 def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
-    """Save arrays to the cache if it has room; errors of the disk are ignored."""
+    """Save arrays to the disk cache if it has room; disk errors are ignored."""
     path = cache_folder() / folder
     with contextlib.suppress(OSError):
         if _has_room(path, sum(array.nbytes for array in arrays.values())):
             save_arrays(folder, key, arrays)
-            _prune(path)
+            _prune_folder(path)
 
 
 def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
-    """Return the named arrays of a cached file, or None if it is missing or damaged."""
+    """Return arrays from the disk cache; None if the entry is missing or damaged, or lacks one of `names`."""
     path = cache_folder() / folder / f"{key}{_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
             return None
         try:
-            arrays = _read(path, f"{folder}/{key}")
+            arrays = _read_arrays(path, f"{folder}/{key}")
         except _DAMAGE_ERRORS:
             path.unlink()
             return None
@@ -104,7 +112,7 @@ def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
 
 
 def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
-    """Write arrays to the cache atomically.
+    """Write arrays to the disk cache atomically.
 
     Raises OSError when the disk fails, or when other users can write to the folder.
     """
@@ -112,7 +120,7 @@ def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
     if not _is_trusted(path.parent):
         raise PermissionError(path.parent)
     data = {k: a if a.flags.fnc else np.ascontiguousarray(a).reshape(a.shape) for k, a in arrays.items()}
-    blocks = _blocks(data.values())
+    blocks = _byte_blocks(data.values())
     header = {
         "key": f"{folder}/{key}",
         "arrays": [[k, a.dtype.str, a.shape, "F" if a.flags.fnc else "C"] for k, a in data.items()],
@@ -125,7 +133,7 @@ def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Return whether only this user can write to a folder; if not, print a note once."""
+    """Return whether no other user can write to a folder; if one can, print a note once."""
     if reason := other_writers(folder):
         advice = "make it private, or name another in DERMIS_CACHE"
         _notify_once(f"{cache_folder()} is not used, because {reason}: {advice}")
@@ -138,17 +146,24 @@ def _notify_once(message: str) -> None:
 
 
 def _has_room(folder: Path, size: int) -> bool:
-    """Return whether a new file fits into a folder next to all files used in the last minutes.
+    """Return whether a file of `size` bytes fits into a folder beside all files used in the last minutes.
 
-    Otherwise files that one process needs together would evict each other.
+    Without this check, files that one process needs together would evict each other.
     """
     now = time.time()
-    used = sum(status.st_size for _, status in _files(folder, _SUFFIX) if now - status.st_mtime < _START_S)
+    used = sum(
+        status.st_size
+        for _, status in _folder_files(folder, _SUFFIX)
+        if now - status.st_mtime < _RECENT_USE_S
+    )
     return size + used <= _MAX_FOLDER_BYTES
 
 
-def _files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
-    """Return path and status of all files with a suffix; files that vanish meanwhile are skipped."""
+def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
+    """Return path and status of the files in a folder that have a suffix.
+
+    Files that another process deletes meanwhile are skipped.
+    """
     found = []
     with contextlib.suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
@@ -158,14 +173,14 @@ def _files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
     return found
 
 
-def _read(path: Path, key: str) -> Arrays:
-    """Return the arrays of a cached file.
+def _read_arrays(path: Path, key: str) -> Arrays:
+    """Return the arrays in a file of the cache.
 
-    Raises OSError or MemoryError when the file cannot be read, one of `_DAMAGE_ERRORS` when its key or its
-    content is wrong.
+    Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when it is damaged
+    or has another key.
     """
     with open_private_file(path) as raw, io.BufferedReader(raw) as file:
-        digest, head = file.readline(_MAX_LINE), file.readline(_MAX_LINE)
+        digest, head = file.readline(_MAX_LINE_BYTES), file.readline(_MAX_LINE_BYTES)
         start, size = file.tell(), os.fstat(file.fileno()).st_size
     header = json.loads(head) if digest == _digest_line(head) else {}
     if header.get("key") != key:
@@ -174,7 +189,7 @@ def _read(path: Path, key: str) -> Arrays:
     if start + sum(_byte_count(kind, shape) for _, kind, shape, _ in kinds) != size:
         raise ValueError(key)
     arrays = {name: np.empty(shape, kind, order) for name, kind, shape, order in kinds}
-    blocks = _blocks(arrays.values())
+    blocks = _byte_blocks(arrays.values())
     offsets = start + np.cumsum([0, *(len(block) for block in blocks)])
     if _map_threaded(partial(_read_block, path), blocks, offsets.tolist()) != header["blocks"]:
         raise ValueError(key)
@@ -186,14 +201,18 @@ def _digest_line(head: bytes) -> bytes:
 
 
 def _byte_count(kind: np.dtype[Any], shape: Sequence[int]) -> int:
-    """Return the size of an array in bytes, checked before memory is allocated."""
+    """Return the size of an array in bytes, after checking its type and shape before memory is allocated."""
     if kind.kind not in _PLAIN_KINDS or not kind.itemsize or any(type(n) is not int or n < 0 for n in shape):
         raise ValueError(f"no array: {kind} {shape}")
     return math.prod(shape) * kind.itemsize
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:
-    """Fill a block from an offset in a file and return its SHA-256."""
+    """Read a block of bytes of a file into memory and return its SHA-256.
+
+    block : memory to be filled
+    offset : of the block in the file
+    """
     with open_private_file(path) as file:
         file.seek(offset)
         if file.readinto(block) != len(block):  # uninitialised memory may hold the right bytes
@@ -201,14 +220,19 @@ def _read_block(path: Path, block: memoryview, offset: int) -> str:
     return hashlib.sha256(block).hexdigest()
 
 
-def _blocks(arrays: Iterable[Array]) -> list[memoryview]:
-    """Return the bytes of arrays, one after the other, as views of at most 2 MiB."""
+def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
+    """Return views of at most 2 MiB that together cover the bytes of all arrays, in their order."""
     buffers = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
-    return [data[start : start + _BLOCK] for data in buffers for start in range(0, len(data), _BLOCK)]
+    return [
+        data[start : start + _BLOCK_BYTES] for data in buffers for start in range(0, len(data), _BLOCK_BYTES)
+    ]
 
 
 def _map_threaded(function: Callable[..., str], blocks: list[memoryview], *more: Sequence[int]) -> list[str]:
-    """Return the results of a function for all blocks, in threads if the blocks are large."""
+    """Apply a function to each block and return its results; large data are divided among threads.
+
+    more : sequences of further arguments, one value for each block
+    """
     if sum(map(len, blocks)) < _MIN_THREADED_BYTES:
         return list(map(function, blocks, *more))
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
@@ -217,9 +241,9 @@ def _map_threaded(function: Callable[..., str], blocks: list[memoryview], *more:
 
 @contextlib.contextmanager
 def _temporary_file(path: Path) -> Iterator[BinaryIO]:
-    """Yield a new file that is renamed to `path` after success and deleted after an error."""
+    """Yield a new file that is renamed to `path` on success and deleted after an error."""
     make_private_folder(path.parent)
-    unfinished = path.with_name(f"{path.name}.{os.urandom(6).hex()}{_UNFINISHED}")
+    unfinished = path.with_name(f"{path.name}.{os.urandom(6).hex()}{_UNFINISHED_SUFFIX}")
     try:
         with open(unfinished, "xb", opener=partial(os.open, mode=0o600)) as file:
             yield file
@@ -229,14 +253,14 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
             unfinished.unlink()
 
 
-def _prune(folder: Path) -> None:
+def _prune_folder(folder: Path) -> None:
     """Delete the least recently used files beyond the folder's size limit, and old unfinished files."""
-    newest_first = sorted(_files(folder, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True)
+    newest_first = sorted(_folder_files(folder, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True)
     total, now = 0, time.time()
     for path, status in newest_first:
         total += status.st_size
         if total > _MAX_FOLDER_BYTES:
             path.unlink(missing_ok=True)
-    for path, status in _files(folder, _UNFINISHED):
+    for path, status in _folder_files(folder, _UNFINISHED_SUFFIX):
         if now - status.st_mtime > _MAX_WRITE_S:
             path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Errors and warnings of the package for invalid input, unsuitable machines and full disks."""
+"""Errors and warnings for invalid input, unsuitable machines and full disks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DermisError(Exception):
 
 @contextmanager
 def error_context(culprit: object) -> Iterator[None]:
-    """Prefix errors raised inside with the name of what they are about, unless they contain it."""
+    """Prefix errors raised in the block with the name of a file, option or object, unless they contain it."""
     try:
         yield
     except DermisError as error:
@@ -38,7 +38,7 @@ def error_context(culprit: object) -> Iterator[None]:
 
 
 class DermisWarning(UserWarning):
-    """Warning that a result may not be what was meant; the message says why and what to do."""
+    """Warning that a result may differ from the user's intention; the message says why and what to do."""
 
 
 def notify(message: str) -> None:
@@ -62,9 +62,9 @@ def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn
 
 
 def format_value(value: object, max_length: int = 60) -> str:
-    """Return a short text for a value in an error message: its repr, or its type if that is too long.
+    """Return a value for an error message: its repr, shortened or replaced by its type if it is too long.
 
-    max_length : of the text, in characters
+    max_length : longest repr [characters]
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
@@ -79,12 +79,12 @@ def format_value(value: object, max_length: int = 60) -> str:
 
 
 def error_text(error: Exception) -> str:
-    """Return an error in one line, without the path that an OSError repeats."""
+    """Return the message of an error in one line; for an OSError without its path, which callers add."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text.splitlines()[0].rstrip(".")
 
 
 def shorten(text: str, max_length: int) -> str:
-    """Return a text without its middle part where it is too long for a message."""
+    """Return a text for a message; if it is longer than `max_length`, its middle is left out."""
     half = (max_length - 5) // 2
     return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

@@ -1,4 +1,4 @@
-"""Optional packages, and the extras of this package that install them."""
+"""Optional dependencies, and the extras of this package that install them."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _DISTRIBUTIONS = {"pxr": "usd-core"}  # distributions with other names than thei
 
 
 def import_extra(module: str, task: str) -> Any:
-    """Import a module of an optional package listed in `EXTRAS` and return it.
+    """Import a module of an optional dependency listed in `EXTRAS` and return it.
 
-    task : what needs the module, for the error message
+    task : noun phrase for what needs the module, for the error
 
-    Raises DermisError when the package is not installed.
+    Raises DermisError when the dependency is not installed.
     """
     package = module.partition(".")[0]
     try:
@@ -41,5 +41,5 @@ def import_extra(module: str, task: str) -> Any:
 
 
 def distribution_name(module: str) -> str:
-    """Return the name under which a module's package is installed from PyPI."""
+    """Return the name on PyPI of the package that contains a module."""
     return _DISTRIBUTIONS.get(module, module.replace("_", "-"))

@@ -1,4 +1,4 @@
-"""Private folders and files: only their user and root can have written to them."""
+"""Private folders and files: only this user and root can have written to them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path:
-    """Return the folder for cached files: DERMIS_CACHE, or the user's cache folder.
+    """Return the folder of the disk cache: DERMIS_CACHE, or the user's cache folder.
 
-    For a user without a home folder it is a path in which nothing can be stored.
+    For a user without a home folder it is a path at which nothing can be stored.
     """
     import platformdirs
 
@@ -31,7 +31,7 @@ def cache_folder() -> Path:
 
 
 def make_private_folder(folder: Path) -> None:
-    """Create a folder and its missing parents with access for this user only.
+    """Create a folder and its missing parents, accessible to this user only.
 
     Raises OSError where that is not possible.
     """
@@ -43,7 +43,7 @@ def make_private_folder(folder: Path) -> None:
 
 
 def other_writers(folder: Path) -> str:
-    """Return a description of how other users can write to a folder; empty if they cannot.
+    """Return a clause that says how other users can write to a folder; empty if they cannot.
 
     Folders above the user's home and folders that only root can write to count as safe.
     """
@@ -69,7 +69,7 @@ def other_writers(folder: Path) -> str:
 
 
 def open_private_file(path: Path) -> io.FileIO:
-    """Open a regular file for unbuffered reading; links, pipes and devices are refused.
+    """Open a regular file for unbuffered reading, but no link, pipe or device.
 
     Raises OSError when it cannot be read, ValueError when other users may have written it.
     """
@@ -84,7 +84,7 @@ def open_private_file(path: Path) -> io.FileIO:
 
 
 def _path_components(path: Path) -> Iterator[Path]:
-    """Yield each folder and symbolic link along a path, and the path itself."""
+    """Yield all folders and symbolic links through which a path is resolved, and the path itself."""
     absolute = path.absolute()
     names, current, links = list(reversed(absolute.parts[1:])), Path(absolute.anchor), 0
     yield current
@@ -104,7 +104,10 @@ def _path_components(path: Path) -> Iterator[Path]:
 
 
 def _is_shared(status: os.stat_result) -> bool:
-    """Return whether other users have write access; a group with this user alone does not count."""
+    """Return whether users other than this one have write access to a file or folder.
+
+    Access of a group whose only member is this user does not count.
+    """
     import grp
     import pwd
 

@@ -1,4 +1,4 @@
-"""Log messages about slow preparation steps, on the logger "dermis"."""
+"""Log records of slow preparation steps, on the logger "dermis"."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LOGGER = logging.getLogger("dermis")
 
 @contextmanager
 def logged_step(step: str) -> Iterator[None]:
-    """Log the start of a slow step with level INFO and its duration with level DEBUG.
+    """Log the start of a slow preparation step with level INFO, and its duration with level DEBUG.
 
     step : description, such as "fitting the eyes"
     """

@@ -1,4 +1,4 @@
-"""Checks of numbers from callers and files: finite, within a range, and converted to Python types."""
+"""Checks that numbers of callers and files are finite and in a range; conversion to Python types."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:  # importing NumPy takes longer than printing --help
 def checked_number(culprit: object, value: object, low: float, high: float, reason: str = "") -> float:
     """Return a value as a float after checking that it lies in a range.
 
-    culprit : named in error messages
+    culprit : option or field with the value, for errors
     low, high : limits, both included
-    reason : why these are the limits, or the unit
+    reason : why these are the limits, or the unit, for errors
 
     Raises DermisError for text, booleans, arrays, NaN, infinity and numbers outside the range.
     """
@@ -30,7 +30,7 @@ def checked_number(culprit: object, value: object, low: float, high: float, reas
 def checked_integer(culprit: object, value: object, low: float, high: float, reason: str = "") -> int:
     """Return a value as an int after checking that it is a whole number in a range; 4.0 becomes 4.
 
-    Parameters and errors as in `checked_number`.
+    For parameters and errors see `checked_number`.
     """
     found = _number_in_range(value, low, high)
     if found is None or found != int(found):
@@ -43,7 +43,10 @@ def checked_array(
 ) -> NDArray[np.float64]:
     """Return values as a float64 array after checking its shape and the range of all elements.
 
+    culprit : option or field with the values, for errors
     shape : expected shape, with 0 for an axis of any length
+    low, high : limits, both included
+    reason : why these are the limits, or the unit, for errors
 
     Raises DermisError for another shape, and when an element is not a number in the range.
     """
@@ -65,7 +68,10 @@ def checked_array(
 
 
 def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
-    """Check that attributes of an object lie in their ranges; ranges of ints require whole numbers.
+    """Check that attributes of an object lie in their ranges.
+
+    ranges : lowest and highest value by attribute; if both are ints, the value must be a whole number
+    prefix : text before the attribute in errors
 
     Raises DermisError as `checked_number` does.
     """
@@ -86,7 +92,7 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 
 
 def _has_text(values: Any, dimensions: int) -> bool:
-    """Return whether values contain text or booleans, which NumPy would convert to numbers.
+    """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
     dimensions : of the expected array; lists nested more deeply count as text
     """

@@ -1,7 +1,7 @@
-"""Safe reading of files from users, and of files that these refer to.
+"""Safe reading of files that users name, and of files that those refer to.
 
-Only regular files are opened, their size is limited, and errors of parsers become messages that name the
-file.
+Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
+the file.
 """
 
 from __future__ import annotations
@@ -88,6 +88,8 @@ def is_file(path: str | Path) -> bool:
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
     """Return the text of a UTF-8 file with or without a byte order mark.
 
+    expected : what the file should be, for error messages
+
     Raises DermisError as `read_file` does, and for files that are not text.
     """
     with parsing(path, expected):
@@ -120,7 +122,9 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
 
 
 def checked_path(name: object, expected: str) -> Path:
-    """Return a name as a path.
+    """Convert the name of a file to a path.
+
+    expected : what the name should denote, for the error
 
     Raises DermisError when it is neither text nor a path.
     """
@@ -131,8 +135,10 @@ def checked_path(name: object, expected: str) -> Path:
 
 @contextmanager
 def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
-    """Convert errors of a parser into a DermisError that names the file.
+    """Convert the exceptions of a parser in the block into a DermisError that names the file.
 
+    culprit : the file
+    expected : what the file should be
     errors : exception types that the parser raises besides ValueError and OverflowError
     """
     try:
@@ -150,7 +156,7 @@ def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterato
 
 
 def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
-    """Return a file descriptor of a regular file without blocking on pipes or devices."""
+    """Open a regular file and return its descriptor; pipes and devices are refused without blocking."""
     descriptor = os.open(path, os.O_RDONLY | _NONBLOCKING)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
@@ -193,7 +199,7 @@ def _megabytes(size: int) -> str:
 
 
 def _short_error(fault: BaseException) -> str:
-    """Return an error's text shortened to one line."""
+    """Return the text of an error, shortened to one line."""
     text = " ".join(str(fault)[:1000].split())
     text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

@@ -73,7 +73,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @contextmanager
     def including(self, name: str, entry: T | str) -> Iterator[None]:
-        """Add an entry for the duration of a with block."""
+        """Add an entry for the duration of a with block, such as in tests."""
         self.register(name, entry)
         try:
             yield
@@ -92,7 +92,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return tuple(self._entries)
 
     def summaries(self) -> list[str]:
-        """Return "name: summary" of each entry that has a summary."""
+        """Return "name: summary" for each entry that has a summary, for help texts."""
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
@@ -137,7 +137,7 @@ class RegisteredName:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return all accepted names."""
+        """Return all accepted names: those of the registry and the further words."""
         return (*self.registry, *self.words)
 
     def check(self, name: str) -> str:

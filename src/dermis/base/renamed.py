@@ -1,6 +1,7 @@
-"""Names of earlier releases, which work with a warning for one more release.
+"""Renamed objects and modules: their old names keep working for one release, with a warning.
 
-To rename a public name or a module, add it to `NAMES` or `MODULES`; remove the entry one release later.
+To rename a public name or a module, add it to `RENAMED_OBJECTS` or `RENAMED_MODULES`; remove the entry one
+release later.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
-NAMES: Mapping[str, str] = {
+RENAMED_OBJECTS: Mapping[str, str] = {
     "profile": "side",
     "scene.profile": "scene.side",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
@@ -22,7 +23,7 @@ NAMES: Mapping[str, str] = {
 }
 """Old to new names of objects, both without the package's name."""
 
-MODULES: Mapping[str, str] = {
+RENAMED_MODULES: Mapping[str, str] = {
     "batch": "apps.batch",
     "batch.samples": "apps.batch.reader",
     "benchmark": "apps.validation.benchmarks",
@@ -47,16 +48,19 @@ _REMOVAL = "the old name will be removed in the next release"
 
 
 def successor(module: str, name: str) -> str | None:
-    """Return the new name of a renamed object after a DeprecationWarning, or None for other names."""
+    """Return the new name of a renamed object and issue a DeprecationWarning; None if it was not renamed.
+
+    module, name : module of the object, and its old name
+    """
     old = f"{module}.{name}".removeprefix(f"{_PACKAGE}.")
-    if old not in NAMES:
+    if old not in RENAMED_OBJECTS:
         return None
-    _warn(old, NAMES[old], stacklevel=4)
-    return NAMES[old].rpartition(".")[2]
+    _warn(old, RENAMED_OBJECTS[old], stacklevel=4)
+    return RENAMED_OBJECTS[old].rpartition(".")[2]
 
 
 def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator for functions that accept old names of keyword arguments with a warning.
+    """Return a decorator that lets a function accept the old names of keyword arguments, with a warning.
 
     new_names : new names by old names
     """
@@ -77,7 +81,7 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
 
 
 def renamed_attribute(old: str, new: str) -> property:
-    """Return a property that warns and returns the attribute of the new name."""
+    """Return a property for the old name of an attribute, which warns and returns the new attribute."""
 
     def get(instance: Any) -> Any:
         text = f"{type(instance).__name__}.{old} is now {new}"
@@ -88,37 +92,40 @@ def renamed_attribute(old: str, new: str) -> property:
 
 
 def find_renamed_modules() -> None:
-    """Install an import hook that finds modules by their old paths."""
-    sys.meta_path.insert(0, _Finder())
+    """Install an import hook, so that renamed modules can be imported by their old paths."""
+    sys.meta_path.insert(0, _RenamedModuleFinder())
 
 
-class _Finder:
-    """Import hook that imports the new module and registers it under both paths."""
+class _RenamedModuleFinder:
+    """Import hook for the old path of a renamed module: it imports the new module and aliases it."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        return ModuleSpec(fullname, cast(Any, self)) if _new_path(fullname) else None
+        return ModuleSpec(fullname, cast(Any, self)) if _new_module_path(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Leave the creation of the module to the import system; `exec_module` replaces it."""
 
     def exec_module(self, module: ModuleType) -> None:
         old = module.__name__
-        new = _new_path(old)
+        new = _new_module_path(old)
         assert new is not None
         sys.modules[old] = import_module(f"{_PACKAGE}.{new}")
         _warn(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
 
 
-def _new_path(fullname: str) -> str | None:
-    """Return the new path of a renamed module without the package's name, or None for other modules."""
+def _new_module_path(fullname: str) -> str | None:
+    """Return the new path of a renamed module, without the package's name; None if it was not renamed.
+
+    fullname : old path with the package's name
+    """
     package, _, path = fullname.partition(".")
     if package != _PACKAGE:
         return None
-    for old in sorted(MODULES, reverse=True):  # longer paths first
+    for old in sorted(RENAMED_MODULES, reverse=True):  # longer paths first
         if path == old or path.startswith(f"{old}."):
-            return MODULES[old] + path[len(old) :]
+            return RENAMED_MODULES[old] + path[len(old) :]
     return None
 
 

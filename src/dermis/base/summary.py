@@ -1,4 +1,4 @@
-"""Short representations of objects that hold large arrays."""
+"""Short reprs of objects that hold large arrays."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class ShortRepr:
     """Mixin for dataclasses with `repr=False` whose repr shows types and shapes instead of large arrays."""
 
     def __repr__(self) -> str:
-        """Return the class name and its fields by `short_repr`."""
+        """Return the class name and the fields, each abbreviated by `short_repr`."""
         own_fields = fields(cast(Any, self))
         parts = [f"{one.name}={short_repr(getattr(self, one.name))}" for one in own_fields if one.repr]
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
 def short_repr(value: object) -> str:
-    """Return the repr of a value if it is short, else its type with its shape or length."""
+    """Return the repr of a value; for arrays and long collections, their type and shape or length."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
     if isinstance(value, Collection) and (len(value) > _MAX_ITEMS or not _is_short(value)):

@@ -1,4 +1,7 @@
-"""CSV tables of the package, with comments above the header: quantity, unit, source and licence."""
+"""Reading of the CSV tables of the package.
+
+Comments above the header of a table state the quantity, unit, source and licence.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +16,21 @@ Rows = list[dict[str, str]]
 
 
 def read_rows(package: str, name: str) -> Rows:
-    """Return the rows of a package's table `name`.csv as dictionaries by column name."""
+    """Return the rows of a CSV table in a package, as dictionaries by column name.
+
+    package : such as "dermis.environment"
+    name : path of the table in the package, without .csv
+    """
     return parse_rows(resources.files(package).joinpath(f"{name}.csv").read_text("utf-8"))
 
 
 def parse_rows(text: str) -> Rows:
-    """Return the rows of a CSV text as dictionaries by column name, without lines that start with #."""
+    """Parse the rows of a CSV text as dictionaries by column name; lines that start with # are comments."""
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
 def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
-    """Return columns of a table as floats, (rows, columns).
+    """Return selected columns of a table as floats, (rows, columns).
 
     columns : names of the columns, separated by spaces
     """
