@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tolerances import PREFILTERED
 
 from dermis.base.errors import DermisError
-from dermis.environment.harmonics import analyse, synthesise, zonal
+from dermis.environment.harmonics import analyse_panorama, synthesise_panoramas, zonal_factors
 from dermis.environment.panorama import (
     directions,
     load_panorama,
@@ -21,7 +21,7 @@ from dermis.environment.panorama import (
     split_suns,
 )
 from dermis.environment.prefilter import (
-    HEIGHT,
+    LAYER_HEIGHT,
     ROUGHNESSES,
     isotropic_kernel,
     isotropic_lobe,
@@ -133,14 +133,14 @@ def test_harmonics_give_back_what_they_hold() -> None:
     """Check analysis and synthesis of a picture of low degree."""
     x, y, z = np.moveaxis(directions(256, 512), -1, 0)
     picture = np.stack([1 + x * y, z**3 - 0.2 * z, x**2 - z**2 + 0.1 * y], axis=-1)
-    (again,) = synthesise(analyse(picture, 12), np.ones((1, 13)), 256)
+    (again,) = synthesise_panoramas(analyse_panorama(picture, 12), np.ones((1, 13)), 256)
     assert np.abs(again - picture).max() < PREFILTERED
 
 
 def test_cosine_kernel_is_the_known_one() -> None:
     """Check the factors pi, 2 pi / 3, pi / 4, 0, -pi / 24 [RamamoorthiHanrahan2001]."""
     expected = [np.pi, 2 * np.pi / 3, np.pi / 4, 0, -np.pi / 24]
-    assert np.allclose(zonal(np.cos, 4), expected, atol=1e-6)
+    assert np.allclose(zonal_factors(np.cos, 4), expected, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_irradiance_is_the_plain_sum(lamps: tuple[str, Floats]) -> None:
     name, radiance = lamps
     made = prefilter(name)
     assert made.suns == ()
-    towards, normals = directions(256, 512), directions(HEIGHT, 2 * HEIGHT)
+    towards, normals = directions(256, 512), directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
     for y, x in [(0, 3), (20, 70), (64, 128), (90, 200), (127, 250)]:
         exact = summed(radiance, normals[y, x], np.maximum(towards @ normals[y, x], 0))
         assert np.allclose(made.layers[0, y, x], exact, rtol=PREFILTERED)
@@ -166,7 +166,7 @@ def test_irradiance_is_the_plain_sum(lamps: tuple[str, Floats]) -> None:
 def test_reflections_are_the_plain_mean(lamps: tuple[str, Floats], layer: int) -> None:
     name, radiance = lamps
     made, m = prefilter(name), float(ROUGHNESSES[layer - 1])
-    towards, mirror = directions(256, 512), directions(HEIGHT, 2 * HEIGHT)
+    towards, mirror = directions(256, 512), directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
     for y, x in [(0, 3), (20, 70), (64, 128), (90, 200)]:
         cosine = np.clip(towards @ mirror[y, x], -1, 1)
         weight = np.where(cosine > 0, isotropic_lobe(np.arccos(np.maximum(cosine, 0)), m), 0.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, solid_angles
-from dermis.environment.prefilter import HEIGHT, ROUGHNESSES, isotropic_lobe, prefilter
+from dermis.environment.prefilter import LAYER_HEIGHT, ROUGHNESSES, isotropic_lobe, prefilter
 from dermis.images.io import write_exr
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
@@ -155,13 +155,13 @@ def seen_in(layers: NDArray[np.float32], frame: Floats, lobe: Floats) -> Floats:
     """
     x, y = lobe[:2]
     direction = np.array([2 * x, 2 * y, 1 - x**2 - y**2]) / (1 + x**2 + y**2) @ frame
-    row = np.arccos(direction[1]) / np.pi * HEIGHT - 0.5
-    column = (0.5 + np.arctan2(direction[0], -direction[2]) / (2 * np.pi)) * 2 * HEIGHT - 0.5
+    row = np.arccos(direction[1]) / np.pi * LAYER_HEIGHT - 0.5
+    column = (0.5 + np.arctan2(direction[0], -direction[2]) / (2 * np.pi)) * 2 * LAYER_HEIGHT - 0.5
     at = np.interp(np.log(lobe[2]), np.log(ROUGHNESSES), np.arange(len(ROUGHNESSES)))
     layer = min(int(at), len(ROUGHNESSES) - 2)
     seen = np.zeros(3)
     for k, j, i in np.ndindex(2, 2, 2):
         y, x = int(np.floor(row)) + j, int(np.floor(column)) + i
         share = np.prod(1 - np.abs([layer + k - at, y - row, x - column]))
-        seen += share * layers[1 + layer + k, np.clip(y, 0, HEIGHT - 1), x % (2 * HEIGHT)]
+        seen += share * layers[1 + layer + k, np.clip(y, 0, LAYER_HEIGHT - 1), x % (2 * LAYER_HEIGHT)]
     return seen

@@ -1,1 +1,1 @@
-"""Environment light: panoramas, their sun-like peaks, and prefiltering."""
+"""Environment light: panoramas of radiance, extraction of suns, and prefiltering by lobes."""

@@ -1,4 +1,4 @@
-"""Spherical harmonics of a panorama, and its convolution with isotropic kernels."""
+"""Spherical harmonics of panoramas, and their convolution with isotropic kernels."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ Complex = NDArray[np.complex128]
 _KERNEL_NODES = 4096
 
 
-def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
-    """Return the associated Legendre functions (degree + 1 - m, n) of each order m < orders.
+def legendre_functions(cosine: Floats, degree: int, orders: int) -> list[Floats]:
+    """Return the associated Legendre functions up to `degree`, an array for each order m < `orders`.
 
-    cosine : (n,) of the polar angle
+    The array of order m is (degree + 1 - m, n). Functions are fully normalised: times exp(i m phi), the
+    integral of the squared modulus over the sphere is 1. They are computed by recurrence in the degree
+    [HolmesFeatherstone2002].
 
-    They are fully normalised: times exp(i m phi), the integral of their squared modulus over the sphere is 1.
-    Recurrence in the degree [HolmesFeatherstone2002].
+    cosine : (n,) cosines of the polar angle
     """
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
     table = np.zeros((orders, degree + 1, *cosine.shape))
@@ -36,8 +37,13 @@ def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
     return [table[m, m:] for m in range(orders)]
 
 
-def analyse(radiance: Floats, degree: int) -> list[Complex]:
-    """Return the coefficients (degree + 1 - m, c) of a panorama (h, w, c) for each order m >= 0."""
+def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
+    """Return the spherical harmonic coefficients of a panorama, an array for each order m from 0 to `degree`.
+
+    The array of order m is (degree + 1 - m, c); as the panorama is real, negative orders are redundant.
+
+    radiance : (h, w, c)
+    """
     height, width = radiance.shape[:2]
     weighted = radiance * (_row_weights(height) * 2.0 * np.pi / width)[:, None, None]
     around = np.fft.rfft(weighted, axis=1)
@@ -50,11 +56,11 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
     ]
 
 
-def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
-    """Return the factors (degree + 1,) by which convolution with a kernel multiplies the coefficients.
+def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
+    """Return the factors (degree + 1,) by which convolution with a kernel multiplies harmonic coefficients.
 
-    kernel : function of the angle theta in 0..pi/2, 0 beyond; the factor of degree 0 is its integral over the
-        sphere
+    kernel : isotropic kernel as function of the angle theta in 0..pi/2, 0 beyond; the factor of degree 0 is
+        its integral over the sphere
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
@@ -63,10 +69,11 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     return np.asarray(_kernel_polynomials(degree) @ (kernel(theta) * measure))
 
 
-def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return panoramas (k, height, 2 height, c) of coefficients multiplied by factors.
+def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
+    """Return k panoramas (k, height, 2 height, c) from one set of coefficients with different factors.
 
-    factors : (k, degree + 1) factor of each panorama for each degree
+    coefficients : of the spherical harmonics, see `analyse_panorama`
+    factors : (k, degree + 1) factor of each panorama for each degree, such as those of `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
     count, degree = factors.shape[0], factors.shape[1] - 1
@@ -80,25 +87,25 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
 
 
 def _complex_product(matrix: Floats, values: Complex) -> Complex:
-    """Return the product of a real and a complex matrix; NumPy would first copy the real one as complex."""
+    """Return the product of a real and a complex matrix, without NumPy's conversion of the real one."""
     return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
 
 @lru_cache(maxsize=2)  # input and output size; 51 kB a row at degree 112
 def _legendre_table(height: int, degree: int) -> list[Floats]:
-    """Return the Legendre functions of all orders at the rows of a panorama."""
-    return legendre(_polar_cosines(height), degree, degree + 1)
+    """Return the associated Legendre functions of all orders at the polar angles of a panorama's rows."""
+    return legendre_functions(_polar_cosines(height), degree, degree + 1)
 
 
 @lru_cache(maxsize=1)
 def _kernel_polynomials(degree: int) -> Floats:
-    """Return the Legendre polynomials (degree + 1, n) at the quadrature angles of kernels."""
-    (functions,) = legendre(np.cos(_kernel_angles()), degree, orders=1)
+    """Return the Legendre polynomials (degree + 1, n) at the angles over which kernels are integrated."""
+    (functions,) = legendre_functions(np.cos(_kernel_angles()), degree, orders=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 
 
 def _kernel_angles() -> Floats:
-    """Return the quadrature angles (n,) of kernels."""
+    """Return the quadrature angles (n,) over which kernels are integrated: midpoints in 0..pi/2 [rad]."""
     return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES)
 
 
@@ -108,7 +115,10 @@ def _polar_cosines(height: int) -> Floats:
 
 @lru_cache(maxsize=2)
 def _row_weights(height: int) -> Floats:
-    """Return the quadrature weights (h,) of rows by Fejer's first rule, exact for low degrees."""
+    """Return the quadrature weight (h,) of each row of a panorama by Fejér's first rule.
+
+    Unlike solid angles, these weights integrate harmonics of low degree exactly.
+    """
     double_angle = 2.0 * np.pi * (np.arange(height) + 0.5) / height
     k = np.arange(1, height // 2 + 1)
     series = np.cos(np.outer(double_angle, k)) @ (2.0 / (4.0 * k**2 - 1.0))

@@ -1,4 +1,8 @@
-"""Least-squares fits of isotropic lobes to specular lobes."""
+"""Least-squares fits of sums of isotropic lobes to specular lobes.
+
+A specular lobe is approximated for each node of a table of roughness and view angle. Five lobes have four
+parameters each, relative to the mean direction and the standard deviations of the specular lobe.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +25,16 @@ from dermis.optics.fits.variable_projection import qr_factor
 from dermis.specular.models import Lobe
 
 Floats = NDArray[np.float64]
-Node = tuple[int, int]
+TableNode = tuple[int, int]
 ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT = 12, 16, 5
 LOBE_TABLE_ROUGHNESSES = np.geomspace(0.05, 1.0, ROUGHNESS_COUNT)
 """Roughnesses of the rows of the table."""
 LOBE_TABLE_COSINES = np.maximum(np.linspace(0.0, 1.0, VIEW_COUNT) ** 2, 0.02)
 """Cosines of the view for the columns of the table; the first ones replace 0."""
 _IN_PLANE_LOBES = (3,) * 10 + (2,) * 3 + (1,) * 3
-"""Number of lobes in the plane of incidence for each column, without the pair."""
-_ELONGATED = 1.8  # ratio of length to width above which the pair lies in the plane
-_PASSES = 2
+"""Number of lobes in the plane of incidence for each view, without the pair."""
+_MIN_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
+_FIT_PASSES = 2
 _REGULARISATION = 0.01  # towards the mean of the neighbours, for undetermined parameters
 _MAX_EVALUATIONS = 30
 _MAX_OFFSET = 5.0  # of positions in widths of the lobe, and of logarithms of weights
@@ -47,71 +51,94 @@ _INITIAL_LOBES = np.array(
 
 
 def fit_isotropic_lobes(lobe: Lobe) -> Floats:
-    """Return isotropic lobes fitted to a lobe (12, 16, 5, 4): angle, out-of-plane angle, roughness, weight.
+    """Return a table (12, 16, 5, 4) of the five isotropic lobes that approximate a specular lobe.
 
-    Angles [rad] are from the normal, away from the viewer. Rows and columns are LOBE_TABLE_ROUGHNESSES and
-    LOBE_TABLE_COSINES. Three lobes are in the plane of incidence; for steep views two or one have weight. The
-    others are a pair: on both sides of the plane, or in it where the specular lobe is elongated. The fit
-    minimises the expected difference of the reflection under random environments whose power falls with the
-    degree of harmonics, including light from below the horizon. Fits proceed from rough and grazing to smooth
-    and steep, each from its neighbours, so that lobes vary smoothly over the table.
+    Axes are roughness (LOBE_TABLE_ROUGHNESSES), view (LOBE_TABLE_COSINES), lobe, and parameter: angle from
+    the normal away from the viewer [rad], angle from the plane of incidence [rad], roughness, weight.
+
+    Three lobes are in the plane of incidence; for steep views two or one have weight. The other two are a
+    pair: on both sides of the plane, or in it where the specular lobe is elongated. The fit minimises the
+    expected difference of the reflections of random environments whose power falls with the degree of
+    harmonics, including light from below the horizon. Fits proceed from rough and grazing to smooth and
+    steep, each starting at the mean of its neighbours, so that lobes vary smoothly over the table.
     """
-    found: dict[Node, Floats] = {}
+    found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
-    targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _nodes()}
-    for _ in range(_PASSES):
-        for i, j in _nodes():
+    targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _table_nodes()}
+    for _ in range(_FIT_PASSES):
+        for i, j in _table_nodes():
             adjacent = (i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)
             neighbours = [found[node] for node in adjacent if node in found]
             mean = np.mean(neighbours, axis=0) if neighbours else _INITIAL_LOBES
-            found[i, j] = _fit(targets[i, j], j, found.get((i, j), mean), mean)
+            found[i, j] = _fit_parameters(targets[i, j], j, found.get((i, j), mean), mean)
     table = np.empty((ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4))
-    for i, j in _nodes():
-        lobes = _lobes(found[i, j], targets[i, j], _active_lobes(j))
+    for i, j in _table_nodes():
+        lobes = _to_isotropic_lobes(found[i, j], targets[i, j], _active_lobes(j))
         columns = [lobes.angle, lobes.out_of_plane, np.exp(lobes.log_roughness), lobes.weight]
         table[i, j] = np.stack(columns, axis=-1)
     return table
 
 
-def _nodes() -> Iterator[Node]:
+def _table_nodes() -> Iterator[TableNode]:
     return ((i, j) for i in reversed(range(ROUGHNESS_COUNT)) for j in range(VIEW_COUNT))
 
 
-def _active_lobes(column: int) -> NDArray[np.bool_]:
-    """Return the mask (5,) of lobes that are used in a column."""
-    return np.array([k < _IN_PLANE_LOBES[column] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
+def _active_lobes(view_index: int) -> NDArray[np.bool_]:
+    """Return the mask (5,) of lobes that have weight for a view.
+
+    view_index : index of the view in LOBE_TABLE_COSINES
+    """
+    return np.array([k < _IN_PLANE_LOBES[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
 
 
-def _change(kind: int, *amounts: tuple[int, float]) -> Floats:
-    """Return the change (20,) of one parameter of some lobes."""
+def _parameter_direction(kind: int, *amounts: tuple[int, float]) -> Floats:
+    """Return a direction (20,) in the space of the lobe parameters: a change of one kind in some lobes.
+
+    kind : parameter that changes, such as `_POSITION`
+    amounts : index of each lobe that changes, and its component of the direction
+    """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in amounts:
         change[kind, lobe] = amount
     return change.ravel()
 
 
-def _free_changes(target: LobeTarget, column: int) -> Floats:
-    """Return the changes (20, k) that a fit may make: of lobes in the plane, then of the pair."""
+def _free_directions(target: LobeTarget, view_index: int) -> Floats:
+    """Return the directions (20, k) in parameter space along which a fit moves the lobes.
+
+    Directions of lobes in the plane come first, then those of the pair, which is symmetric unless it is in
+    the plane.
+
+    view_index : index of the view in LOBE_TABLE_COSINES
+    """
     left, right = (LOBE_COUNT - 2, 1.0), (LOBE_COUNT - 1, 1.0)
-    if column == VIEW_COUNT - 1:  # at normal incidence the lobe is isotropic, and so is the fit
+    if view_index == VIEW_COUNT - 1:  # at normal incidence the lobe is isotropic, and so is the fit
         groups, sizes = ([(0, 1.0)], [left, right]), (_LOG_WIDTH, _LOG_WEIGHT)
-        return np.stack([_change(kind, *group) for group in groups for kind in sizes], 1)
+        return np.stack([_parameter_direction(kind, *group) for group in groups for kind in sizes], 1)
     kinds = _POSITION, _LOG_WIDTH, _LOG_WEIGHT
-    in_plane = [_change(kind, (k, 1.0)) for k in range(_IN_PLANE_LOBES[column]) for kind in kinds]
+    in_plane = [
+        _parameter_direction(kind, (k, 1.0)) for k in range(_IN_PLANE_LOBES[view_index]) for kind in kinds
+    ]
     if _is_elongated(target):
-        pair = [_change(kind, one) for one in (left, right) for kind in kinds]
+        pair = [_parameter_direction(kind, one) for one in (left, right) for kind in kinds]
     else:
-        pair = [_change(kind, left, right) for kind in kinds]
-        pair += [_change(_OUT_OF_PLANE, left, (LOBE_COUNT - 1, -1.0))]
+        pair = [_parameter_direction(kind, left, right) for kind in kinds]
+        pair += [_parameter_direction(_OUT_OF_PLANE, left, (LOBE_COUNT - 1, -1.0))]
     return np.stack([*in_plane, *pair], axis=1)
 
 
 def _is_elongated(target: LobeTarget) -> bool:
-    return target.along_deviation > _ELONGATED * target.across_deviation
+    return target.along_deviation > _MIN_ELONGATION * target.across_deviation
 
 
-def _arrange_pair(start: Floats, target: LobeTarget, column: int) -> Floats:
-    """Return the start (4, 5) with the pair on both sides of the plane or in it, as the lobe requires."""
+def _arrange_pair(start: Floats, target: LobeTarget, view_index: int) -> Floats:
+    """Return initial parameters (4, 5) with the pair placed as the specular lobe requires.
+
+    It is in the plane of incidence for an elongated lobe, else on both sides of it.
+
+    start : (4, 5) parameters by kind and lobe
+    view_index : index of the view in LOBE_TABLE_COSINES
+    """
     lobes = start.copy()
     separation = lobes[_POSITION, -1] - lobes[_POSITION, -2]
     if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION:
@@ -119,36 +146,39 @@ def _arrange_pair(start: Floats, target: LobeTarget, column: int) -> Floats:
     if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE, -2]) < _PAIR_SEPARATION:
         lobes[_OUT_OF_PLANE, -2:] = _PAIR_SEPARATION, -_PAIR_SEPARATION
     lobes[_OUT_OF_PLANE, :-2] = 0.0
-    if _is_elongated(target) or column == VIEW_COUNT - 1:
+    if _is_elongated(target) or view_index == VIEW_COUNT - 1:
         lobes[_OUT_OF_PLANE] = 0.0
-    if column == VIEW_COUNT - 1:
+    if view_index == VIEW_COUNT - 1:
         lobes[_POSITION] = 0.0
     return lobes
 
 
-def _fit(target: LobeTarget, column: int, start: Floats, neighbours: Floats) -> Floats:
-    """Return the fitted parameters (4, 5), relative to the specular lobe.
+def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbours: Floats) -> Floats:
+    """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
-    They are positions, distances from the plane, logarithms of the width and of the weight.
+    The four parameters are position in the plane of incidence, distance from it, logarithm of the width, and
+    logarithm of the weight. Lengths are in standard deviations of the specular lobe.
 
-    neighbours : mean of the parameters of adjacent nodes
+    view_index : index of the view in LOBE_TABLE_COSINES
+    start : initial parameters (4, 5)
+    neighbours : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
     """
-    scale, active = harmonic_terms(target.degree)[2], _active_lobes(column)
-    free = _free_changes(target, column)
+    scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
+    free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
-    start, neighbours = (_arrange_pair(one, target, column).ravel() for one in (start, neighbours))
+    start, neighbours = (_arrange_pair(one, target, view_index).ravel() for one in (start, neighbours))
     first, mean = (free.T @ one / lengths for one in (start, neighbours))
     fixed = np.where(free.any(axis=1), 0.0, start)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
-    low, high = _bounds(target, kinds)
+    low, high = _parameter_bounds(target, kinds)
     regularisation = _REGULARISATION * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
     def reduced(vector: bytes) -> Floats:
-        """Return the QR-reduced Jacobian and residual, with 16 rows instead of 8,000."""
+        """Return Jacobian and residual at parameters, reduced by QR from about 8,000 to 16 rows."""
         x = np.frombuffer(vector)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
-        total, slopes = isotropic_sum(_lobes(parameters, target, active), target.degree)
+        total, slopes = isotropic_sum(_to_isotropic_lobes(parameters, target, active), target.degree)
         slopes[:, _POSITION] *= target.along_deviation
         slopes[:, _OUT_OF_PLANE] *= target.across_deviation
         residuals = np.append((total - target.coefficients) * scale, regularisation * (x - mean))
@@ -169,7 +199,7 @@ def _fit(target: LobeTarget, column: int, start: Floats, neighbours: Floats) -> 
     return np.asarray(fixed + free @ solution.x).reshape(4, LOBE_COUNT)
 
 
-def _bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _parameter_bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
     smoothest, roughest = np.log([SMOOTHEST, ROUGHEST]) - np.log(target.across_deviation)
     low, high = (np.full(4, side * _MAX_OFFSET) for side in (-1.0, 1.0))
     low[_OUT_OF_PLANE], high[_OUT_OF_PLANE] = 0.0, min(_MAX_OFFSET, 0.45 * np.pi / target.across_deviation)
@@ -177,7 +207,7 @@ def _bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floats, Floats
     return low[kinds], high[kinds]
 
 
-def _lobes(numbers: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
+def _to_isotropic_lobes(numbers: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
     position, out_of_plane, log_width, log_weight = numbers
     weight = np.where(active, np.exp(log_weight - log_weight[active].max()), 0.0)
     return IsotropicLobes(

@@ -1,4 +1,4 @@
-"""Tables of isotropic lobes that approximate specular lobes, for prefiltered panoramas."""
+"""Tables of isotropic lobes that approximate specular lobes, so that prefiltered panoramas can be used."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def isotropic_lobe_constants() -> dict[str, float]:
-    """Return the constants that are filled into environment.wgsl."""
+    """Return the `override` constants of environment.wgsl for the table: its sizes and roughness range."""
     return {
         "mirror_rough": ROUGHNESS_COUNT,
         "mirror_views": VIEW_COUNT,
@@ -35,17 +35,19 @@ def isotropic_lobe_constants() -> dict[str, float]:
 
 @cache
 def isotropic_lobe_table(model: str = "kelemen") -> Floats:
-    """Return the table of isotropic lobes by roughness and view (12, 16, 5, 4): x, y, roughness, weight.
+    """Return the isotropic lobes that approximate a specular lobe, by roughness and view, (12, 16, 5, 4).
+
+    The last axis is the direction (x, y), the roughness and the weight of each of five lobes.
 
     model : name in MODELS
 
-    Rows are uniform in the logarithm of the roughness from 0.05 to 1, columns in the square root of the
-    view's cosine. Directions are stereographic coordinates (x, y) about the mirror direction: the direction
-    is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the mirror
-    direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns, the
-    last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
-    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight
-    0 need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
+    The first axis is uniform in the logarithm of the roughness from 0.05 to 1, the second in the square root
+    of the view's cosine. Directions are stereographic coordinates (x, y) about the mirror direction: the
+    direction is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the
+    mirror direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns,
+    the last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
+    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight 0
+    need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = [

@@ -1,4 +1,7 @@
-"""Spherical harmonics of specular and isotropic lobes about the normal of the plane of incidence."""
+"""Spherical harmonics of specular and isotropic lobes, with the normal of the plane of incidence as pole.
+
+Lobes are symmetric about that plane, so half of the harmonics vanish. n is the number of the others.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.environment.harmonics import legendre
+from dermis.environment.harmonics import legendre_functions
 from dermis.environment.prefilter import ROUGHNESSES, isotropic_kernel
 from dermis.specular.cosines import cosines
 from dermis.specular.models import Lobe
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_DEGREES = (40, 80, 128)
+_FIT_DEGREES = (40, 80, 128)
 """Degrees up to which lobes are fitted."""
 _DEGREE_TIMES_WIDTH = 10.0  # the degree of a fit, times the lobe's deviation across the plane
 _SKY_POWER_FALLOFF = 1.0  # exponent of environment power per harmonic: 0 for lamps, 2 for smooth light
@@ -25,12 +28,13 @@ _TABLE_STEP = np.radians(0.25)  # step of the tabulated angles from the plane
 
 
 class LobeTarget(NamedTuple):
-    """Normalised specular lobe for one roughness and view angle, as a fitting target.
+    """Specular lobe of unit integral for one roughness and view angle, to which isotropic lobes are fitted.
 
-    degree : highest degree of its harmonics
-    coefficients : (n,) harmonics about the normal of the plane of incidence
+    degree : highest degree of its spherical harmonics
+    coefficients : (n,) coefficients of the harmonics of `harmonic_terms`
     mean_angle : angle between its mean direction and the surface normal [rad]
-    along_deviation, across_deviation : standard deviations in the plane [rad] and of the sine across it
+    along_deviation : standard deviation of the angle in the plane of incidence [rad]
+    across_deviation : standard deviation of the sine of the angle from the plane of incidence [-]
     """
 
     degree: int
@@ -41,12 +45,12 @@ class LobeTarget(NamedTuple):
 
 
 class IsotropicLobes(NamedTuple):
-    """Isotropic lobes, (5,) each.
+    """Five isotropic lobes, by the fields (5,) below.
 
-    angle : from the normal, in the plane of incidence [rad]
-    out_of_plane : angle from the plane of incidence [rad]
+    angle : of the direction from the normal, in the plane of incidence [rad]
+    out_of_plane : angle of the direction from the plane of incidence [rad]
     log_roughness : logarithm of the roughness
-    weight : with a sum of 1
+    weight : weights, which sum to 1
     """
 
     angle: Floats
@@ -56,9 +60,12 @@ class IsotropicLobes(NamedTuple):
 
 
 def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
-    """Return the fitting target of a lobe for a cosine of the view and a roughness.
+    """Expand a specular lobe in spherical harmonics, as a fitting target.
 
-    The quadrature covers one side of the plane of incidence; the other is symmetric.
+    cosine : of the angle between view and surface normal
+    m : roughness [-]
+
+    The quadrature covers one side of the plane of incidence, as the lobe is symmetric about it.
     """
     t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
     widest = min(10.0 * m + 0.05, 0.5 * np.pi)
@@ -74,18 +81,21 @@ def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
     weight = weight / weight.sum()
     mean_angle = np.arctan2((weight * light[..., 0]).sum(), (weight * light[..., 2]).sum())
     along, across = (float(np.sqrt((weight * x**2).sum())) for x in (a - mean_angle, light[..., 1]))
-    degree = min((one for one in _DEGREES if one > _DEGREE_TIMES_WIDTH / across), default=_DEGREES[-1])
+    degree = min(
+        (one for one in _FIT_DEGREES if one > _DEGREE_TIMES_WIDTH / across), default=_FIT_DEGREES[-1]
+    )
     around = np.exp(-1j * np.outer(np.arange(degree + 1), angles)) @ weight
     order = harmonic_terms(degree)[1]
-    coefficients = (around[order] * _node_functions(m, degree)).sum(axis=1)
+    coefficients = (around[order] * _legendre_at_nodes(m, degree)).sum(axis=1)
     return LobeTarget(degree, coefficients, float(mean_angle), along, across)
 
 
 @cache
 def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return degrees, orders and weights (n,) of the harmonics that are symmetric about the plane.
+    """Return degree, order and weight (n,) of the harmonics that are symmetric about the plane of incidence.
 
-    The weighted sum of squares is the expected squared difference under randomly rotated environments.
+    The sum of the squared, weighted differences of two lobes' coefficients is the expected squared difference
+    of their reflections of a randomly rotated environment.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T
@@ -95,16 +105,16 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
 
 
 def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
-    """Return the coefficients (n,) of a weighted sum of isotropic lobes, and their derivatives (n, 4, 5).
+    """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
-    The sum is averaged with its mirror image. The derivatives are with respect to angle, out-of-plane angle,
-    log roughness, and log weight at a constant sum of 1.
+    Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives of each lobe
+    are those by angle, out-of-plane angle, log roughness, and log weight at a constant sum of the weights.
     """
     order = harmonic_terms(degree)[1]
     azimuthal = np.exp(-1j * np.outer(np.arange(degree + 1), lobes.angle))[order]
-    polar, polar_slopes = _interpolated_functions(degree, lobes.out_of_plane)
+    polar, polar_slopes = _interpolate_legendre(degree, lobes.out_of_plane)
     factors, factor_slopes = np.stack(
-        [_layer_factors(float(m), degree) for m in lobes.log_roughness], axis=-1
+        [_layer_convolution_factors(float(m), degree) for m in lobes.log_roughness], axis=-1
     )
     terms = factors * azimuthal * polar * lobes.weight
     total = terms.sum(axis=1)  # a matrix product would start BLAS threads, which take longer
@@ -119,50 +129,64 @@ def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]
     )
 
 
-def _plane_functions(sine: Floats, degree: int) -> Floats:
-    """Return the Legendre functions (n, k) of the terms at sines (k,) of the angle from the plane."""
-    return np.concatenate([rows[::2] for rows in legendre(sine, degree, degree + 1)])
+def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
+    """Return the associated Legendre functions (n, k) of the harmonics of `harmonic_terms`.
+
+    sine : (k,) sines of the angle from the plane of incidence, which are cosines of the polar angle
+    """
+    return np.concatenate([rows[::2] for rows in legendre_functions(sine, degree, degree + 1)])
 
 
 @cache
-def _node_functions(m: float, degree: int) -> Floats:
-    """Return the Legendre functions at the quadrature nodes across a lobe."""
+def _legendre_at_nodes(m: float, degree: int) -> Floats:
+    """Return the associated Legendre functions (n, k) at the quadrature nodes across the plane of incidence.
+
+    m : roughness of the lobe, which determines how far the nodes extend
+    """
     t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
-    return _plane_functions(np.sin(min(10.0 * m + 0.05, 0.5 * np.pi) * t**2), degree)
+    return _legendre_from_plane(np.sin(min(10.0 * m + 0.05, 0.5 * np.pi) * t**2), degree)
 
 
 @cache
-def _function_table(degree: int) -> Floats:
-    """Return the Legendre functions (k, n) at angles from the plane to the pole."""
-    return _plane_functions(
+def _legendre_table(degree: int) -> Floats:
+    """Return the associated Legendre functions (k, n) at k angles from the plane of incidence to the pole."""
+    return _legendre_from_plane(
         np.sin(np.append(np.arange(0.0, 0.5 * np.pi, _TABLE_STEP), 0.5 * np.pi)), degree
     ).T.copy()
 
 
-def _interpolated_functions(degree: int, out_of_plane: Floats) -> tuple[Floats, Floats]:
-    """Return the functions (n, k) at angles from the plane (k,), and their derivatives."""
-    table, position = _function_table(degree), np.abs(out_of_plane) / _TABLE_STEP
+def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Floats]:
+    """Interpolate the associated Legendre functions to k angles; return values and derivatives, (n, k) each.
+
+    out_of_plane : (k,) angles from the plane of incidence [rad]
+    """
+    table, position = _legendre_table(degree), np.abs(out_of_plane) / _TABLE_STEP
     low = np.minimum(position.astype(int), len(table) - 2)
     step = table[low + 1] - table[low]
     value = table[low] + (position - low)[:, None] * step
     return value.T, (np.where(out_of_plane < 0.0, -1.0, 1.0)[:, None] * step / _TABLE_STEP).T
 
 
-def _layer_factors(log_roughness: float, degree: int) -> Floats:
-    """Return the factors of the terms under the shader's prefiltered lobe, and their derivatives (2, n).
+def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
+    """Return the convolution factors of a prefiltered lobe for each harmonic, and their derivatives, (2, n).
 
-    log_roughness : logarithm of the roughness; the shader interpolates between two layers
+    The factors are interpolated between two prefiltered layers, as the shader does.
+
+    log_roughness : logarithm of the roughness, by which the derivatives are taken
     """
     layers, degrees = np.log(ROUGHNESSES), harmonic_terms(degree)[0]
     step = layers[1] - layers[0]
     position = np.clip((log_roughness - layers[0]) / step, 0.0, len(layers) - 1.0)
     low = min(int(position), len(layers) - 2)
-    near, far = _layer_kernels()[low : low + 2, degrees]
+    near, far = _layer_factor_table()[low : low + 2, degrees]
     return np.stack([near + (position - low) * (far - near), (far - near) / step])
 
 
 @cache
-def _layer_kernels() -> Floats:
-    """Return the factors (layers, degrees) of the prefiltered layers, 0 above their highest degree."""
+def _layer_factor_table() -> Floats:
+    """Return the convolution factors of all prefiltered layers by degree, (layers, degrees).
+
+    They are 0 above the highest degree of the layers.
+    """
     kernels = np.stack([isotropic_kernel(float(m)) for m in ROUGHNESSES])
-    return np.pad(kernels, ((0, 0), (0, max(_DEGREES[-1] + 1 - kernels.shape[1], 0))))
+    return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

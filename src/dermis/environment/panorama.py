@@ -1,4 +1,4 @@
-"""Latitude-longitude panoramas of distant light, and extraction of their sun-like peaks."""
+"""Latitude-longitude panoramas of distant light, and extraction of their suns."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _MIN_SUN_FRACTION = 0.05  # of the irradiance of the mean radiance
 
 
 def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
-    """Load a panorama of radiance (h, w, 3), linear Rec. 709; centre -Z, right +X, top +Y.
+    """Load a panorama of radiance (h, 2 h, 3), linear Rec. 709, with -Z at the centre, +X right and +Y up.
 
     name : a sample, a file (.hdr, .exr), or "uniform"
-    max_rows : maximum number of rows; larger pictures are averaged
+    max_rows : largest h; larger pictures are reduced by averaging
 
     Raises DermisError for any other name, and for a picture without radiance.
     """
@@ -75,7 +75,7 @@ def mean_radiance(radiance: Floats) -> Floats:
 
 
 def resample(radiance: NDArray[np.floating], height: int) -> Floats:
-    """Return a panorama of another size (height, 2 height, 3), averaged over texel solid angles."""
+    """Resample a panorama to (height, 2 height, 3) by averaging over the solid angle of each new texel."""
     rows, columns = radiance.shape[:2]
     edges, target_edges = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
     upright = _interval_means(radiance, edges, target_edges)
@@ -84,7 +84,12 @@ def resample(radiance: NDArray[np.floating], height: int) -> Floats:
 
 
 def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
-    """Return means over target intervals of values that are constant between edges, on the first axis."""
+    """Return means of a piecewise constant function over other intervals, along the first axis.
+
+    values : (n, ...) of the function between consecutive edges
+    edges : (n + 1,) increasing
+    target_edges : (k + 1,) edges of the intervals over which the k means are taken
+    """
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
     after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(values))
     means = np.empty((len(first), *values.shape[1:]))
@@ -95,7 +100,9 @@ def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: F
 
 
 def panorama_file(name: str) -> Path | None:
-    """Return the path of a panorama; None for the uniform one.
+    """Return the path of a panorama's picture, downloading a sample if necessary; None for "uniform".
+
+    name : see `load_panorama`
 
     Raises DermisError for an unknown name.
     """
@@ -120,10 +127,10 @@ def _sample_names() -> list[str]:
 
 @dataclass(frozen=True)
 class Sun:
-    """Peak of a panorama as a directional light.
+    """Bright peak of a panorama, rendered as a directional light.
 
-    direction : (3,) unit vector towards it
-    irradiance : (3,) on a surface that faces it, linear Rec. 709
+    direction : (3,) unit vector towards the sun
+    irradiance : (3,) on a surface that faces the sun, linear Rec. 709
     radius : angular radius [rad]
     """
 
@@ -133,12 +140,14 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """Return the panorama without its peaks, and the peaks, strongest first; their sum conserves energy.
+    """Split a panorama into suns and the remaining panorama; together they have the light of the original.
+
+    Suns are sorted by irradiance, the strongest first.
 
     radiance : (h, w, 3)
 
-    A peak is the radiance above 32 times the mean within 8 degrees of the centre of a bright cluster. At most
-    four peaks are extracted, each with at least a twentieth of the irradiance of the mean radiance. This is a
+    A sun is the radiance above 32 times the mean, within 8 degrees of the centre of a bright cluster. At most
+    four suns are extracted, each with at least a twentieth of the irradiance of the mean radiance. This is a
     simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
@@ -149,7 +158,7 @@ def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
     kept_fraction = _PEAK_FACTOR * mean / brightness[above]
     light = radiance[above] * ((1.0 - kept_fraction) * weight)[:, None]
     remaining, suns = np.ones(len(kept_fraction)), list[Sun]()
-    clusters = _clusters(brightness[above], towards, weight)
+    clusters = _bright_clusters(brightness[above], towards, weight)
     for inside in sorted(clusters, key=lambda cluster: -_luminance_sum(light[cluster])):
         if len(suns) == MAX_SUNS or _luminance_sum(light[inside]) < _MIN_SUN_FRACTION * np.pi * mean:
             break
@@ -165,15 +174,25 @@ def _luminance_sum(light: Floats) -> float:
 
 
 def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
-    """Return the light of a peak's texels (n, 3), a uniform disc with the same mean square radiance."""
+    """Return the sun for a cluster of n texels: a uniform disc with equal mean square radiance.
+
+    light : (n, 3) radiance of each texel times its solid angle
+    towards : (n, 3) unit vectors to the texels
+    weight : (n,) solid angles [sr]
+    """
     grey = np.asarray(luminance(light), np.float64)
     centre = grey @ towards
     solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
     return Sun(centre / np.linalg.norm(centre), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
 
 
-def _clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Return masks of bright texels (n,) for each peak, in order of brightness."""
+def _bright_clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
+    """Group n bright texels into clusters; return the mask (n,) of each, from the brightest peak on.
+
+    brightness : (n,) luminance
+    towards : (n, 3) unit vectors to the texels
+    weight : (n,) solid angles [sr]
+    """
     near = np.cos(np.radians(_CLUSTER_DEGREES))
     remaining = np.ones(len(brightness), bool)
     clusters = []

@@ -1,4 +1,4 @@
-"""Prefiltering of a panorama: irradiance by normal, and reflections by roughness."""
+"""Prefiltering of a panorama: irradiance by normal, and reflected radiance by roughness."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.progress import logged_step
-from dermis.environment.harmonics import analyse, synthesise, zonal
+from dermis.environment.harmonics import analyse_panorama, synthesise_panoramas, zonal_factors
 from dermis.environment.panorama import Sun, load_panorama, split_suns
 from dermis.specular.beckmann import beckmann
 
@@ -16,18 +16,18 @@ Floats = NDArray[np.float64]
 SMOOTHEST, ROUGHEST = 0.018, 1.0
 ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
 """Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
-HEIGHT = 192
+LAYER_HEIGHT = 192
 _DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
 def isotropic_lobe(theta: Floats, m: float) -> Floats:
-    """Return the weight of light at an angle from the mirror direction, viewed along the normal.
+    """Return the weight of radiance at an angle from the mirror direction, for a view along the normal.
 
-    theta : [rad], 0 to pi / 2
+    theta : angle from the mirror direction [rad], 0 to pi / 2
     m : roughness [-]
 
-    It is the Kelemen lobe with n = v = r [Karis2013], up to a constant factor: the half vector is at theta /
-    2, and h.h is 4 cos^2(theta / 2).
+    This is the Kelemen lobe with n = v = r, normal, view and mirror direction [Karis2013], up to a constant
+    factor: the angle of the half vector is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
@@ -35,7 +35,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Return the constants that are filled into environment.wgsl."""
+    """Return the `override` constants of environment.wgsl for reflection layers: number and roughnesses."""
     return {
         "reflections": len(ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
@@ -45,7 +45,7 @@ def reflection_constants() -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """Prefiltered panorama.
+    """Panorama convolved with a cosine and with lobes of several roughnesses, for lookups by the shader.
 
     layers : (14, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction for each
         roughness
@@ -58,23 +58,26 @@ class Prefiltered:
 
 @logged_step("filtering the environment")
 def prefilter(name: str) -> Prefiltered:
-    """Return the prefiltered layers and the suns of a panorama.
+    """Load a panorama, split off its suns, and convolve the remainder with isotropic kernels.
 
     name : see `load_panorama`
 
-    Each layer is the exact convolution with an isotropic kernel in spherical harmonics up to degree 160, so
-    there is no noise from sampling.
+    Convolution is exact multiplication of spherical harmonics up to degree 160, so there is no noise from
+    sampling.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
     """
     radiance, suns = split_suns(load_panorama(name))
-    coefficients = analyse(radiance, _DEGREE)
-    kernels = [zonal(np.cos, _DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
-    layers = synthesise(coefficients, np.stack(kernels), HEIGHT)
+    coefficients = analyse_panorama(radiance, _DEGREE)
+    kernels = [zonal_factors(np.cos, _DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
+    layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
 def isotropic_kernel(m: float) -> Floats:
-    """Return the factors (161,) of the isotropic lobe of roughness m, normalised over the sphere."""
-    factors = zonal(lambda theta: isotropic_lobe(theta, m), _DEGREE)
+    """Return the convolution factors (161,) by degree of the isotropic lobe of roughness m.
+
+    The lobe is normalised to unit integral.
+    """
+    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _DEGREE)
     return np.asarray(factors / factors[0])
