@@ -6,10 +6,10 @@ import os
 
 import pytest
 from observed import observed
-from tolerances import HALVES, TWIN
+from tolerances import HALF_FORMAT, TWIN
 
 from dermis.frame.observation import Observation
-from dermis.frame.programs import FLOATS, level_format
+from dermis.frame.programs import FLOAT_FORMAT, level_format
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 
@@ -22,7 +22,7 @@ def renderer() -> Renderer:
 @pytest.fixture(scope="session")
 def close(device: Device) -> float:
     """Return the tolerance of light after blurs against its reference, relative."""
-    return TWIN if level_format(device) == FLOATS else HALVES
+    return TWIN if level_format(device) == FLOAT_FORMAT else HALF_FORMAT
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion.kernels import add_intermediate_levels, chain_cost
 from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
-from dermis.frame.programs import FLOATS
+from dermis.frame.programs import FLOAT_FORMAT
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
@@ -58,7 +58,10 @@ def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm
     weight = np.zeros((len(led), 3))
     weight[-1] = 1.0
     blur = Blur(led, weight, halvings, intermediate_levels=steps)
-    space, into = make_levels(device, 256, (halvings,), FLOATS), make_texture(device, (256, 256), FLOATS)
+    space, into = (
+        make_levels(device, 256, (halvings,), FLOAT_FORMAT),
+        make_texture(device, (256, 256), FLOAT_FORMAT),
+    )
     upload(device, space.stacks[0], np.dstack([source, np.ones((256, 256))]))
     frame = CommandList(device)
     diffuse.draw(frame, space, textures, blur)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.frame.features.post.meter import CLIPPING, KEY, MIN_HIGHLIGHT_FACTOR, SIDE
+from dermis.frame.features.post.meter import MAX_CLIPPED_FRACTION, METER_KEY, METER_SIDE, MIN_HIGHLIGHT_FACTOR
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -31,16 +31,16 @@ def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
     meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.post.meter
     assert meter is not None
     raw = np.frombuffer(renderer.device.handle.queue.read_buffer(meter.points), np.float32)
-    found = raw.reshape(SIDE * SIDE, 2).astype(float)
+    found = raw.reshape(METER_SIDE * METER_SIDE, 2).astype(float)
     return found[found[:, 0] >= 0]
 
 
 def test_a_lit_plane_is_exposed_for_the_key(renderer: Renderer) -> None:
     """Irradiance 3 makes a white surface 3 / pi, which the exposure brings to the key."""
     scene = scene_of(FLAT, frontal(3.0), **DULL)
-    assert metered(renderer, scene) == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
+    assert metered(renderer, scene) == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
     assert metered(renderer, scene_of(FLAT, frontal(30.0), **DULL)) == pytest.approx(
-        KEY * np.pi / 30, rel=1e-5
+        METER_KEY * np.pi / 30, rel=1e-5
     )
     assert metered(renderer, scene, exposure=0.4) == pytest.approx(0.4)
 
@@ -50,9 +50,9 @@ def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> 
     scene = scene_of(ball, frontal(np.pi), camera=front_camera(ball, frame_mm=80.0), **DULL)
     found = metered(renderer, scene)
     light = points(renderer, scene)[:, 0]
-    assert 500 < len(light) < SIDE * SIDE and light.std() > 0.1
-    assert found == pytest.approx(KEY / np.sqrt((light**2).mean()), rel=1e-4)
-    assert found == pytest.approx(KEY * np.sqrt(2.0), rel=0.05)  # the cosine's mean square over a disc is 1/2
+    assert 500 < len(light) < METER_SIDE * METER_SIDE and light.std() > 0.1
+    assert found == pytest.approx(METER_KEY / np.sqrt((light**2).mean()), rel=1e-4)
+    assert found == pytest.approx(METER_KEY * np.sqrt(2.0), rel=0.05)  # the mean square cosine is 1/2
 
 
 @pytest.mark.parametrize("technique", TECHNIQUES)
@@ -63,12 +63,12 @@ def test_it_is_an_incident_meter(renderer: Renderer, technique: str) -> None:
         metered(renderer, scene_of(head, frontal(3.0), **DULL), technique=technique) for head in (FLAT, dark)
     ]
     assert both[0] == pytest.approx(both[1], rel=1e-6)
-    assert both[0] == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
+    assert both[0] == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
 
 
 def test_surroundings_count_as_the_light_that_falls_in(renderer: Renderer) -> None:
     scene = Scene(FLAT, (), front_camera(FLAT), environment=Environment(name="uniform", exposure=4.0))
-    assert metered(renderer, scene, occlusion="none") == pytest.approx(KEY / 4.0, rel=HALVES)
+    assert metered(renderer, scene, occlusion="none") == pytest.approx(METER_KEY / 4.0, rel=HALVES)
 
 
 def glossy(irradiance: float, share: float) -> Scene:
@@ -81,10 +81,10 @@ def glossy(irradiance: float, share: float) -> Scene:
 
 def test_highlights_stop_it_down_by_one_stop_at_most(renderer: Renderer) -> None:
     for irradiance in (1.0, 9.0):
-        usual, scene = KEY * np.pi / irradiance, glossy(irradiance, 0.2)
+        usual, scene = METER_KEY * np.pi / irradiance, glossy(irradiance, 0.2)
         found = metered(renderer, scene, technique="none")
         bright = np.sort(points(renderer, scene)[:, 1])[::-1]
-        limit = 1.0 / bright[int(CLIPPING * len(bright))]
+        limit = 1.0 / bright[int(MAX_CLIPPED_FRACTION * len(bright))]
         assert limit < usual
         assert found == pytest.approx(max(limit, MIN_HIGHLIGHT_FACTOR * usual), rel=1e-3)
 
@@ -98,8 +98,8 @@ def test_only_skin_is_metered(renderer: Renderer) -> None:
     for name, head in (("both", both), ("plain", head_of(joined(*parts, kinds=["opaque"] * 2)))):
         scene = scene_of(head, frontal(3.0), **DULL)
         count[name] = metered(renderer, scene), len(points(renderer, scene))
-    assert count["both"][0] == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
-    assert 0.1 < count["both"][1] / SIDE**2 < 0.6
+    assert count["both"][0] == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
+    assert 0.1 < count["both"][1] / METER_SIDE**2 < 0.6
     assert count["plain"] == (1.0, 0)
 
 

@@ -17,7 +17,7 @@ from twins import surface
 from dermis.atlas.build import cached_atlas
 from dermis.frame.features.occlusion import moving as moving_occlusion
 from dermis.frame.features.occlusion.baked import bake_occlusion
-from dermis.frame.features.occlusion.moving import SIDE as MAP_SIDE
+from dermis.frame.features.occlusion.moving import DEPTH_MAP_SIDE as MAP_SIDE
 from dermis.frame.features.occlusion.moving import head_rotation, make_anchors, sky_views
 from dermis.frame.features.visibility.layers import make_layers
 from dermis.frame.renderer import Renderer

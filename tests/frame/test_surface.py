@@ -13,7 +13,7 @@ from setups import front_camera, head_of, run_frame, scene_of
 from tolerances import TWIN
 
 from dermis.frame.features.surface import record as surface
-from dermis.frame.programs import FEATURES, shader_folders
+from dermis.frame.programs import FEATURES_FOLDER, shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, download
 from dermis.mesh.primitives import plane
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
 COLOUR = np.array([0.5, 0.25, 0.75])
 PATCH = head_of(plane(100.0), colour=np.broadcast_to(COLOUR, (8, 8, 3)))
-SURFACE = FEATURES / "surface/surface.wgsl"
+SURFACE = FEATURES_FOLDER / "surface/surface.wgsl"
 PROFILE = GaussianSum("white", np.array([1.0]), np.ones((1, 3)))
 LIGHT = DirectionalLight(direction=(0.6, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
 

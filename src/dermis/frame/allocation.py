@@ -10,9 +10,12 @@ from dermis.frame.features import diffusion, hair, outputs, post, shape
 from dermis.frame.features.atlas.gutters import GutterTracing, make_gutter_tracing, with_own_gutters
 from dermis.frame.features.atlas.lit_atlas import GutterUpdate
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
-from dermis.frame.features.hair.resources import no_strand_shadows
-from dermis.frame.features.interreflection.interreflection import make_interreflection, no_interreflection
-from dermis.frame.features.occlusion.baked import no_occlusion, occlusion_map
+from dermis.frame.features.hair.resources import placeholder_strand_shadows
+from dermis.frame.features.interreflection.interreflection import (
+    make_interreflection,
+    placeholder_interreflection,
+)
+from dermis.frame.features.occlusion.baked import occlusion_map, placeholder_occlusion
 from dermis.frame.features.occlusion.moving import VertexSky, make_moving_map, make_vertex_sky
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import view_record
@@ -143,7 +146,7 @@ def _shared_bindings(
         "environment": environment_record(program, environment, skin, total, request.has_occlusion),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
-        "strand_shadows": strands.shadows if strands else no_strand_shadows(device),
+        "strand_shadows": strands.shadows if strands else placeholder_strand_shadows(device),
         "curvatures": curvature.smoothed if curvature else placeholder_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": request.environment_map.panorama,
@@ -195,7 +198,7 @@ def _make_layout(
         inputs = bindings, textures.resources["atlas"]
         occlusion = cached(occlusion_map, device, head, atlas, untracked=inputs, owner=number)
     else:
-        occlusion = no_occlusion(device)
+        occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
         occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=number)
@@ -210,7 +213,7 @@ def _make_layout(
         light = request.split.total, request.has_occlusion, request.light_key
         interreflection = make_interreflection(memo, device, head, atlas, *light, owner=number)
     bindings["from_skin"] = (
-        interreflection.buffers.from_skin if interreflection else no_interreflection(device)
+        interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
     )
     side = settings.atlas if request.blur_count else 1
     surfaces = cached(make_surface_texture, device, side, owner=number)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.atlas.raster import rasterise, texel_corners
 from dermis.base.errors import DermisError
 from dermis.frame.features.shading import bake as baking_pass
-from dermis.frame.features.shading.bake import CHANNELS, COUNT
+from dermis.frame.features.shading.bake import CHANNEL_COUNT, CHANNELS
 from dermis.frame.features.shape import curvature
 from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.inputs import FrameInputs
@@ -142,7 +142,7 @@ def _bake_points(
     points: NDArray[np.uint32],
     side: int,
 ) -> Floats:
-    """Render a frame to light the atlas, and return the (n, COUNT) shading channels at surface points.
+    """Light the atlas by a frame, and return the (n, CHANNEL_COUNT) shading channels at points.
 
     outputs : names of outputs whose resources bake.wgsl needs
     points : (n, 4) surface points, packed by `features.shading.bake.point_words`
@@ -152,7 +152,7 @@ def _bake_points(
     inputs = renderer.prepare(scene, settings, "", outputs)
     bindings, output_resources = _bake_bindings(renderer, inputs, scene), inputs.resources.outputs
     pigments = output_resources.light.pigments if output_resources and "melanin" in outputs else (0.0, 0.0)
-    values = np.empty((len(points), COUNT), np.float32)
+    values = np.empty((len(points), CHANNEL_COUNT), np.float32)
     for start in range(0, len(points), _POINTS_PER_PASS):
         part = slice(start, start + _POINTS_PER_PASS)
         options = bindings, points[part], 1.0 / side, pigments
@@ -169,7 +169,7 @@ def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> Mut
     curvature.draw(frame, resources.head, skin_curvature)
     frame.submit()
     measured = resources.outputs.light.thickness if resources.outputs else None
-    thickness = baking_pass.no_thickness(device) if measured is None else measured
+    thickness = baking_pass.placeholder_thickness(device) if measured is None else measured
     own: MutableBindings = {"curvatures": skin_curvature.smoothed, "thickness_map": thickness}
     return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **own}
 
@@ -178,7 +178,7 @@ def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[s
     """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
 
     texel : (n,) indices of the skin texels, row by row
-    values : (n, COUNT) shading channels of these texels
+    values : (n, CHANNEL_COUNT) shading channels of these texels
     """
     covered = np.zeros(side * side, np.bool_)
     covered[texel] = True

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.features.diffusion.mixture import sum_count
+from dermis.frame.features.diffusion.mixture import sum_layer_count
 from dermis.frame.features.shadows.shadows import SHADOW_BYTES
 from dermis.frame.features.surface.texels import SURFACE_BYTES
 from dermis.frame.request import FrameRequest
@@ -104,7 +104,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
 def _mixing_bytes(request: FrameRequest) -> float:
     """Return the memory per atlas texel that a blend of several profiles adds [bytes]."""
     others = len(request.other_profiles)
-    maps = len(request.atlas_plan.layouts) + sum_count(others)
+    maps = len(request.atlas_plan.layouts) + sum_layer_count(others)
     return others * request.technique.texel_bytes(request.blur_count) + _TEXEL_BYTES * maps if others else 0.0
 
 

@@ -20,14 +20,14 @@ from dermis.gpu.wgsl_source import Folder, Member, ShaderFolder
 from dermis.scene.outputs import OUTPUTS
 from dermis.specular.models import MODELS
 
-FLOATS = "rgba32float"
+FLOAT_FORMAT = "rgba32float"
 """Texture format of light in full precision."""
-HALVES = "rgba16float"
+HALF_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
-FRAME = Path(__file__).parent
-FEATURES = FRAME / "features"
+FRAME_FOLDER = Path(__file__).parent
+FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Root of shader paths such as "shading/shade.wgsl"."""
-SPECULAR = Path(str(specular.__file__)).parent
+SPECULAR_FOLDER = Path(str(specular.__file__)).parent
 TILE = 16
 """Side of the workgroups of short shaders; smaller ones end before a GPU has started the next."""
 WORKGROUP_SIZE = 64
@@ -64,13 +64,13 @@ def shader_folders(*options: str) -> tuple[Folder, ...]:
     for feature in _features():
         numbers |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
-    shared = ShaderFolder(FEATURES, lists, lambda: numbers, frozenset(options))
-    return (shared, FRAME / "wgsl", FRAME / "techniques", SPECULAR)
+    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: numbers, frozenset(options))
+    return (shared, FRAME_FOLDER / "wgsl", FRAME_FOLDER / "techniques", SPECULAR_FOLDER)
 
 
 @cache
 def _features() -> tuple[ModuleType, ...]:
-    names = sorted(one.name for one in pkgutil.iter_modules([str(FEATURES)]))
+    names = sorted(one.name for one in pkgutil.iter_modules([str(FEATURES_FOLDER)]))
     return tuple(import_module(f"dermis.frame.features.{name}") for name in names)
 
 
@@ -78,8 +78,8 @@ def program(
     device: Device,
     path: str | Path,
     constants: Constants = (),
-    source: str = FLOATS,
-    store: str = FLOATS,
+    source: str = FLOAT_FORMAT,
+    store: str = FLOAT_FORMAT,
     labels: bool = False,
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
@@ -94,7 +94,7 @@ def program(
     active = shader_options(source, store, labels)
 
     def compile_program() -> ComputeProgram:
-        file, folders = FEATURES / path, shader_folders(*active)
+        file, folders = FEATURES_FOLDER / path, shader_folders(*active)
         return ComputeProgram(device, file, folders, program_constants(device, file, folders, constants))
 
     return cached_program(device, (path, active, registry_version()), constants, compile_program)
@@ -102,7 +102,11 @@ def program(
 
 def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
-    values = {"FILTERED_SOURCE": source == HALVES, "STORED_HALVES": store == HALVES, "HAIR_LABELS": labels}
+    values = {
+        "FILTERED_SOURCE": source == HALF_FORMAT,
+        "STORED_HALVES": store == HALF_FORMAT,
+        "HAIR_LABELS": labels,
+    }
     return tuple(name for name, value in values.items() if value)
 
 
@@ -154,7 +158,7 @@ def strip_constants(device: Device, samples: int) -> Constants:
 
 def level_format(device: Device) -> str:
     """Return the faster texture format of pyramid levels: half floats on GPUs, floats in software."""
-    return FLOATS if device.adapter.kind == "CPU" else HALVES
+    return FLOAT_FORMAT if device.adapter.kind == "CPU" else HALF_FORMAT
 
 
 def warm_up(device: Device) -> None:

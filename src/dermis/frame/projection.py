@@ -86,11 +86,11 @@ def view_axes(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
     For single vectors this is faster than NumPy. A horizontal axis is chosen where `up` is parallel to
     `forward`.
     """
-    f = normalised(forward)
+    f = unit_vector(forward)
     r = _cross(f, up)
     if math.hypot(*r) <= 1e-6 * math.hypot(*up):
         r = _cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.9 else (0.0, 0.0, 1.0))
-    r = normalised(r)
+    r = unit_vector(r)
     return r, _cross(r, f), f
 
 
@@ -108,7 +108,7 @@ def vector_between(start: Sequence[float], end: Sequence[float]) -> Triple:
     return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
 
-def normalised(v: Sequence[float]) -> Triple:
+def unit_vector(v: Sequence[float]) -> Triple:
     """Return a vector scaled to unit length."""
     x, y, z = v
     length = math.hypot(x, y, z)

@@ -16,9 +16,9 @@ from dermis.frame.lights.kind import KINDS, Members, override_name
 from dermis.frame.projection import (
     ShadowView,
     Triple,
-    normalised,
     parallel_shadow_view,
     point_shadow_views,
+    unit_vector,
     vector_between,
     world_position,
 )
@@ -170,7 +170,7 @@ def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblin
         "punctual": kind.punctual,
         "sheet": kind.sheet,
         "irradiance": light.irradiance,
-        "direction": normalised(along),
+        "direction": unit_vector(along),
         "position": position,
         "reference_mm": distance,
         "texel": texel if view else 0.0,

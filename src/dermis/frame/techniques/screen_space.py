@@ -29,7 +29,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.camera import Window
 from dermis.scene.settings import Settings
 
-FOLDER = Path(__file__).parent
+TECHNIQUES_FOLDER = Path(__file__).parent
 _MAX_TAIL = (
     5e-4  # largest fraction of the light of a channel that may lie beyond the kernel's reach on one side
 )
@@ -151,7 +151,7 @@ def draw(
         "transmittance": layers.transmittance,
         "picture": layers.result,
     }
-    shader = program(graph.device, FOLDER / "resurface.wgsl")
+    shader = program(graph.device, TECHNIQUES_FOLDER / "resurface.wgsl")
     graph.compute("screen space", shader, bound, surface.size[:2])
     return layers.result
 
@@ -162,7 +162,9 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
     window : rectangle of the image plane that the picture shows
     """
     device, size = graph.device, layers.scratch.size[:2]
-    programs = [program(device, FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
+    programs = [
+        program(device, TECHNIQUES_FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)
+    ]
     record = programs[0].record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
     passes: tuple[tuple[TextureOrView, TextureOrView], ...] = (
         (layers.subsurface, layers.scratch),

@@ -25,7 +25,7 @@ from dermis.frame.features.surface import texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import FrameInputs
-from dermis.frame.programs import FLOATS, level_format
+from dermis.frame.programs import FLOAT_FORMAT, level_format
 from dermis.frame.technique import ProfileSplit, TechniqueResources, TechniqueTraits, channel_weights
 from dermis.gpu import ComputeProgram, Device, Graph, Memo, Recorder, Texture, TextureOrView, UniformRecord
 from dermis.gpu.textures import FORMAT_BYTES
@@ -54,7 +54,7 @@ class Technique(TechniqueTraits):
         side : side of the atlas [texels]
         halvings : how often the resolution of each level is halved, for each layout
         """
-        return make_levels(device, side, halvings, FLOATS)
+        return make_levels(device, side, halvings, FLOAT_FORMAT)
 
     def make_sum(self, device: Device, side: int) -> Texture:
         """Create the texture for the exitance of scattered light, side x side texels."""
@@ -162,7 +162,7 @@ class AtlasTechnique(Technique):
     def texel_bytes(self, levels: int) -> float:
         """Return the peak memory per atlas texel on a software adapter, with temporary textures [bytes]."""
         mips = sum(0.25**halving for halving in range(MAX_HALVINGS + 1))
-        return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # upper bound, as if no level were halved
+        return FORMAT_BYTES[FLOAT_FORMAT] * (levels + 2 * mips)  # upper bound, as if no level were halved
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """Return how often the resolution of each level is halved, starting with the unblurred level.

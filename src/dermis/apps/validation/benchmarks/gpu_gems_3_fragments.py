@@ -8,12 +8,18 @@ import numpy as np
 
 from dermis.frame.features.atlas import passes as atlas_passes
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
-from dermis.frame.features.diffusion.combine import no_light
+from dermis.frame.features.diffusion.combine import placeholder_light
 from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.inputs import FrameInputs
-from dermis.frame.programs import FLOATS, HALVES, program_constants, registry_version, shader_folders
+from dermis.frame.programs import (
+    FLOAT_FORMAT,
+    HALF_FORMAT,
+    program_constants,
+    registry_version,
+    shader_folders,
+)
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, StretchedLevels, TexturePair
 from dermis.gpu import (
     ComputeProgram,
@@ -42,14 +48,14 @@ class FragmentPasses(GpuGems3):
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Return textures for the irradiance and the blurred levels, all in half precision."""
         count = max(map(len, halvings))
-        stack = make_texture(device, (side, side), HALVES, layers=count, use="raster")
-        scratch, *stretch = (make_texture(device, (side, side), HALVES, use="raster") for _ in range(3))
+        stack = make_texture(device, (side, side), HALF_FORMAT, layers=count, use="raster")
+        scratch, *stretch = (make_texture(device, (side, side), HALF_FORMAT, use="raster") for _ in range(3))
         first, second = (texture.create_view() for texture in stretch)
-        return StretchedLevels((stack,), (0,), scratch, side, HALVES, stretch=(first, second))
+        return StretchedLevels((stack,), (0,), scratch, side, HALF_FORMAT, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Texture:
         """Return the texture of the sum."""
-        return make_texture(device, (side, side), FLOATS, use="raster")
+        return make_texture(device, (side, side), FLOAT_FORMAT, use="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Light the atlas, blur the light and sum the levels."""
@@ -72,7 +78,7 @@ class FragmentPasses(GpuGems3):
 
     def blur_program(self, device: Device, constants: Constants) -> RenderProgram:
         """Return the program of the pass along one axis."""
-        return _fragment_program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
+        return _fragment_program(device, "gpu_gems_3_fragment.wgsl", constants, [HALF_FORMAT, HALF_FORMAT])
 
     def draw_blur(
         self,
@@ -89,7 +95,7 @@ class FragmentPasses(GpuGems3):
     def _light(
         self, graph: Graph, layout: LitAtlas, constants: Constants, target: TextureOrView, scale: float
     ) -> None:
-        shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
+        shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_FORMAT])
         entering = shader.record("Entering", scale=scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
         graph.fill("irradiance", shader, bound, [target])
@@ -103,7 +109,7 @@ class FragmentPasses(GpuGems3):
         transmitted: Texture | None,
         lost: Texture | None,
     ) -> None:
-        shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
+        shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOAT_FORMAT])
         padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
@@ -111,8 +117,8 @@ class FragmentPasses(GpuGems3):
         bound: MutableBindings = {
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
-            "transmitted": no_light(graph.device) if transmitted is None else transmitted,
-            "lost": no_light(graph.device) if lost is None else lost,
+            "transmitted": placeholder_light(graph.device) if transmitted is None else transmitted,
+            "lost": placeholder_light(graph.device) if lost is None else lost,
         }
         graph.fill("combine", shader, bound, [target])
 

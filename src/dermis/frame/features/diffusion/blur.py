@@ -23,7 +23,7 @@ from dermis.frame.programs import TILE, program
 from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
 from dermis.gpu.textures import texture_from_array
 
-EDGES = ("repeated", "cleared", "skipped")
+EDGE_MODES = ("repeated", "cleared", "skipped")
 # Variance that halving the resolution adds: averaging four texels, and interpolating the means [texel^2].
 _AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
@@ -80,7 +80,7 @@ def _axis_program(device: Device, texel: str, axis: int, sheared: bool, edge: st
     edge : filter mode at the edges of charts
     """
     table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
-    constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGES.index(edge)))
+    constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGE_MODES.index(edge)))
     return program(device, "diffusion/diffuse.wgsl", constants, texel, texel)
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.programs import FLOATS, TILE, program
+from dermis.frame.programs import FLOAT_FORMAT, TILE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureOrView, make_texture
 from dermis.optics.gaussians import MAX_GAUSSIANS
 
 
 def make_sum(device: Device, side: int) -> Texture:
     """Allocate the texture for the weighted sum of blurred levels, side x side texels."""
-    return make_texture(device, (side, side), FLOATS, name="sum of blurred light")
+    return make_texture(device, (side, side), FLOAT_FORMAT, name="sum of blurred light")
 
 
 def draw(
@@ -41,7 +41,7 @@ def draw(
             ("THIN", lost is not None),
         )
         texel = levels.texel
-        shader = program(device, "diffusion/combine.wgsl", constants, texel, texel if mip else FLOATS)
+        shader = program(device, "diffusion/combine.wgsl", constants, texel, texel if mip else FLOAT_FORMAT)
         first, count = halvings.index(mip), halvings.count(mip)
         weight = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         weight[:count, :3] = blur.weight[first : first + count]
@@ -55,14 +55,14 @@ def draw(
             "weights": shader.record("Weights", **layers, **scales),
             "levels": levels.stacks[mip],
             "source": levels.scratch_view(mip + 1) if mip < coarsest else levels.layer(0),
-            "transmitted": no_light(device) if added is None else added,
-            "lost": no_light(device) if lost is None else lost,
+            "transmitted": placeholder_light(device) if added is None else added,
+            "lost": placeholder_light(device) if lost is None else lost,
             "linear": device.sampler(mag_filter="linear", min_filter="linear"),
             "stored": levels.scratch_view(mip) if mip else target,
         }
         graph.compute("combine", shader, bindings, (levels.size >> mip,) * 2, TILE)
 
 
-def no_light(device: Device) -> Texture:
+def placeholder_light(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for a texture of light that the shader does not read."""
     return device.cached("no light", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))

@@ -15,7 +15,7 @@ from dermis.formats.maps import mixture_map
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.diffusion.pyramid import PyramidLevels
-from dermis.frame.programs import FLOATS, HALVES, TILE, program
+from dermis.frame.programs import FLOAT_FORMAT, HALF_FORMAT, TILE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
 from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
@@ -60,12 +60,12 @@ def make_mixture(
     atlas_weights = tuple(
         make_texture(device, (side, side), texel, name="shares of profiles") for _ in range(layouts)
     )
-    layers = sum_count(len(entering))
-    sums = make_texture(device, (side, side), FLOATS, layers=layers, name="light of mixed profiles")
+    layers = sum_layer_count(len(entering))
+    sums = make_texture(device, (side, side), FLOAT_FORMAT, layers=layers, name="light of mixed profiles")
     return Mixture(uv_weights, entering, atlas_weights, sums)
 
 
-def sum_count(others: int) -> int:
+def sum_layer_count(others: int) -> int:
     """Return the number of layers of `Mixture.sums`.
 
     others : number of profiles besides the first
@@ -77,7 +77,7 @@ def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Textur
     """Upload the (h, w, 2) blend weights of two profiles as a texture with all its mip levels."""
     height, width = weights.shape[:2]
     mips = mip_chain(np.pad(weights, ((0, 0), (0, 0), (0, 2))))
-    texture = make_texture(device, (width, height), HALVES, mips=len(mips), use="map")
+    texture = make_texture(device, (width, height), HALF_FORMAT, mips=len(mips), use="map")
     for mip, pixels in enumerate(mips):
         upload(device, texture, pixels, mip=mip)
     return texture

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import FLOATS
+from dermis.frame.programs import FLOAT_FORMAT
 from dermis.gpu import Device, Texture, TextureView, make_texture, mark_scratch
 from dermis.gpu.textures import make_view
 
@@ -124,7 +124,7 @@ def half_precision_scale(texel: str, brightest: float) -> float:
 
     The factor is a power of two, so that scaling is exact.
     """
-    if texel == FLOATS or brightest == 0.0:
+    if texel == FLOAT_FORMAT or brightest == 0.0:
         return 1.0
     return math.ldexp(0.5, math.frexp(min(_TARGET_IRRADIANCE / brightest, _MAX_SCALE))[1])
 

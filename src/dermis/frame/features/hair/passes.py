@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.frame.features.hair.resources import TILE, WINDOW_KNOTS, Resources, StrandTables, drawn_hair_count
+from dermis.frame.features.hair.resources import (
+    TILE_PIXELS,
+    WINDOW_KNOTS,
+    Resources,
+    StrandTables,
+    drawn_hair_count,
+)
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
 from dermis.frame.programs import program, workgroup_grid
@@ -145,7 +151,7 @@ def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) 
     segments : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
-    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE * pixel_mm)) ** 2)
+    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_PIXELS * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()
     return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segments - fine))
 

@@ -17,7 +17,7 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-TILE = 8
+TILE_PIXELS = 8
 """Pixels along a side of the tiles in which segments are listed."""
 _GPU_CHAINS = 64  # chains of a tile on GPUs: one for each invocation of the tile's workgroup
 OPACITY_WIDTH = 256
@@ -119,7 +119,7 @@ def make_strand_buffers(device: Device, capacity: StrandCapacity) -> StrandBuffe
 
 def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE) for side in size)
+    across, down = (-(-side // TILE_PIXELS) for side in size)
     links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_LINKS, device.max_storage_bytes // 8)
     per_tile = chains_per_tile(device, across * down)
@@ -145,7 +145,7 @@ def make_deep_opacity(device: Device, lights: int) -> Buffer:
     return _make_buffer(device, (HEADER_WORDS + texels) * max(1, lights))
 
 
-def no_strand_shadows(device: Device) -> Buffer:
+def placeholder_strand_shadows(device: Device) -> Buffer:
     """Return a placeholder for the deep opacity maps of heads without hair."""
     return device.cached("no strand shadows", lambda: _make_buffer(device, HEADER_WORDS))
 
@@ -202,7 +202,7 @@ def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the hair shaders, by name."""
     opacity = {"strand_window": OPACITY_WIDTH, "strand_layers": OPACITY_LAYERS}
     words = {"strand_window_words": HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
-    return {"strand_tile": TILE, **opacity, **words, **hair_constants()}
+    return {"strand_tile": TILE_PIXELS, **opacity, **words, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.lights.records import oblique_constants
-from dermis.frame.programs import FLOATS, program
+from dermis.frame.programs import FLOAT_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
@@ -41,7 +41,7 @@ def draw(
     constants: Constants,
     into: TextureOrView,
     side: int,
-    texel: str = FLOATS,
+    texel: str = FLOAT_FORMAT,
     scale: float = 1.0,
     area: float = 0.0,
 ) -> None:

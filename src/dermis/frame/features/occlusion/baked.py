@@ -116,6 +116,6 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, bindings: Bindings, 
     return texture_from_array(device, integers / np.float32(65535.0), "r32float")
 
 
-def no_occlusion(device: Device) -> Texture:
+def placeholder_occlusion(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
     return device.cached("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))

@@ -24,8 +24,8 @@ from dermis.mesh.rig import Motion
 from dermis.mesh.subdivide import coarse_triangles
 
 Floats = NDArray[np.float64]
-VIEWS = 64
-SIDE = 256
+VIEW_COUNT = 64
+DEPTH_MAP_SIDE = 256
 """Texels along the side of a depth map."""
 _MARGIN_MM = 1.0
 _BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
@@ -75,16 +75,16 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _MARGIN_MM, 0.5 * (high + low)
     half[:, 2] += outline.margin_mm
-    half[:, :2] *= SIDE / (SIDE - 2.0 * _BORDER_TEXELS)
-    clips = np.zeros((VIEWS, 4, 4))
+    half[:, :2] *= DEPTH_MAP_SIDE / (DEPTH_MAP_SIDE - 2.0 * _BORDER_TEXELS)
+    clips = np.zeros((VIEW_COUNT, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
     clips[:, 2] *= -0.5  # from 1 near to 0 far
     clips[:, 2, 3] += 0.5
     clips[:, 3, 3] = 1.0
     to_map = clips[:, :3].copy()
-    to_map[:, :2] *= 0.5 * SIDE * np.array([[1.0], [-1.0]])
-    to_map[:, :2, 3] += 0.5 * SIDE - 0.5
-    steps = axes[:, :2] * (2.0 / SIDE * half[:, :2, None])
+    to_map[:, :2] *= 0.5 * DEPTH_MAP_SIDE * np.array([[1.0], [-1.0]])
+    to_map[:, :2, 3] += 0.5 * DEPTH_MAP_SIDE - 0.5
+    steps = axes[:, :2] * (2.0 / DEPTH_MAP_SIDE * half[:, :2, None])
     return SkyViews(Views(clips, PIXEL_CENTRE), to_map, -axes[:, 2], steps)
 
 
@@ -92,7 +92,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 def _view_axes() -> Floats:
     """Return the axes right, up and forward of all views of a head at rest, (k, 3, 3) unit vectors."""
     up = np.array([0.0, 1.0, 0.0])
-    return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(VIEWS)])
+    return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(VIEW_COUNT)])
 
 
 def make_anchors(head: Head) -> RotationAnchors:
@@ -153,7 +153,7 @@ def make_vertex_sky(device: Device, head: Head, rest_geometry: HeadGeometry) -> 
     rest_geometry : the triangles of the head at rest
     """
     count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
-    layers = make_layers(device, (SIDE, SIDE), VIEWS, triangles=False)
+    layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), VIEW_COUNT, triangles=False)
     occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_LIMITS))
     sky = VertexSky(layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))

@@ -11,7 +11,7 @@ from dermis.base.errors import DermisError, refuse
 from dermis.frame.features.diffusion.combine import make_sum
 from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
 from dermis.frame.features.outputs.stage_inputs import StageInputs
-from dermis.frame.features.shading.shade import no_subsurface_layers
+from dermis.frame.features.shading.shade import placeholder_subsurface_layers
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.programs import program, workgroup_grid
 from dermis.frame.request import FrameRequest
@@ -86,7 +86,7 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
     """
     device, diffusion = graph.device, inputs.picture_diffusion
     shader = stage_program(device, planes, inputs.constants)
-    layers = diffusion.layers if diffusion else no_subsurface_layers(device)
+    layers = diffusion.layers if diffusion else placeholder_subsurface_layers(device)
     draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
     if diffusion is not None and "diffuse" in planes.channels:
         below, leaving = diffusion.diffuse()

@@ -20,7 +20,7 @@ from dermis.gpu import Bindings, Graph
 from dermis.gpu.wgsl_source import Member
 from dermis.scene.outputs import OUTPUTS, Output
 
-Stage = Callable[[Graph, Planes, Resources, StageInputs], None]
+DrawStage = Callable[[Graph, Planes, Resources, StageInputs], None]
 _SURFACE_CONSTANTS = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
@@ -40,7 +40,7 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
     if not _labels_hair(resources, inputs):  # else `hair_labels` has drawn the centres
         _draw_centres(graph, inputs)
     for planes in resources.planes:
-        STAGES[planes.stage](graph, planes, resources, inputs)
+        DRAW_STAGES[planes.stage](graph, planes, resources, inputs)
     if resources.landmarks:
         draw_landmarks(graph, resources.landmarks, inputs)
 
@@ -92,11 +92,11 @@ def _draw_label(graph: Graph, planes: Planes, resources: Resources, inputs: Stag
     draw_labels(graph, planes, resources.labels, inputs)
 
 
-def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None]) -> Stage:
+def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None]) -> DrawStage:
     return lambda graph, planes, resources, inputs: draw(graph, planes, resources.light, inputs)
 
 
-STAGES: Registry[Stage] = Registry(
+DRAW_STAGES: Registry[DrawStage] = Registry(
     "stage of outputs",
     {
         "geometry": _draw_geometry,

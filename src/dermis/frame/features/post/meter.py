@@ -11,11 +11,11 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Buffer, Constants, Device, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
-SIDE = 64
+METER_SIDE = 64
 """Metered points along each side of a grid over the picture."""
-KEY = 0.85
+METER_KEY = 0.85
 """Value of white skin in the metered light: the exposure of studio light is then about 1."""
-CLIPPING = 0.01
+MAX_CLIPPED_FRACTION = 0.01
 """Fraction of the visible skin that may be brighter than the picture can show."""
 MIN_HIGHLIGHT_FACTOR = 0.5
 """Least factor by which highlights lower the exposure: one stop."""
@@ -23,8 +23,8 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 
 def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the shaders of the exposure meter, by name."""
-    highlights = {"meter_clipping": CLIPPING, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
-    return {"meter_side": SIDE, "meter_key": KEY, **highlights}
+    highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
+    return {"meter_side": METER_SIDE, "meter_key": METER_KEY, **highlights}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,9 @@ class Meter:
 
 def make_meter(device: Device) -> Meter:
     """Allocate the buffers of the exposure meter."""
-    return Meter(device.storage_buffer(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
+    return Meter(
+        device.storage_buffer(8 * METER_SIDE * METER_SIDE), device.buffer(np.ones(1, np.float32), "STORAGE")
+    )
 
 
 def draw(
@@ -59,7 +61,7 @@ def draw(
     camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
     images = {"visibility_buffer": visibility, "image": image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
-    graph.compute("meter", shader, bindings, (SIDE, SIDE))
+    graph.compute("meter", shader, bindings, (METER_SIDE, METER_SIDE))
     key = program(graph.device, "post/meter_key.wgsl")
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 

@@ -28,12 +28,12 @@ CHANNELS: Mapping[str, int] = MappingProxyType(
     }
 )
 """Numbers of each quantity that bake.wgsl computes at a point, in its order."""
-COUNT = sum(CHANNELS.values())
+CHANNEL_COUNT = sum(CHANNELS.values())
 
 
 def shader_constants() -> dict[str, int]:
     """Return the values that `//#fill` lines insert in bake.wgsl, by name."""
-    return {"baked_numbers": COUNT}
+    return {"baked_numbers": CHANNEL_COUNT}
 
 
 def point_words(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -56,7 +56,7 @@ def bake(
     footprint: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """Return the (n, COUNT) channels that bake.wgsl computes at surface points, in the order of `CHANNELS`.
+    """Return the (n, CHANNEL_COUNT) values of `CHANNELS` that bake.wgsl computes at surface points.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
@@ -65,7 +65,7 @@ def bake(
     pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """
     shader = program(device, "shading/bake.wgsl", constants)
-    count, size = len(points), 4 * COUNT * len(points)
+    count, size = len(points), 4 * CHANNEL_COUNT * len(points)
     baked = device.storage_buffer(size, "baked")
     uniform = pigments or (0.0, 0.0)
     record = shader.record(
@@ -76,9 +76,9 @@ def bake(
     commands.dispatch("bake", shader, {**bindings, **own}, workgroup_grid(count))
     commands.submit()
     raw = device.handle.queue.read_buffer(baked, 0, size)
-    return np.frombuffer(raw, np.float32).reshape(-1, COUNT).copy()
+    return np.frombuffer(raw, np.float32).reshape(-1, CHANNEL_COUNT).copy()
 
 
-def no_thickness(device: Device) -> Texture:
+def placeholder_thickness(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for the map of tissue thickness."""
     return device.cached("no thickness", lambda: make_texture(device, (1, 1), "rgba32float"))

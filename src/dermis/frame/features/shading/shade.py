@@ -46,12 +46,12 @@ def draw(
     """
     device, (width, height) = graph.device, size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
-    bindings |= {"image": image, "subsurface": subsurface or no_subsurface_layers(device)}
+    bindings |= {"image": image, "subsurface": subsurface or placeholder_subsurface_layers(device)}
     shader = shade_program(device, (*constants, *strip_constants(device, visibility.count)))
     graph.compute("shade", shader, bindings, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return image
 
 
-def no_subsurface_layers(device: Device) -> Texture:
+def placeholder_subsurface_layers(device: Device) -> Texture:
     """Return a placeholder for the layers of light below the skin, for techniques outside screen space."""
     return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))

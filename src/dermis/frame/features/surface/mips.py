@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import HALVES, program
+from dermis.frame.programs import HALF_FORMAT, program
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -61,7 +61,7 @@ def upload_slopes(device: Device, image: Floats | None) -> Texture:
         return _flat_relief(device)
     mipped, frame = empty_map(device, image.shape), CommandList(device, timed=False)
     bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": mipped.levels[0]}
-    shader = program(device, "surface/map_moments.wgsl", store=HALVES)
+    shader = program(device, "surface/map_moments.wgsl", store=HALF_FORMAT)
     frame.compute("maps", shader, bound, image.shape[1::-1])
     fill_mips(frame, mipped)
     frame.submit()
@@ -78,7 +78,7 @@ def upload_detail(device: Device, slopes: Floats) -> Texture:
     layers = slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))
     height, width = slopes.shape[:2]
     mips = max(height, width).bit_length()
-    texture = make_texture(device, (width, height), HALVES, layers=len(layers), mips=mips, use="map")
+    texture = make_texture(device, (width, height), HALF_FORMAT, layers=len(layers), mips=mips, use="map")
     for layer, texels in enumerate(layers):
         for mip, level in enumerate(mip_chain(texels)):
             upload(device, texture, level, mip=mip, layer=layer)
@@ -139,17 +139,17 @@ def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top
         "halved": relief.levels[1],
     }
     size = -(-relief.size[0] // 2), -(-rows // _ROWS_PER_INVOCATION)
-    recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALVES), bound, size)
+    recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALF_FORMAT), bound, size)
 
 
 def _flat_relief(device: Device) -> Texture:
-    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALVES, use="map"))
+    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALF_FORMAT, use="map"))
 
 
 def empty_map(device: Device, shape: tuple[int, ...]) -> MippedTexture:
     """Allocate an (h, w) map of half floats with all mip levels."""
     mips = max(shape[:2]).bit_length()
-    texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips, name="painted map")
+    texture = make_texture(device, (shape[1], shape[0]), HALF_FORMAT, mips=mips, name="painted map")
     return with_mip_views(texture)
 
 
@@ -165,7 +165,7 @@ def fill_mips(recorder: Recorder, mipped: MippedTexture, first: int = 1) -> None
 
     first : index of the first level to compute
     """
-    shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALVES), mipped.levels
+    shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALF_FORMAT), mipped.levels
     width, height = mipped.size
     for mip in range(first, len(levels)):
         bound: Bindings = {"finer": levels[mip - 1], "stored": levels[mip]}

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from dermis.frame.features.shape.mesh import HeadGeometry
-from dermis.frame.programs import FEATURES, program, program_constants, shader_folders
+from dermis.frame.programs import FEATURES_FOLDER, program, program_constants, shader_folders
 from dermis.frame.projection import Matrix, Views
 from dermis.gpu import (
     Buffer,
@@ -177,7 +177,7 @@ def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix,
 def _raster_program(device: Device, triangles: bool) -> RenderProgram:
     def make() -> RenderProgram:
         name = "visibility/visibility_buffer_raster.wgsl" if triangles else "visibility/depth_raster.wgsl"
-        path, folders = FEATURES / name, shader_folders()
+        path, folders = FEATURES_FOLDER / name, shader_folders()
         constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
         return RenderProgram(device, path, folders, constants, targets=targets, depth_compare="greater")
 

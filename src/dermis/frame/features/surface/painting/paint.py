@@ -16,7 +16,7 @@ from dermis.base.disk import Arrays, array_key, load_arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.frame.features.surface import mips as map_mips
-from dermis.frame.programs import FEATURES, HALVES, program, shader_folders, workgroup_grid
+from dermis.frame.programs import FEATURES_FOLDER, HALF_FORMAT, program, shader_folders, workgroup_grid
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -123,7 +123,7 @@ def cache_key(inputs: PaintInputs, driver: str) -> str:
 
 @cache
 def _shader_text(shader: str) -> str:
-    return shader_source(FEATURES / shader, shader_folders()).text
+    return shader_source(FEATURES_FOLDER / shader, shader_folders()).text
 
 
 def _face_tables(recession: float) -> bytes:
@@ -184,7 +184,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
     surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
-    deltas = make_texture(device, (side, side), HALVES, layers=2)
+    deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
@@ -240,7 +240,7 @@ def _upload_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
         upload(device, one.texture, arrays[name])
     deltas = None
     if "deltas" in arrays:
-        deltas = make_texture(device, (side, side), HALVES, layers=2)
+        deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
         for layer, texels in enumerate(arrays["deltas"]):
             upload(device, deltas, texels, layer=layer)
     return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
