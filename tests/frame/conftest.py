@@ -6,7 +6,7 @@ import os
 
 import pytest
 from observed import observed
-from tolerances import HALF_FORMAT, TWIN
+from tolerances import HALVES, TWIN
 
 from dermis.frame.observation import Observation
 from dermis.frame.programs import FLOAT_FORMAT, level_format
@@ -22,7 +22,7 @@ def renderer() -> Renderer:
 @pytest.fixture(scope="session")
 def close(device: Device) -> float:
     """Return the tolerance of light after blurs against its reference, relative."""
-    return TWIN if level_format(device) == FLOAT_FORMAT else HALF_FORMAT
+    return TWIN if level_format(device) == FLOAT_FORMAT else HALVES
 
 
 @pytest.fixture(scope="session")

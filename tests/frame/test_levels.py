@@ -11,7 +11,7 @@ import pytest
 from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from setups import resting
-from tolerances import FLAT, HALF_FORMAT, HALVED, SPREAD_ENERGY
+from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
@@ -120,7 +120,7 @@ def test_constant_light_stays_constant_at_every_resolution(
     device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
 ) -> None:
     made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.lit[..., None])
-    close = FLAT if texel == FLOAT_FORMAT else HALF_FORMAT
+    close = FLAT if texel == FLOAT_FORMAT else HALVES
     assert np.abs(made[atlas.lit] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
@@ -167,8 +167,8 @@ def test_halves_keep_the_light(
     light = stripes * [brightest, brightest, brightest, 1.0]
     floats, _ = combined(device, FLOAT_FORMAT, textures, light)
     halves, _ = combined(device, HALF, textures, light, half_precision_scale(HALF, brightest))
-    assert error(halves, floats, atlas.lit) < HALF_FORMAT
-    assert halves[atlas.lit].sum() == pytest.approx(floats[atlas.lit].sum(), rel=HALF_FORMAT / 4)
+    assert error(halves, floats, atlas.lit) < HALVES
+    assert halves[atlas.lit].sum() == pytest.approx(floats[atlas.lit].sum(), rel=HALVES / 4)
 
 
 @pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
