@@ -214,9 +214,9 @@ def test_an_iris_lies_between_the_lids() -> None:
     canthi = [np.array([[x, -40, 13.0], [s * 40, -40, 13.0], [x, 40, 13.0]]) for s, x in ((1, 8), (-1, -8))]
     walls = np.concatenate([lid(2.0, 40.0, 13.0), lid(-40.0, -6.0, 13.0)])
     low = lids_in_front(np.concatenate([walls, np.array(canthi)]), sphere, AHEAD)
-    across, up = low.iris
+    across, up = low.opening_angles
     assert abs(np.degrees(across)) < 1 and np.degrees(up) == pytest.approx(-7, abs=1.5)
-    assert lids_in_front(walls[:2], sphere, AHEAD).iris == (0.0, 0.0)
+    assert lids_in_front(walls[:2], sphere, AHEAD).opening_angles == (0.0, 0.0)
 
 
 def test_corneas_stay_behind_lids() -> None:

@@ -246,9 +246,9 @@ def _unused_files_note(path: Path, faults: list[str]) -> str:
 def _load_map(
     role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
-    """Load the map in a file; the result has its role as key. Heights and slopes are scaled by -bm.
+    """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
 
-    role : "bump" for a file with heights or normals, which is found out from its colours
+    The result has the role as key. For "bump" it is "height" for a grey picture, else "normal".
     """
     if role == "bump":
         role = "height" if _is_grey(file) else "normal"

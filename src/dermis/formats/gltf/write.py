@@ -146,13 +146,16 @@ def _gltf_mesh(
 
 
 def _mesh_name(head: Head) -> str:
-    """Return a name for the mesh that no bone has."""
+    """Return the name of the exported mesh, which no bone may have."""
     name = Path(head.name).stem or "head"
     return f"{name} mesh" if name in head.bones else name
 
 
 def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """Return all glTF nodes, bones first and the mesh last, the indices of root nodes, and the skin."""
+    """Return the glTF nodes, the indices of root nodes, and a list with the skin.
+
+    Bones come first and the mesh last; the list is empty without bones.
+    """
     skeleton = head.control.skeleton
     if skeleton is None:
         return [{"name": _mesh_name(head), "mesh": 0}], [0], []

@@ -80,7 +80,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
-    """Raise the error for a motion none of whose names is a morph target or bone of the head."""
+    """Raise the error for a motion without any name that is a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from dermis.formats.deformable_mesh import DeformableMesh, influences
+from dermis.formats.deformable_mesh import DeformableMesh, point_bone_influences
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -188,7 +188,7 @@ def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
 def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> None:
     rig, count = deformable.rig, int(deformable.head.mesh.point.max()) + 1
     rigid = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, weight = rigid if rig.skeleton is None else influences(rig, deformable.refinement)
+    bone, weight = rigid if rig.skeleton is None else point_bone_influences(rig, deformable.refinement)
     indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
     weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
     binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)
