@@ -19,7 +19,7 @@ from dermis.frame.programs import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
 from dermis.gpu.adapters import DEFAULT_LIMITS
-from dermis.gpu.shader_types import bindings, struct_dtype
+from dermis.gpu.shader_types import shader_bindings, struct_dtype
 from dermis.gpu.wgsl_source import compose
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -56,7 +56,7 @@ def _programs() -> list[Path]:
 @pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
 def test_bindings_fit_any_device(path: Path) -> None:
     text = compose(path, FOLDERS).text
-    found = bindings(text)
+    found = shader_bindings(text)
     kinds = Counter(_kind(binding.entry) for binding in found)
     kinds["dynamic"] = kinds["uniform"]  # each has an offset of its own in every frame
     assert not {kind: count for kind, count in kinds.items() if count > MOST[kind]}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dermis.gpu import CommandList, ComputeProgram, Device, Graph, download, make_texture, mark_scratch
-from dermis.gpu.shader_types import bindings, struct_dtype, used_members
+from dermis.gpu.shader_types import shader_bindings, struct_dtype, used_members
 from dermis.gpu.textures import texture_from_array
 
 SIZE = (9, 5)
@@ -189,9 +189,9 @@ def test_accesses_are_what_shaders_declare() -> None:
         "var<storage, read_write> x: array<u32>;": (True, True, True),
     }
     for declaration, expected in declared.items():
-        (one,) = bindings(f"@group(0) @binding(0) {declaration}")
+        (one,) = shader_bindings(f"@group(0) @binding(0) {declaration}")
         assert (one.has_content, one.reads, one.writes) == expected, declaration
-    (sampler,) = bindings("@group(0) @binding(0) var x: sampler;")
+    (sampler,) = shader_bindings("@group(0) @binding(0) var x: sampler;")
     assert not sampler.has_content and not sampler.writes
 
 

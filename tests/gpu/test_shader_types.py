@@ -11,7 +11,7 @@ import pytest
 import dermis
 from dermis.base.errors import DermisError
 from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
-from dermis.gpu.shader_types import bindings, struct_dtype
+from dermis.gpu.shader_types import shader_bindings, struct_dtype
 
 SHADERS = sorted(Path(dermis.__file__).parent.rglob("*.wgsl"))
 
@@ -119,17 +119,17 @@ def fill(record: Any, member: str, numbers: Any) -> list[int]:
     ],
 )
 def test_binding_entries(declaration: str, entry: dict[str, Any]) -> None:
-    (found,) = bindings(f"@group(0) @binding(7) {declaration}")
+    (found,) = shader_bindings(f"@group(0) @binding(7) {declaration}")
     assert (found.index, found.name, found.entry) == (7, "x", entry)
 
 
 def test_bindings_come_in_order() -> None:
     text = "\n".join(f"@group(0) @binding({b}) var x{b}: sampler;" for b in (30, 3, 1))
-    assert [b.name for b in bindings(text)] == ["x1", "x3", "x30"]
+    assert [b.name for b in shader_bindings(text)] == ["x1", "x3", "x30"]
 
 
 @pytest.mark.parametrize("path", SHADERS, ids=lambda p: p.stem)
 def test_every_binding_of_the_package_is_understood(path: Path) -> None:
     """Check that the parser skips no declaration."""
     text = path.read_text(encoding="utf-8")
-    assert len(bindings(text)) == text.count("@binding(")
+    assert len(shader_bindings(text)) == text.count("@binding(")

@@ -1,4 +1,4 @@
-"""Toolkit over wgpu: adapters, devices, shaders, textures, passes and the frame graph."""
+"""Toolkit on top of wgpu: adapters, devices, shaders, textures, passes and the frame graph."""
 
 from dermis.gpu.adapters import Adapter, list_adapters
 from dermis.gpu.command_list import CommandList

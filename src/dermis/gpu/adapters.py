@@ -1,4 +1,4 @@
-"""Graphics adapters of the machine, their limits, and a faster start of wgpu.
+"""Graphics adapters of this machine, their limits, and a faster start of wgpu.
 
 C types that wgpu looks up by name are registered in advance: cffi parses each new name together with all
 typedefs of the header, which takes some ten milliseconds, and a first frame looks up seventy-five.
@@ -64,7 +64,7 @@ _RANKED_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 
 def register_wgpu_types() -> None:
-    """Register the types of wgpu's native library; to be called before wgpu is used."""
+    """Register the C types of wgpu's native library with cffi, before wgpu is used, to speed up its start."""
     with contextlib.suppress(ImportError):  # other builds of wgpu need no registration
         from wgpu.backends.wgpu_native import ffi
 
@@ -72,15 +72,15 @@ def register_wgpu_types() -> None:
 
 
 def register_types(ffi: Any) -> int:
-    """Register names of pointers, arrays and callbacks with cffi and return their number.
+    """Register the C types of pointers, arrays and callbacks with cffi, and return their number.
 
     This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
     """
     try:
         with ffi._lock:  # as its own callers do
             declared = ffi._parser._declarations
-            types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _types(declared)}
-            types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callbacks(declared)}
+            types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _named_types(declared)}
+            types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callback_types(declared)}
         for name, parsed in types.items():
             ffi._parsed_types.setdefault(name, parsed)
     except Exception:  # another cffi may raise anything
@@ -88,8 +88,11 @@ def register_types(ffi: Any) -> int:
     return len(types)
 
 
-def _types(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Yield names of types as wgpu spells them, with cffi's descriptions of the types."""
+def _named_types(declared: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the C type names of pointers and arrays as wgpu spells them, with their cffi models.
+
+    declared : declarations that cffi parsed from wgpu's header, by name
+    """
     from cffi import model  # type: ignore[import-untyped]
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
@@ -104,8 +107,11 @@ def _types(declared: Any) -> Iterator[tuple[str, Any]]:
         yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)
 
 
-def _callbacks(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Yield signatures of callbacks as wgpu spells them, with cffi's descriptions of the pointers."""
+def _callback_types(declared: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the C signatures of callbacks as wgpu spells them, with their cffi models.
+
+    declared : declarations that cffi parsed from wgpu's header, by name
+    """
     from cffi import model
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
@@ -120,14 +126,14 @@ def _callbacks(declared: Any) -> Iterator[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class Adapter:
-    """A graphics processor, or a software one, as reached through one backend.
+    """Graphics processor, or software renderer, as seen through one backend.
 
-    name, driver : as the driver spells them
-    kind : "DiscreteGPU" | "IntegratedGPU" | "VirtualGPU" | "CPU" | "Unknown"
-    backend : "Vulkan" | "Metal" | "D3D12" | "OpenGL"
-    features : those of `OPTIONAL_FEATURES` that it has
-    handle : wgpu's object
-    number : index in `list_adapters`; "#1" selects the adapter with the number 1, as GPUs may share a name
+    name, driver : names of the adapter and its driver, as the driver reports them
+    kind : type of the adapter: "DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU" or "Unknown"
+    backend : graphics interface: "Vulkan", "Metal", "D3D12" or "OpenGL"
+    features : names in `OPTIONAL_FEATURES` that the adapter supports
+    handle : adapter object of wgpu
+    number : index in `list_adapters`, by which "#1" selects one of several GPUs with the same name
     """
 
     name: str
@@ -140,7 +146,7 @@ class Adapter:
 
 
 def list_adapters() -> list[Adapter]:
-    """Return all adapters, the best first: GPUs before software, then by number of features.
+    """Return all adapters, best first: GPUs before software, then by the number of supported features.
 
     Raises DermisError if drivers fail, or would fail for lack of address space.
     """
@@ -152,19 +158,19 @@ def list_adapters() -> list[Adapter]:
     register_wgpu_types()
     try:
         with _silenced_stderr():
-            adapters = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
+            adapters = [_describe_adapter(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
         refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
-    adapters.sort(key=lambda a: (_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
+    adapters.sort(key=lambda a: (_kind_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
     return [replace(one, number=number) for number, one in enumerate(adapters)]
 
 
 def select_adapters(selector: str) -> tuple[list[Adapter], str]:
-    """Return the adapters that a selector fits, the best first, and the reason for the choice.
+    """Return the adapters that match a selector, best first, and the reason for the choice, for users.
 
-    selector : "auto", "cpu", part of a name, or "#1" for the adapter with that number, counted from 0
+    selector : "auto", "cpu", part of a name, or "#1" for the adapter with the number 1, counted from 0
 
-    Raises DermisError if there is none.
+    Raises DermisError if no adapter matches.
     """
     adapters = list_adapters()
     # OpenGL renders wrongly or not at all, so it has to be selected by name.
@@ -190,11 +196,11 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
 
 
 def similar_adapters(selector: str) -> list[Adapter]:
-    """Return the best adapter for a selector and all others of its kind and backend.
+    """Return the best adapter for a selector, and all other matching GPUs of its kind and backend.
 
-    As all have one backend, no GPU is listed twice.
+    The common backend ensures that no GPU is listed twice. A software adapter is returned alone.
 
-    Raises DermisError as `select_adapters`.
+    Raises DermisError if no adapter matches.
     """
     (best, *others), _ = select_adapters(selector)
     if best.kind == "CPU":
@@ -203,9 +209,9 @@ def similar_adapters(selector: str) -> list[Adapter]:
 
 
 def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
-    """Raise DermisError for an adapter that cannot run the programs of a frame.
+    """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter, offered : name and limits of the adapter
+    adapter, offered : name of the adapter, and its limits by name
     """
     for name in _REQUIRED_LIMITS:
         minimum = DEFAULT_LIMITS[name]
@@ -216,7 +222,11 @@ def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
 
 
 def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
-    """Return WebGPU's default limits, with the adapter's own for `raised` and where it offers less."""
+    """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
+
+    offered : limits of the adapter by name
+    raised : names of the limits for which all that the adapter offers is requested
+    """
     limits = {
         name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
         for name, default in DEFAULT_LIMITS.items()
@@ -224,7 +234,7 @@ def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str
     return limits | {name: offered[name] for name in raised}
 
 
-def _describe(handle: Untyped) -> Adapter:
+def _describe_adapter(handle: Untyped) -> Adapter:
     info = handle.info
     return Adapter(
         name=info["device"],
@@ -236,13 +246,13 @@ def _describe(handle: Untyped) -> Adapter:
     )
 
 
-def _rank(kind: str) -> int:
+def _kind_rank(kind: str) -> int:
     return _RANKED_KINDS.index(kind if kind in _RANKED_KINDS else "Unknown")
 
 
 @contextlib.contextmanager
 def _silenced_stderr() -> Iterator[None]:
-    """Discard the process's stderr, to which drivers write warnings if there is no display."""
+    """Redirect file descriptor 2 to the null device, as drivers write warnings to it without a display."""
     try:
         saved = os.dup(2)
     except OSError:  # there is no stderr

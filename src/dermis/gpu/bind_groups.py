@@ -1,4 +1,4 @@
-"""Bind groups, created by direct calls of the native library, as a new head needs dozens of them."""
+"""Bind groups, created by direct calls of the native library for speed: a new head needs dozens."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, Entry
-from dermis.gpu.types import Native, Texture, TextureOrView, Untyped, is_texture
+from dermis.gpu.shader_types import Binding, LayoutEntry
+from dermis.gpu.types import NativeObject, Texture, TextureOrView, Untyped, is_texture
 
-UNIFORM = {"type": "uniform"}
+UNIFORM_BUFFER = {"type": "uniform"}
 
 _DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
 
@@ -25,14 +25,14 @@ T = TypeVar("T")
 
 
 class BindGroup:
-    """A bind group, which keeps the bound resources alive.
+    """Bind group, which keeps the bound resources alive.
 
-    _internal : handle in the native library, as in wgpu's objects; released with this object
+    _internal : handle in the native library, released with this object; wgpu's own objects use the same name
     """
 
     __slots__ = ("__weakref__", "_internal")
 
-    def __init__(self, device: Device, layout: Native, entries: Sized) -> None:
+    def __init__(self, device: Device, layout: NativeObject, entries: Sized) -> None:
         descriptor = device.ffi.new("WGPUBindGroupDescriptor *")
         descriptor.layout, descriptor.entries, descriptor.entryCount = layout._internal, entries, len(entries)
         handle = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, descriptor)
@@ -41,15 +41,15 @@ class BindGroup:
 
 def make_bind_group(
     device: Device,
-    layout: Native,
+    layout: NativeObject,
     bindings: Sequence[Binding],
     values: Sequence[Untyped],
     records: Sequence[int],
 ) -> BindGroup:
-    """Create a bind group.
+    """Create the bind group of a program.
 
-    values : a buffer, texture, texture view or sampler for each binding; the last ones are uniform buffers
-    records : sizes of the records in the uniform buffers [byte]
+    values : buffer, texture, texture view or sampler for each binding, the uniform buffers last
+    records : sizes of the records that these uniform buffers hold, in order [byte]
     """
     entries = device.ffi.new("WGPUBindGroupEntry[]", len(values))
     first_uniform = len(values) - len(records)
@@ -62,15 +62,15 @@ def make_bind_group(
         elif "sampler" in kind:
             entry.sampler = value._internal
         else:
-            entry.textureView = _view(device, value, kind.get("texture") or kind["storage_texture"])
+            entry.textureView = _view_handle(device, value, kind.get("texture") or kind["storage_texture"])
     return BindGroup(device, layout, entries)
 
 
 class ResourceCache(Generic[T]):
     """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
 
-    A bind group keeps the memory of its resources allocated, so it has to be dropped as soon as one of them
-    is no longer used elsewhere.
+    A bind group keeps the memory of its resources allocated, so it must be dropped as soon as one of them is
+    no longer used elsewhere.
     """
 
     def __init__(self) -> None:
@@ -78,26 +78,26 @@ class ResourceCache(Generic[T]):
         self._keys: dict[int, tuple[weakref.ref[object], set[Key]]] = {}  # of each resource, by its id
 
     def __len__(self) -> int:
-        """Return the number of entries."""
+        """Return the number of cached entries."""
         return len(self._entries)
 
     @property
     def resource_count(self) -> int:
-        """Return the number of resources that entries depend on."""
+        """Return the number of resources whose release the cache watches."""
         return len(self._keys)
 
     def find(self, key: Key) -> T | None:
-        """Return the entry for a key from `resource_key`, or None."""
+        """Return the cached entry for a key of `resource_key`, or None."""
         return self._entries.get(key)
 
     def add(self, key: Key, resources: Sequence[object], entry: T) -> None:
-        """Add an entry, which is kept for as long as all of its resources live."""
+        """Add an entry that is kept until one of its resources is released."""
         self._entries[key] = entry
         for resource in resources:
             self._keys_of(resource).add(key)
 
     def _keys_of(self, resource: object) -> set[Key]:
-        """Return the keys that contain a resource; the release of a new one is watched from now on."""
+        """Return the cache keys that contain a resource, and start to watch its release if it is new."""
         identity = id(resource)
         if identity not in self._keys:
             this = weakref.ref(self)
@@ -119,12 +119,15 @@ class ResourceCache(Generic[T]):
 
 
 def resource_key(resources: Sequence[object]) -> Key:
-    """Return the cache key for these resources in this order."""
+    """Return the cache key of a sequence of resources: their Python ids in order."""
     return tuple(map(id, resources))
 
 
-def _view(device: Device, value: TextureOrView, texture: Entry) -> object:
-    """Return the handle of a view, or of a texture's default view, created once for each dimension."""
+def _view_handle(device: Device, value: TextureOrView, texture: LayoutEntry) -> object:
+    """Return the native handle of a view; for a texture, that of its default view, which is cached.
+
+    texture : layout entry of the binding, which has the view dimension
+    """
     if is_texture(value):
         return _default_view(device, value, texture["view_dimension"])
     return value._internal

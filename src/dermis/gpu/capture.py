@@ -1,4 +1,4 @@
-"""Capture of frames, so that another program can run them."""
+"""Capture of frames as data: shaders, programs, resources and passes, for playback by web pages."""
 
 from __future__ import annotations
 
@@ -33,28 +33,31 @@ T = TypeVar("T")
 
 Ts = TypeVarTuple("Ts")
 
-Description = dict[str, Any]
+PlainData = dict[str, Any]
 """Plain data for JSON."""
-Bound = list[int]
+BoundIndices = list[int]
 """For each binding of the program the index of a resource, or -1 - k for record k of the frame."""
 
 
 @dataclass
 class CapturedPass:
-    """A pass of a captured frame.
+    """Pass of a captured frame.
 
-    program, bound : index of the program and what it binds; None and empty where the host writes to a buffer
-    groups : workgroups along each axis, or number of vertices of a render pass
-    completes : index of the resource that the pass extends in place (see `Recorder.dispatch`), -1 for none
-    raster : for a render pass its layer, clear depth, and indices of index buffer, depth view and target; -1
-        for none
-    written : buffer and bytes that the host writes
-    unit : index of the recording that the pass belongs to, which runs as a whole; other passes have their own
+    stage : name of the stage
+    program, bound : index of the program, and index of the resource or record at each of its bindings; None
+        and empty for a write from the host
+    groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
+        the host
+    completes : index of the resource that the pass extends in place (see `Recorder.dispatch`); -1 if none
+    raster : for a render pass its layer and clear depth, and the resource indices of index buffer, depth view
+        and colour target, each -1 if none
+    written : index of the buffer and the bytes that the host writes to it
+    unit : index of the group of passes that run or are skipped together: a recording, or a single pass
     """
 
     stage: str
     program: int | None
-    bound: Bound
+    bound: BoundIndices
     groups: tuple[int, ...]
     completes: int = -1
     raster: dict[str, float] | None = None
@@ -64,7 +67,7 @@ class CapturedPass:
 
 @dataclass
 class CapturedFrame:
-    """Passes of a captured frame and the uniform records that they read.
+    """Passes of a captured frame, and the uniform records that they read.
 
     records : name of the WGSL struct and content of each record
     """
@@ -74,16 +77,16 @@ class CapturedFrame:
     _record_index: dict[int, int] = field(default_factory=dict)
 
     def add(self, one: CapturedPass, unit: int | None) -> None:
-        """Add a pass.
+        """Append a pass.
 
-        unit : index of the recording that it belongs to, if any
+        unit : index of the recording to which it belongs; None for a pass that is a unit by itself
         """
         last = self.passes[-1].unit if self.passes else -1
         one.unit = last + 1 if unit is None else unit
         self.passes.append(one)
 
     def record(self, struct: str, record: UniformRecord) -> int:
-        """Return the index of a record, which is added if it is new."""
+        """Return the index of a uniform record in `records`, appending it on first use."""
         if id(record) not in self._record_index:
             self._record_index[id(record)] = len(self.records)
             self.records.append((struct, record))  # kept alive, so that its id stays unique
@@ -91,19 +94,20 @@ class CapturedFrame:
 
 
 class FrameCapture(Graph):
-    """Recorder that captures the frames declared on it instead of running them.
+    """Recorder that captures declared frames as data instead of running them.
 
-    shaders : texts of the shaders
-    programs : shader, constants, bindings and, for render programs, targets of each program
-    resources : description of each resource, see `describe_resource`
-    structs : dtypes of the records by the name of their struct
+    shaders : WGSL texts of the shaders
+    programs : for each program its shader, constants, bindings and, for render programs, depth test and
+        target
+    resources : description of each resource, from `describe_resource`
+    structs : dtypes of the uniform records by the name of their WGSL struct
     """
 
     def __init__(self, device: Device) -> None:
         super().__init__(device)
         self.shaders: list[str] = []
-        self.programs: list[Description] = []
-        self.resources: list[Description] = []
+        self.programs: list[PlainData] = []
+        self.resources: list[PlainData] = []
         self.structs: dict[str, np.dtype[np.generic]] = {}
         self._objects: list[Bindable] = []
         self._resource_index: dict[int, int] = {}
@@ -113,14 +117,18 @@ class FrameCapture(Graph):
         self._program_objects: list[Program] = []  # kept alive, so that their ids stay unique
 
     def capture(self, declare: Callable[[FrameCapture], object]) -> CapturedFrame:
-        """Return the frame that `declare(self)` declares."""
+        """Return the passes and records of the frame that `declare` declares on this recorder."""
         self._frame = frame = CapturedFrame()
         self._unit = None
         declare(self)
         return frame
 
     def read_content(self, index: int) -> list[NDArray[np.uint8]]:
-        """Return the bytes of a buffer, or of each layer of a texture, mip level by mip level."""
+        """Download a resource: return the bytes of a buffer, or of each image of a texture.
+
+        A texture has one image per layer and mip level; all layers of a mip level come before the next mip
+        level.
+        """
         value = self._objects[index]
         if not is_texture(value):
             return [np.frombuffer(self.device.handle.queue.read_buffer(value), np.uint8)]
@@ -129,14 +137,14 @@ class FrameCapture(Graph):
         return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]
 
     def resource_at(self, index: int) -> Untyped:
-        """Return a resource by its index."""
+        """Return the texture, view, buffer or sampler with an index in `resources`."""
         return self._objects[index]
 
     def resource(self, value: Bindable) -> int:
-        """Return the index of a texture, view, buffer or sampler, which is added if it is new."""
+        """Return the index of a texture, view, buffer or sampler in `resources`, adding it on first use."""
         if id(value) not in self._resource_index:
             if is_view(value):
-                found: Description = {
+                found: PlainData = {
                     "kind": "view",
                     "part": value.layer_and_mip,
                     "of": self.resource(value.texture),
@@ -151,12 +159,12 @@ class FrameCapture(Graph):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Capture a compute pass."""
+        """Capture a compute pass instead of running it."""
         captured = self._add_pass(stage, program, resources, groups)
         captured.completes = self.resource(resources[in_place]) if in_place else -1
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Capture a write from the host."""
+        """Capture a write of bytes from the host to a buffer."""
         written = self.resource(buffer), data
         self._frame.add(CapturedPass(stage, None, [], (len(data),), written=written), self._unit)
 
@@ -171,7 +179,7 @@ class FrameCapture(Graph):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Capture a render pass of triangles."""
+        """Capture a render pass of triangles instead of running it."""
         attachments = {"indices": indices, "depth": target.depth, "target": target.colour}
         numbers = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
         captured = self._add_pass(stage, program, resources, (vertices,))
@@ -180,11 +188,11 @@ class FrameCapture(Graph):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Raise NotImplementedError: no player can run passes that fill targets."""
+        """Raise NotImplementedError, as players of captured frames have no passes that fill targets."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Capture the passes of `record(self, *args)`, which run as a whole."""
+        """Capture the passes that `record` adds as one unit, which players run or skip as a whole."""
         if self._unit is not None:
             return record(self, *args)
         passes = self._frame.passes
@@ -197,26 +205,26 @@ class FrameCapture(Graph):
     def _add_pass(
         self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]
     ) -> CapturedPass:
-        bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
-        captured = CapturedPass(stage, self._program(program), bound, groups)
+        bound = [self._binding_index(program, one, resources[one.name]) for one in program.bindings]
+        captured = CapturedPass(stage, self._program_number(program), bound, groups)
         self._frame.add(captured, self._unit)
         return captured
 
-    def _bound(self, program: Program, binding: Binding, value: Bindable) -> int:
+    def _binding_index(self, program: Program, binding: Binding, value: Bindable) -> int:
         if not isinstance(value, np.ndarray):
             return self.resource(value)
         struct = uniform_type(program.source.text, binding.name)
         self.structs[struct] = value.dtype
         return -1 - self._frame.record(struct, cast("UniformRecord", value))
 
-    def _program(self, program: Program) -> int:
+    def _program_number(self, program: Program) -> int:
         if id(program) not in self._program_index:
             self._program_index[id(program)] = len(self.programs)
             self._program_objects.append(program)
             self.programs.append(
                 {
                     "name": program.name,
-                    "shader": self._shader(program.source.text),
+                    "shader": self._shader_number(program.source.text),
                     "constants": dict(program.constants),
                     "bindings": [(one.index, one.name, one.entry) for one in program.bindings],
                     "raster": program.raster if isinstance(program, RenderProgram) else None,
@@ -224,14 +232,17 @@ class FrameCapture(Graph):
             )
         return self._program_index[id(program)]
 
-    def _shader(self, text: str) -> int:
+    def _shader_number(self, text: str) -> int:
         if text not in self.shaders:
             self.shaders.append(text)
         return self.shaders.index(text)
 
 
-def describe_resource(device: Device, value: Bindable) -> Description:
-    """Return what is needed to create a resource: its kind, and its sizes and usage flags or its options."""
+def describe_resource(device: Device, value: Bindable) -> PlainData:
+    """Return the parameters with which a resource can be created again, as plain data for JSON.
+
+    They are the kind with sizes, format and usage flags, or the options of a sampler.
+    """
     if is_texture(value):
         size, mips = list(value.size), value.mip_level_count
         sizes = {"format": value.format, "size": size, "mips": mips, "usage": int(value.usage)}

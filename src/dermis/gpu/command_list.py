@@ -1,4 +1,4 @@
-"""Command list of one frame: passes in order, each timed under the name of its stage."""
+"""Command list of one frame: passes in order of execution, with GPU times per stage."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, RenderProgram
 from dermis.gpu.readback import BufferReadback
 from dermis.gpu.recorder import DrawTarget, Recorder, Workgroups
-from dermis.gpu.types import Bindings, Buffer, Native, Texture, TextureOrView, Untyped
+from dermis.gpu.types import Bindings, Buffer, NativeObject, Texture, TextureOrView, Untyped
 from dermis.gpu.uniforms import Uniforms
 
 Timing = bool | Literal["whole"]
@@ -25,12 +25,12 @@ _CACHED_DISPATCHES = 16  # of a pass, whose record positions depend on which pas
 
 
 class CommandList(Recorder):
-    """Passes that are recorded, submitted together and timed by stage.
+    """Recorder that encodes passes, submits them together and measures the time of each stage.
 
-    On software adapters each timed stage is submitted and waited for by itself.
+    On software adapters each timed stage is submitted separately and waited for.
 
-    timed : see `Timing`; without stage times, dispatches share passes across stages. Software adapters always
-        time stages
+    timed : see `Timing`; dispatches of several stages share a pass unless each stage is timed. Software
+        adapters time stages whenever anything is timed
     uniforms : uniform memory for the records of the passes; new if None
     submitted : number of the last submission, for `Device.wait`
     """
@@ -58,10 +58,10 @@ class CommandList(Recorder):
         in_place: str = "",
         access: Access | None = None,
     ) -> None:
-        """Add a compute pass, see `Recorder.dispatch`.
+        """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
-        in_place : ignored, as all passes run
-        access : access of the program to these resources, if the caller has it
+        in_place : ignored, as it only matters for finding stale passes
+        access : access of the program to these resources, which caches native dispatches for later frames
         """
         key = stage, groups, program.record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
@@ -74,7 +74,7 @@ class CommandList(Recorder):
         self.run(found[0])
 
     def run(self, dispatches: Sequence[Dispatch]) -> None:
-        """Add dispatches that were made by `make_dispatch`."""
+        """Add dispatches that `make_dispatch` prepared."""
         if self._splits_stages:
             for one in dispatches:
                 self._compute_pass(one.stage).run([one])
@@ -82,16 +82,20 @@ class CommandList(Recorder):
             self._compute_pass(dispatches[0].stage).run(dispatches)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Write bytes to the start of a buffer before the next submission."""
+        """Write bytes from the host to the start of a buffer, before the next submission runs."""
         self.device.write(buffer, data, len(data))
 
     def clear(self, buffer: Buffer) -> None:
-        """Add a command that fills a buffer with zeros."""
+        """Add a command that sets all bytes of a buffer to zero."""
         self._end_pass()
         self._encoder.clear_buffer(buffer, 0, buffer.size)
 
     def copy(self, buffer: Buffer, texture: Texture, *, pitch: int, layers: int) -> None:
-        """Add a copy of a buffer into a texture: layers of rows of `pitch` pixels of 4 bytes."""
+        """Add a copy from a buffer to all texels of a texture with 4 bytes per texel.
+
+        pitch : row length in the buffer [texel]
+        layers : number of texture layers to copy
+        """
         width, height = texture.size[:2]
         self._end_pass()
         self._encoder.copy_buffer_to_texture(
@@ -101,7 +105,7 @@ class CommandList(Recorder):
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
-        """Add copies of buffers, one after the other, into a readback that starts with the submission."""
+        """Add copies of buffers into a readback, one after the other; its mapping starts after submission."""
         self._end_pass()
         start = 0
         for buffer in buffers:
@@ -120,7 +124,7 @@ class CommandList(Recorder):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Add a pass that rasterises triangles, see `Recorder.draw`."""
+        """Add a render pass of triangles, see `Recorder.draw`."""
         depth = {
             "view": target.depth,
             "depth_load_op": "clear",
@@ -139,14 +143,14 @@ class CommandList(Recorder):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a pass that runs a program for each texel of its targets, see `Recorder.fill`."""
+        """Add a render pass that runs a program once per texel of its targets, see `Recorder.fill`."""
         views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
         render_pass = self._render_pass(stage, program, resources, views)
         render_pass.draw(3)
         render_pass.end()
 
     def submit(self) -> None:
-        """Submit the passes to the device."""
+        """Submit all passes to the device's queue."""
         self._end_pass()
         if self._wall_clock and self._stage:
             self._end_stage(self._wall_clock)
@@ -157,11 +161,11 @@ class CommandList(Recorder):
         self._uniforms.finish()
 
     def wait(self) -> None:
-        """Wait until the device has finished what was submitted."""
+        """Wait until the device has finished the last submission."""
         self.device.wait(self.submitted)
 
     def stage_ms(self) -> dict[str, float] | None:
-        """Return the time of each stage and the "total" [ms] after `submit`; None without a clock."""
+        """Return the time of each stage and of the frame ("total") after `submit` [ms]; None if not timed."""
         clock = self._wall_clock or self._timestamps
         return clock.stage_ms() if clock else None
 
@@ -173,7 +177,10 @@ class CommandList(Recorder):
         targets: Sequence[TextureOrView],
         depth: Mapping[str, object] | None = None,
     ) -> Untyped:
-        """Begin a render pass over cleared targets, with a program and its resources set."""
+        """Begin a render pass with cleared targets, pipeline and bind group, and return its encoder.
+
+        depth : wgpu's description of the depth attachment; None for none
+        """
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
         self._end_pass()
         timestamps = self._begin_stage(stage)
@@ -189,13 +196,13 @@ class CommandList(Recorder):
 
     @property
     def _encoder(self) -> Untyped:
-        """Return the command encoder, which is created for the first command after each submission."""
+        """Return the current command encoder; each submission starts a new one."""
         if self._open_encoder is None:
             self._open_encoder = self.device.command_encoder()
         return self._open_encoder
 
     def _compute_pass(self, stage: str) -> ComputePass:
-        """Return the open compute pass, or a new one where a timed stage begins."""
+        """Return the open compute pass, or begin one; a stage that is timed gets a pass of its own."""
         if self._splits_stages and self._pass and stage != self._stage:
             self._end_pass()
         if not self._pass:
@@ -209,7 +216,7 @@ class CommandList(Recorder):
         self._pass = None
 
     def _begin_stage(self, stage: str) -> TimestampWrites | None:
-        """Begin a stage; return the timestamps that its pass writes."""
+        """Begin a stage and return the `timestamp_writes` of its pass, or None."""
         if self._wall_clock and self._stage not in ("", stage):
             self._end_stage(self._wall_clock)
         self._stage = stage
@@ -231,9 +238,11 @@ class CommandList(Recorder):
 
 
 class Dispatch(NamedTuple):
-    """A dispatch in the form that the native library takes.
+    """Arguments of a compute dispatch, as native handles.
 
-    bind_group, uniforms, offsets : handle of the bind group, its number of uniforms, and their offsets
+    stage : name of the stage
+    pipeline, bind_group : native handles of the pipeline and of the bind group
+    uniforms, offsets : number of dynamic uniform offsets, and C array of these offsets [byte]
     groups : workgroups along each axis
     """
 
@@ -246,18 +255,23 @@ class Dispatch(NamedTuple):
 
 
 def make_dispatch(
-    stage: str, program: ComputeProgram, group: Native, offsets: Sequence[int], groups: Workgroups
+    stage: str, program: ComputeProgram, group: NativeObject, offsets: Sequence[int], groups: Workgroups
 ) -> Dispatch:
-    """Return the dispatch of a program with a bind group and the offsets of its uniforms."""
+    """Return the native arguments for a dispatch of a program.
+
+    group : bind group of the program
+    offsets : offsets of its uniform records in their buffers [byte]
+    groups : workgroups along each axis
+    """
     native_offsets = program.device.ffi.new("uint32_t[]", offsets)
     return Dispatch(stage, program.pipeline._internal, group._internal, len(offsets), native_offsets, groups)
 
 
 class ComputePass:
-    """A compute pass that calls the native library directly.
+    """Compute pass that is encoded by direct calls of the native library, for speed.
 
-    wgpu wraps each call in Python to catch its errors. Here errors are reported all the same: the library
-    collects those of a pass until the encoder finishes. It also keeps alive what a pass binds.
+    wgpu wraps each call in Python to catch its errors. Without that no error is lost: the library collects
+    the errors of a pass until the encoder finishes. The library also keeps the bound resources alive.
     """
 
     def __init__(
@@ -272,7 +286,7 @@ class ComputePass:
             self._handle = self._pass._internal
 
     def run(self, dispatches: Iterable[Dispatch]) -> None:
-        """Add dispatches in order."""
+        """Encode dispatches in order."""
         handle, set_pipeline = self._handle, self._lib.wgpuComputePassEncoderSetPipeline
         set_bind_group = self._lib.wgpuComputePassEncoderSetBindGroup
         dispatch_workgroups = self._lib.wgpuComputePassEncoderDispatchWorkgroups
@@ -282,14 +296,14 @@ class ComputePass:
             dispatch_workgroups(handle, x, y, z)
 
     def end(self) -> None:
-        """End the pass."""
+        """End the pass, after which no dispatch can be added."""
         self._lib.wgpuComputePassEncoderEnd(self._handle)
 
 
 class Timestamps:
-    """Timestamps at the start of each pass; a pass lasts until the next one begins, so stages add up.
+    """GPU timestamps at the start of each pass; a pass lasts until the next one begins, so stages add up.
 
-    frame_only : True takes only the first and the last timestamp, as each of them takes time itself
+    frame_only : whether to take only the first and the last timestamp, as each one costs time itself
     """
 
     def __init__(self, device: Device, *, frame_only: bool = False) -> None:
@@ -298,7 +312,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Return the `timestamp_writes` of a pass descriptor; None for no timestamp."""
+        """Reserve a timestamp for a pass and return its `timestamp_writes`; None for a pass without one."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None
@@ -309,13 +323,13 @@ class Timestamps:
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
     def end(self, encoder: Untyped) -> None:
-        """Add the timestamp at the end of the last pass and resolve all."""
+        """Encode the final timestamp and the copy of all timestamps to a buffer."""
         if self._stages:
             encoder.begin_compute_pass(label="end", timestamp_writes=self._add("end")).end()
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of each stage, unless only the frame is timed, and the "total" [ms]."""
+        """Return the time of each stage (unless `frame_only`) and of the frame ("total") [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
@@ -330,19 +344,19 @@ class Timestamps:
 
 
 class WallClock:
-    """Time between the submission of each stage and its end.
+    """Host time from the submission of each stage to its end, for software adapters.
 
-    For software adapters: Mesa writes the timestamps of compute passes before their work is done; waiting
-    costs nothing there.
+    Mesa writes the timestamps of compute passes before their work is done, and waiting costs nothing in
+    software.
     """
 
     def __init__(self) -> None:
         self._times: dict[str, float] = {}
 
     def add(self, stage: str, started: float) -> None:
-        """Add the time since `started` (time.perf_counter) to the stage."""
+        """Add the time elapsed since `started`, a value of time.perf_counter, to a stage."""
         self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - started)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of each stage and the "total" [ms]."""
+        """Return the time of each stage and their sum ("total") [ms]."""
         return self._times | {"total": sum(self._times.values())}

@@ -1,4 +1,4 @@
-"""Dependencies between the passes of a frame, from which the passes that have to run are found."""
+"""Dependencies between the passes of a frame, by which stale passes are found."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound=Resource)
 
-_id = count(1)
+_access_ids = count(1)
 
 _CACHED_STATES = 16  # combinations of up-to-date resources
 
 
 @dataclass(eq=False, slots=True)
 class ResourceState:
-    """Version of the content of a texture, a buffer or a texture view.
+    """Version of the content of a texture, buffer or texture view.
 
-    Equal versions are the output of the same pass from equal inputs; 0 is unknown content.
+    Content with equal versions was written by the same pass from equal inputs; version 0 means unknown
+    content.
 
-    parent : state of the texture, for a view
-    views : states of a texture's views
+    parent : state of the viewed texture, for a view; None for other resources
+    views : states of the views of a texture
     version : version of the current content
     scratch : whether the resource only carries data between passes, so that nothing reads it after a frame
     """
@@ -39,7 +40,7 @@ class ResourceState:
     scratch: bool = False
 
     def overlapping(self, written: Container[ResourceState]) -> list[ResourceState]:
-        """Return the written states that share content with this one: itself, its views or its texture."""
+        """Return the states in `written` whose content overlaps this one: itself, its views, its texture."""
         found = [view for view in self.views if view in written]
         if self in written:
             found.append(self)
@@ -48,7 +49,7 @@ class ResourceState:
         return found
 
     def set_version(self, version: int) -> None:
-        """Set the version of the content and of its views; the texture of a view becomes unknown."""
+        """Set the version of this resource and its views; that of a viewed texture becomes unknown."""
         self.version = version
         for view in self.views:
             view.version = version
@@ -58,11 +59,12 @@ class ResourceState:
 
 @dataclass(eq=False, slots=True)
 class Access:
-    """Resources that a program reads and writes under one set of bindings.
+    """Resources that a program reads and writes with one set of bindings.
 
-    id : unique number of this program with these resources
-    reads, writes : states of the resources; a resource that is both read and written is in both
-    dispatches : dispatches of earlier frames with bind groups, by stage, workgroups and record positions
+    id : unique number of the combination of program and resources
+    reads, writes : states of the resources; those that are read and written are in both
+    dispatches : native dispatches of earlier frames with their bind groups, by stage, workgroups and
+        positions of the uniform records
     """
 
     id: int
@@ -72,18 +74,18 @@ class Access:
 
 
 def unique_id() -> int:
-    """Return a number that has not been returned before."""
-    return next(_id)
+    """Return a number for `Access.id` that has not been returned before."""
+    return next(_access_ids)
 
 
 def mark_scratch(device: Device, resource: R) -> R:
-    """Mark a texture or buffer as scratch: no pass runs only to keep its content up to date."""
+    """Mark a texture or buffer as scratch, so that no pass runs only to update it, and return it."""
     resource_state(device, resource).scratch = True
     return resource
 
 
 def resource_state(device: Device, resource: Bindable) -> ResourceState:
-    """Return the state of a texture, a buffer or a view, created on first use."""
+    """Return the content version of a texture, buffer or view, whose tracking starts on first use."""
     found = device.resource_states.get(resource)
     if found is None:
         texture = getattr(resource, "texture", None)
@@ -100,10 +102,12 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 
 
 class Dependencies:
-    """Passes of a frame in order, and which of them have to run.
+    """Dependencies between the passes of a frame, which tell stale passes from passes to skip.
 
-    The version that a pass writes follows from its key and the versions of what it reads. A pass is skipped
-    while its outputs have that version, and when no pass that runs needs them.
+    The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
+    if its outputs already have that version, or if no pass that runs needs them.
+
+    passes : for each pass, in order, its access id and the resources that it reads and writes
     """
 
     def __init__(self, passes: list[PassAccess]) -> None:
@@ -122,8 +126,9 @@ class Dependencies:
                 self._add_write(state, index, writers)
 
     def versions(self, epoch: int, keys: Iterable[Hashable]) -> list[int]:
-        """Return the version that each pass writes.
+        """Return the version of the output of each pass.
 
+        epoch : number that changes when all content becomes unknown
         keys : for each pass, everything that its output depends on besides the resources that it reads
         """
         versions: list[int] = []
@@ -133,12 +138,16 @@ class Dependencies:
         return versions
 
     def stale(self, versions: Sequence[int]) -> list[bool]:
-        """Return for each pass whether it has to run to bring every resource up to date."""
+        """Return for each pass whether it has to run to bring all resources to the given versions."""
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))
 
     def _find_stale(self, current: tuple[bool, ...]) -> list[bool]:
-        """Return the stale passes, given which resources already have their final version."""
+        """Return for each pass whether it is stale.
+
+        current : for each written resource, in order of `_last_writer`, whether it already has its final
+            version
+        """
         valid = {state for state, now in zip(self._last_writer, current, strict=True) if now}
         while True:
             stale = self._stale_given(valid)
@@ -149,7 +158,10 @@ class Dependencies:
             valid -= overwritten
 
     def _stale_given(self, valid: set[ResourceState]) -> list[bool]:
-        """Return the passes that write an output which is not valid, or an input of such a pass."""
+        """Return for each pass whether it writes a needed output that is not in `valid`.
+
+        Needed are the final content of resources other than scratch, and the inputs of stale passes.
+        """
         stale, needed = [False] * len(self.passes), set[tuple[int | None, ResourceState]]()
         for index in range(len(stale) - 1, -1, -1):
             for state in self.passes[index][-1]:
@@ -162,14 +174,14 @@ class Dependencies:
         return stale
 
     def set_versions(self, executed: Sequence[bool], versions: Sequence[int]) -> None:
-        """Set the versions of everything that the executed passes wrote."""
+        """Set the versions of all resources that the executed passes wrote."""
         for (*_, writes), now, version in zip(self.passes, executed, versions, strict=True):
             if now:
                 for state in writes:
                     state.set_version(version)
 
     def _add_write(self, state: ResourceState, index: int, writers: dict[ResourceState, int]) -> None:
-        """Register a pass as the last writer of a resource and of what overlaps it."""
+        """Register a pass as the last writer of a resource and of overlapping views and textures."""
         self._last_writer[state] = writers[state] = index
         for view in state.views:
             if writers.pop(view, None) is not None:  # from here on, reads of the view come from the texture

@@ -1,4 +1,4 @@
-"""Devices: opened adapters with their limits, buffers and samplers."""
+"""Devices: opened adapters, with their limits, buffers, samplers and queue."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size",
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
-    """Open an adapter as a device.
+    """Open an adapter as a device; if the best matching one fails to open, try the next.
 
     adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#1" for its number
-    bare : True requests only the limits that WebGPU guarantees everywhere, and no optional feature
+    bare : whether to request only the limits that WebGPU guarantees everywhere, and no optional feature
 
-    Raises DermisError if there is no such adapter or if it does not open.
+    Raises DermisError if no adapter matches or none opens.
     """
     (*others, last), reason = select_adapters(adapter)
     for one in others:
@@ -47,21 +47,22 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 
 
 class Device:
-    """A logical device; devices share no state.
+    """Logical device with its queue, on which all resources and programs of a renderer live.
 
     It has WebGPU's default limits, so that a program that needs more fails on every machine alike; only the
-    largest sizes of textures and buffers are the adapter's own. It has those of `OPTIONAL_FEATURES` that the
-    adapter offers.
+    largest sizes of textures and buffers are the adapter's own. It has the features in `OPTIONAL_FEATURES`
+    that the adapter supports.
 
-    reason : reason for the choice of the adapter
-    bare : True keeps the default sizes too, and requests no feature
+    adapter, reason : adapter, and why it was chosen, for users
+    bare : whether to keep the default sizes too, and to request no feature
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
-    ffi, lib, checked : the native library, called directly in each frame to save the overhead of wgpu's
-        Python; calls of `checked` raise the library's errors, for passes when their encoder is submitted
+    ffi, lib, checked : native library of wgpu, called directly in each frame to save the overhead of wgpu's
+        Python code; functions of `checked` raise the library's errors, those of passes when their encoder is
+        submitted
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
-    spare_chunks : host memory for uniforms that no frame uses at the moment; allocating it takes longer
+    spare_chunks : unused host memory for uniforms, kept because allocation takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
@@ -103,26 +104,27 @@ class Device:
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
     def cached(self, name: str, make: Callable[[], T]) -> T:
-        """Return a small object by its name, which is made on first use and lives as long as the device."""
+        """Return the object with this name, created by `make` on first use and kept with the device."""
         if name not in self._cached:
             self._cached[name] = make()
         found: T = self._cached[name]
         return found
 
     def write(self, buffer: Buffer, data: bytearray | bytes, size: int) -> None:
-        """Write the first `size` bytes of the data to a buffer before the next submission."""
+        """Write the first `size` bytes of data to a buffer before the next submission runs."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
     def command_encoder(self) -> Untyped:
-        """Return a new command encoder, created faster than by wgpu as it has no label."""
+        """Return a new command encoder, without a label, which wgpu itself would take longer to create."""
         handle = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
         return self._encoder("", handle, self.handle)
 
     def submit(self, encoder: Untyped) -> int:
         """Submit the commands of an encoder and return the number of the submission, for `wait`.
 
-        Raises GPUError for errors of the commands, and for a lost device, where the library would abort.
+        Raises GPUError for errors of the commands, and for a lost device, for which the library would abort
+        the process.
         """
         finished = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(finished, self.lib.wgpuCommandBufferRelease)
@@ -132,13 +134,16 @@ class Device:
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, command_list))
 
     def wait(self, submitted: int | None = None) -> None:
-        """Wait for all submissions up to the one with this number from `submit`; None waits for all."""
+        """Wait until a submission and all earlier ones have finished.
+
+        submitted : number of the submission, from `submit`; None for the latest
+        """
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
 
     @property
     def is_lost(self) -> bool:
-        """Return whether the driver has lost the device or it was destroyed."""
+        """Return whether the device was lost by its driver or destroyed."""
         import wgpu
 
         try:
@@ -148,7 +153,7 @@ class Device:
         return False
 
     def _check_alive(self) -> None:
-        """Write zero bytes, for which the library raises GPUError if the device is lost."""
+        """Raise GPUError if the device is lost, found by writing zero bytes to a buffer."""
         self.write(self._unwritten, b"", 0)
 
     @cached_property
@@ -157,7 +162,10 @@ class Device:
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform_chunk(self, index: int, size: int) -> Buffer:
-        """Return one of the uniform buffers that all frames share, created on first use with `size` bytes."""
+        """Return a shared uniform buffer by index; all frames use these buffers, created on first use.
+
+        size : size of a new buffer [byte]
+        """
         while len(self._uniform_chunks) <= index:
             self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
@@ -167,7 +175,7 @@ class Device:
         return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
 
     def acquire_staging(self, size: int) -> Buffer:
-        """Return a staging buffer of at least `size` bytes, a released one if possible."""
+        """Return a mappable buffer of at least `size` bytes for a readback, a released one if possible."""
         size = -(-size // _STAGING_STEP) * _STAGING_STEP
         spare = self._staging.get(size)
         if spare:
@@ -177,23 +185,23 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for reuse; the first one of another size drops the others."""
+        """Keep a staging buffer for later readbacks; buffers of other sizes are dropped."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
 
     def buffer(self, data: NDArray[np.generic], usage: str, name: str = "buffer") -> Buffer:
-        """Create a buffer with the bytes of an array.
+        """Create a buffer from the bytes of an array.
 
-        usage : wgpu's name ("STORAGE", "UNIFORM")
-        name : name of the buffer in the error when it does not fit into memory
+        usage : name of the main flag in `wgpu.BufferUsage`, "STORAGE" or "UNIFORM"
+        name : name of the buffer, for the error if it does not fit into memory
         """
         data = np.ascontiguousarray(data)
         create = partial(self.handle.create_buffer_with_data, data=data)
         return self._buffer(name, data.nbytes, usage, create)
 
     def storage_buffer(self, size: int, name: str = "buffer") -> Buffer:
-        """Create a storage buffer of `size` zero bytes."""
+        """Create a storage buffer of `size` bytes, all zero."""
         return self._buffer(name, size, "STORAGE", partial(self.handle.create_buffer, size=size))
 
     def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
@@ -206,18 +214,18 @@ class Device:
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
-        """Return the sampler with these options of wgpu, created on first use."""
+        """Return a sampler with the given wgpu options; samplers are cached."""
         key = tuple(sorted(options.items()))
         if key not in self._samplers:
             self._samplers[key] = self.handle.create_sampler(**options)
         return self._samplers[key]
 
     def sampler_options(self, sampler: Sampler) -> dict[str, str]:
-        """Return the options that a sampler was created with."""
+        """Return the wgpu options that a sampler was created with."""
         return next(dict(key) for key, made in self._samplers.items() if made is sampler)
 
     def timestamp_pool(self) -> tuple[Untyped, Buffer]:
-        """Return the query set for the timestamps of a frame and the buffer that they are resolved into."""
+        """Return the query set for a frame's timestamps, and the buffer into which they are resolved."""
         import wgpu
 
         if self._timestamps is None:

@@ -1,4 +1,4 @@
-"""Errors of devices as the package's own, and devices that are reopened when they are lost."""
+"""Errors of devices as package errors, and devices that are reopened when lost."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _ADVICE = "Close other programs that use the GPU, or try --adapter cpu"
 
 
 class DeviceError(DermisError):
-    """Failure of a device, after which the same work may succeed on another one, or later."""
+    """Failure of a device; the same work may succeed later or on another device."""
 
 
 class DeviceLostError(DeviceError):
-    """Loss of a device with all that was on it: its driver was reset or updated, or failed."""
+    """Loss of a device and all its resources, because its driver failed, was reset or updated."""
 
     def __init__(self, device: Device) -> None:
         self.name = device.adapter.name
         super().__init__(f"{self.name}: expected the device to last, but its driver lost it. {_ADVICE}.")
 
     def lost_twice(self) -> DeviceError:
-        """Return the error for the case that the reopened device is lost too."""
+        """Return the error to raise when the reopened device is lost as well."""
         return DeviceError(
             f"device: expected {self.name} to last for a frame, but it was lost twice. {_ADVICE}."
         )
@@ -34,9 +34,9 @@ class DeviceLostError(DeviceError):
 
 @contextlib.contextmanager
 def gpu_failures(device: Device) -> Iterator[None]:
-    """Turn errors of the driver (out of memory, invalid call) into DeviceError.
+    """Convert driver errors (out of memory, invalid call) raised in this context to DeviceError.
 
-    Raises DeviceLostError if the device is lost, whichever error that caused.
+    Raises DeviceLostError for any error on a device that is lost.
     """
     import wgpu
 
@@ -56,11 +56,11 @@ def gpu_failures(device: Device) -> Iterator[None]:
 
 
 class ReopeningDevice:
-    """A device that is opened again when it is lost.
+    """Device that is opened again when it is lost, and on which the interrupted work is then repeated.
 
     open_device : function that opens a device
-    on_open : function that is called with each opened device, to create the resources on it
-    reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
+    on_open : function that creates the resources of the caller on each opened device
+    reopens : if False, DeviceLostError is raised instead, for callers that keep more resources on the device
     """
 
     def __init__(
@@ -71,9 +71,9 @@ class ReopeningDevice:
         self.run(lambda: None)
 
     def run(self, job: Callable[[], T]) -> T:
-        """Return `job()`, which is run a second time on a reopened device if this one is lost.
+        """Return the result of `job()`, which is repeated on a reopened device if the current one is lost.
 
-        Raises DermisError if both are lost, and as `gpu_failures` does.
+        Raises DermisError if both devices are lost, and DeviceError for other errors of the driver.
         """
         try:
             return self._run(job)
@@ -100,9 +100,9 @@ class ReopeningDevice:
 
 
 class LazyDevice:
-    """A device for several jobs, opened for the first of them and reopened when it is lost.
+    """Device that is opened for the first job and reopened when it is lost.
 
-    adapter : as for `open_device`
+    adapter : selector of the adapter, see `open_device`
     """
 
     def __init__(self, adapter: str) -> None:
@@ -111,9 +111,9 @@ class LazyDevice:
         self._reopening: ReopeningDevice | None = None
 
     def run(self, job: Callable[[Device], T]) -> T:
-        """Return `job(device)`.
+        """Return the result of `job(device)`, opening or reopening the device as needed.
 
-        Raises DermisError as `open_device` and `ReopeningDevice.run`.
+        Raises DermisError if no device opens, if it is lost twice, and for other errors of the driver.
         """
         if self._reopening is None:
             self._reopening = ReopeningDevice(partial(open_device, self._adapter), self._on_open)
@@ -124,8 +124,10 @@ class LazyDevice:
 
 
 def run_on_device(adapter: str, job: Callable[[Device], T]) -> T:
-    """Return `job(device)` on a device that is opened for it and reopened when it is lost.
+    """Return the result of `job(device)` on a device opened for it, and reopened if lost.
 
-    Raises DermisError as `open_device` and `ReopeningDevice.run`.
+    adapter : selector of the adapter, see `open_device`
+
+    Raises DermisError if no device opens, if it is lost twice, and for other errors of the driver.
     """
     return LazyDevice(adapter).run(job)

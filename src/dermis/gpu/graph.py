@@ -1,4 +1,4 @@
-"""Frame graph: passes are declared in order, only stale passes run, and a frame can be listed."""
+"""Frame graph: passes are declared in order, and only those with stale output run."""
 
 from __future__ import annotations
 
@@ -25,13 +25,16 @@ _CACHED_DEPENDENCIES = 8  # of frames that alternate: pictures, readbacks, and t
 
 @dataclass
 class ListedPass:
-    """A pass of a listed frame.
+    """Entry of a frame listing: one pass with its shader, bindings and whether it ran.
 
+    stage : name of the stage
     shader : name of the shader file
-    constants : pipeline constants
-    bindings : by name in the shader: index of a resource, "sampler", or "record 128" with the size [byte]
-    groups : workgroups along each axis, or number of vertices of a render pass
-    recorded : whether the pass is part of a recording, whose records do not change
+    constants : pipeline constants by name
+    bindings : by name in the shader: index of a resource, "sampler", or "record 128" for a record of 128
+        bytes
+    groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
+        the host
+    recorded : whether the pass belongs to a recording, whose uniform records do not change
     ran : whether the pass ran in that frame
     """
 
@@ -46,7 +49,7 @@ class ListedPass:
 
 @dataclass
 class Listing:
-    """Passes of a frame in order, and the resources that they bind.
+    """Listing of a frame for inspection: its passes in order, and the resources that they bind.
 
     resources : descriptions such as "rgba32float 512 x 512 x 7" or "buffer 4096"
     """
@@ -65,29 +68,38 @@ class Listing:
         index: int,
         recorded: bool = False,
     ) -> None:
-        """Add a pass.
+        """Append a pass to the listing.
 
-        index : index of the graph's pass that it belongs to
+        index : index of the declared pass to which it belongs, which may be a recording of several passes
+        recorded : whether it belongs to a recording
         """
-        bindings = {one.name: self._bound(resources[one.name]) for one in program.bindings}
+        bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
         listed = ListedPass(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
         self.passes.append(listed)
         self._pass_index.append(index)
 
     def add_write(self, stage: str, buffer: Buffer, size: int, index: int) -> None:
-        """Add a write of `size` bytes from the host to a buffer."""
-        self.passes.append(ListedPass(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
+        """Append a write of `size` bytes from the host to a buffer.
+
+        index : index of the declared pass that writes
+        """
+        self.passes.append(
+            ListedPass(stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (size,))
+        )
         self._pass_index.append(index)
 
     def finish(self, ran: Sequence[bool]) -> None:
-        """Set which of the graph's passes ran."""
+        """Set `ran` of all listed passes.
+
+        ran : for each declared pass whether it ran
+        """
         for one, index in zip(self.passes, self._pass_index, strict=True):
             one.ran = ran[index]
 
-    def _bound(self, value: Bindable) -> int | str:
+    def _describe_binding(self, value: Bindable) -> int | str:
         if isinstance(value, np.ndarray):
             return f"record {value.nbytes}"
-        description = _describe(value)
+        description = _describe_resource(value)
         if description == "sampler":
             return description
         if id(value) not in self._resource_index:
@@ -97,9 +109,10 @@ class Listing:
 
 
 class ListingRecorder(Recorder):
-    """Recorder that adds the passes of a recording to a listing.
+    """Recorder that lists the passes of a recording instead of recording them.
 
-    index : index of the recording among the graph's passes
+    listing : listing to which they are added
+    index : index of the recording among the declared passes
     """
 
     def __init__(self, device: Device, listing: Listing, index: int) -> None:
@@ -108,13 +121,13 @@ class ListingRecorder(Recorder):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Add a compute pass to the listing."""
+        """Append a compute pass to the listing instead of running it."""
         self._listing.add(stage, program, resources, groups, self._index, recorded=True)
 
 
-def _describe(value: Bindable) -> str:
+def _describe_resource(value: Bindable) -> str:
     if is_view(value):
-        return f"view of {_describe(value.texture)}"
+        return f"view of {_describe_resource(value.texture)}"
     if is_texture(value):
         width, height, layers = value.size
         return f"{value.format} {width} x {height} x {layers}"
@@ -123,11 +136,12 @@ def _describe(value: Bindable) -> str:
 
 @dataclass(slots=True)
 class DeclaredPass:
-    """A pass of a frame, or the recorded passes of one `repeat`.
+    """Pass declared on a graph, or all passes of a recording, which run as a whole.
 
-    stages : names of the stages
+    stages : names of its stages
     run : function that adds the pass to a command list
-    key : everything that the output depends on besides the resources that the pass reads
+    key : everything that its output depends on besides the resources that it reads
+    access : access id, and states of the resources that it reads and writes
     """
 
     stages: tuple[str, ...]
@@ -137,15 +151,16 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Frame graph that runs only those of the declared passes whose output is stale.
+    """Frame graph: a recorder that runs only those declared passes whose output is stale.
 
-    The resources that a pass reads and writes follow from the bindings of its shader. The version that it
-    writes follows from its program, its resources and their versions, the workgroups, and the uniforms that
-    the shader reads. A pass is skipped while its outputs have that version, and when no pass that runs needs
-    them.
+    The resources that a pass reads and writes follow from the bindings of its shader. The version of its
+    output is a hash of the program, the resources and their versions, the workgroups, and the uniforms that
+    the shader reads. A pass is skipped if its outputs already have that version, or if no pass that runs
+    needs them.
 
-    executed_stages : stages of the passes that the last frame ran, in order
-    listing : if set, the passes of the next frame are added to it
+    recordings : cache of the recordings of `repeat`
+    executed_stages : stages of the passes that ran in the last frame, in order
+    listing : listing that receives the passes of the next frame; None for none
     """
 
     def __init__(self, device: Device) -> None:
@@ -164,7 +179,7 @@ class Graph(Recorder):
         self._epoch += 1
 
     def begin(self) -> None:
-        """Begin a frame."""
+        """Begin a frame without passes."""
         self._passes.clear()
         self._uniforms.clear()
         self._readbacks.clear()
@@ -172,7 +187,7 @@ class Graph(Recorder):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Declare a compute pass, see `Recorder.dispatch`."""
+        """Declare a dispatch of a compute program, see `Recorder.dispatch`."""
         access = program.access(resources)
         writes = access.writes
         if in_place:
@@ -185,7 +200,7 @@ class Graph(Recorder):
         self._add(stage, program, resources, groups, access, writes, run)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
-        """Declare a write from the host, see `Recorder.write`."""
+        """Declare a write of bytes from the host to a buffer, see `Recorder.write`."""
         state = resource_state(self.device, buffer)
 
         def run(frame: CommandList) -> None:
@@ -221,7 +236,7 @@ class Graph(Recorder):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Declare a render pass for each texel of its targets, see `Recorder.fill`."""
+        """Declare a render pass that runs a program once per texel of its targets, see `Recorder.fill`."""
         writes = tuple(resource_state(self.device, one) for one in targets)
 
         def run(frame: CommandList) -> None:
@@ -230,9 +245,9 @@ class Graph(Recorder):
         self._add(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the compute passes of `record(graph, *args)`, which is called once per set of arguments.
+        """Declare the compute passes that `record(recorder, *args)` adds, recorded once per set of arguments.
 
-        Either all passes of the recording run or none. Replaying them takes Python next to no time.
+        All passes of the recording run or none. Replaying them takes almost no time in Python.
         """
         recording, result = self.recordings.get(self.device, record, args)
         if self.listing is not None:
@@ -243,13 +258,13 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback of buffers, one after the other, with their content after the frame."""
+        """Return a readback of the concatenated buffers as they are after the frame."""
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback
 
     def submit(self, timed: Timing = False) -> CommandList:
-        """Run the stale passes and return their command list, which has the times of the stages."""
+        """Run the stale passes and return their command list, from which stage times can be read."""
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
             dependencies = self._find_dependencies()
@@ -274,7 +289,7 @@ class Graph(Recorder):
         return frame
 
     def _find_dependencies(self) -> Dependencies:
-        """Return the dependencies of the declared passes, from the cache for a frame like an earlier one."""
+        """Return the dependencies of the declared passes, cached for frames with the same passes."""
         passes = [one.access for one in self._passes]
         for known in self._dependencies:
             if known.passes == passes:

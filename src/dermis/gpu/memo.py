@@ -1,4 +1,4 @@
-"""A cache of what the CPU prepares for frames: uploaded maps, fitted tables, textures to write to."""
+"""Cache of results that the CPU prepares for frames: uploaded maps, fitted tables, empty textures."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ Key = tuple[Callable[..., object], str]
 
 @dataclass(eq=False, slots=True)
 class CachedResult:
-    """Result of a function for some arguments.
+    """Cached result of a function call.
 
-    parts : results that the function itself took from the cache; they stay in use as long as this one
-    keys : key of this result and of all its parts
+    args : arguments of the call, compared with later ones
+    value : return value
+    parts : results that the function itself took from the cache; they count as used whenever this one is used
+    keys : keys of this result and of all its parts
     """
 
     args: tuple[object, ...]
@@ -32,11 +34,12 @@ class CachedResult:
 
 
 class Memo:
-    """Cache of function results, in which a function is called again only when an argument changes.
+    """Cache of function results: a function is called again only when an argument has changed.
 
-    cache_size : number of results that are kept per function, for callers that alternate between a few
-    cache_ttl : number of frames after which the results of an unused function are dropped, at least
-        `cache_size` squared
+    cache_size : number of results kept per function, for callers that alternate between a few sets of
+        arguments
+    cache_ttl : number of frames after which results of unused functions are dropped, at least `cache_size`
+        squared
     """
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
@@ -57,10 +60,11 @@ class Memo:
     def get(
         self, function: Callable[..., T], *args: object, untracked: tuple[object, ...] = (), owner: str = ""
     ) -> T:
-        """Return `function(*args, *untracked)`, from the cache where it was called with equal `args`.
+        """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
 
-        untracked : further arguments, which do not change the result and are not compared
-        owner : name of what the result belongs to, where several are in use in turn
+        untracked : further arguments that do not affect the result and are not compared
+        owner : name of the caller that the result is for, such as a feature, if several callers use the same
+            function
         """
         key = function, owner
         results = self._results.setdefault(key, [])
@@ -86,11 +90,11 @@ class Memo:
     def submit(
         self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, owner: str = ""
     ) -> Future[T]:
-        """Return the future of `function(*args)`, which runs on another thread unless it is cached."""
+        """Return a future of `function(*args)`, run on a thread of `executor`, or the cached future."""
         return self.get(_submit, executor, function, args, owner=owner)
 
     def result(self, future: Future[T]) -> T:
-        """Wait for the result of a future from `submit`; a failed call is dropped from the cache."""
+        """Wait for a future of `submit` and return its result; if it failed, the cache is cleared."""
         try:
             return future.result()
         except Exception:
@@ -98,7 +102,7 @@ class Memo:
             raise
 
     def end_frame(self) -> None:
-        """End a frame and drop the results of functions that the most recent frames did not use."""
+        """End a frame: drop results of functions that were not called in the last `cache_ttl` frames."""
         if self._cache_size > 1:
             self._mark_hits_used()
         self._recent_keys[-1].update(*(result.keys for _, result in self._hits))
@@ -109,7 +113,7 @@ class Memo:
         self._recent_keys.append(set())
 
     def clear(self) -> None:
-        """Drop all results."""
+        """Drop all cached results."""
         self._results.clear()
         self._hits.clear()
 
@@ -125,13 +129,13 @@ class Memo:
         return result
 
     def _mark_hits_used(self, key: Key | None = None) -> None:
-        """Mark the results of this frame as most recently used: all, or those that involve a key."""
+        """Mark results used in this frame as most recently used: all, or those that depend on a key."""
         for one, result in self._hits:
             if key is None or key in result.keys:
                 self._mark_used(one, result)
 
     def _mark_used(self, key: Key, result: CachedResult) -> None:
-        """Mark a result and its parts as most recently used."""
+        """Move a result and its parts to the front of the cache, as most recently used."""
         self._recent_keys[-1].add(key)
         results = self._results.setdefault(key, [])
         if not results or results[0] is not result:
@@ -145,7 +149,7 @@ def _submit(executor: Executor, function: Callable[[*Ts], T], args: tuple[*Ts]) 
 
 
 def are_equal(a: Any, b: Any) -> bool:
-    """Return whether two objects are equal: by value for arrays and dataclasses, else by identity."""
+    """Return whether two arguments are equal: arrays and dataclasses by value, other objects by identity."""
     if a is b:
         return True
     if type(a) is not type(b):
@@ -174,10 +178,10 @@ def are_equal(a: Any, b: Any) -> bool:
 
 @cache
 def field_names(kind: type) -> tuple[str, ...] | None:
-    """Return the names of a dataclass's fields; None for other types."""
+    """Return the field names of a dataclass; None for other types."""
     return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
 
 
 def has_value_equality(value: object) -> bool:
-    """Return whether an object's type defines equality by value, as textures for example do not."""
+    """Return whether the type of an object defines `__eq__` by value; resources on the device do not."""
     return type(value).__eq__ is not object.__eq__

@@ -1,4 +1,4 @@
-"""Memory of devices and of the process: how much is used, how much is free, and errors when it runs out."""
+"""Memory of devices and of the process: allocated and free bytes, and errors when it runs out."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ _SMALLER_FRAME = (
 
 
 class OutOfMemoryError(DermisError):
-    """A resource that does not fit into the memory of a device.
+    """Error for a resource that does not fit into the memory of a device.
 
-    expected, actual : sentences without a full stop, for callers that have better advice
+    expected, actual : halves of the message, without a full stop, for callers that have better advice
     size : size of the resource [byte]
     """
 
@@ -52,9 +52,9 @@ class OutOfMemoryError(DermisError):
 
 @contextlib.contextmanager
 def allocation(device: str, name: str, size: float, limit: float) -> Iterator[None]:
-    """Raise OutOfMemoryError, which names the resource, if the resource created here does not fit.
+    """Raise OutOfMemoryError if the resource that is created in this context does not fit.
 
-    device, name : names of the adapter and of the resource
+    device, name : names of the adapter and of the resource, for the message
     size, limit : size of the resource, and largest size that the device allows [byte]
     """
     import wgpu
@@ -72,7 +72,7 @@ def allocation(device: str, name: str, size: float, limit: float) -> Iterator[No
 
 
 def allocated_bytes() -> int:
-    """Return the size of all textures and buffers that are not yet released [byte]."""
+    """Return the total size of all textures and buffers that are not released [byte]."""
     import wgpu
 
     found = wgpu.diagnostics.object_counts.get_dict()
@@ -86,13 +86,13 @@ def check_memory(
     sizes: str,
     advice: Callable[[float], str] = lambda _: _SMALLER,
 ) -> None:
-    """Refuse sizes that do not fit into main memory, where software adapters keep textures.
+    """Raise DermisError if textures of a software adapter would not fit into main memory.
 
-    needed : bytes; the system kills a process that takes too much
-    option, sizes : words for the message
-    advice : function that returns the advice for the number of available bytes
+    The operating system would otherwise kill the process.
 
-    Raises DermisError.
+    needed : size of the textures and buffers [byte]
+    option, sizes : name of the option and text with the sizes that it sets, for the message
+    advice : function that returns the advice for a number of available bytes
     """
     if device.adapter.kind != "CPU":
         return
@@ -103,7 +103,7 @@ def check_memory(
 
 
 def probe_memory(device: Device, limit: float) -> float:
-    """Return the free memory of a device up to a limit [byte], found by allocating and releasing it."""
+    """Return the free memory of a device, at most `limit`, found by trial allocation [byte]."""
     buffers: list[Buffer] = []
     total, size = 0, min(int(limit), device.max_storage_bytes) // 4 * 4
     while size >= _MIN_PROBE_BYTES and total < limit:
@@ -118,24 +118,30 @@ def probe_memory(device: Device, limit: float) -> float:
 
 
 def check_drivers() -> None:
-    """Raise DermisError if the limit of address space is too low to load the graphics drivers."""
+    """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
     if _address_space_limit() < math.inf and not _has_drivers():
         _check_address_space(_per_threads(_LISTING_BYTES), _per_threads(_SOFTWARE_BYTES))
 
 
 def check_software() -> None:
-    """Raise DermisError if the limit of address space is too low to render in software."""
+    """Raise DermisError if the address space limit (ulimit -v) is too low to render in software."""
     if _address_space_limit() < math.inf:
         _check_address_space(_per_threads(_SOFTWARE_BYTES))
 
 
 def available_memory() -> float:
-    """Return the memory that the process may still take, by address space, machine and cgroup [byte]."""
+    """Return the memory that this process can still allocate [byte].
+
+    It is limited by address space, by the memory of the machine and by the control group.
+    """
     return min(_address_space_limit() - _address_space_used(), main_memory())
 
 
 def main_memory() -> float:
-    """Return the memory of the machine, or of the process's cgroup if less; infinite if unknown [byte]."""
+    """Return the memory of the machine, or the limit of the process's control group if lower [byte].
+
+    Infinite if unknown.
+    """
     known = [math.inf]
     with contextlib.suppress(AttributeError, ValueError):  # on Windows
         known.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
@@ -145,12 +151,12 @@ def main_memory() -> float:
 
 
 def format_bytes(size: float) -> str:
-    """Return a number of bytes as text in MB or GB."""
+    """Return a size in bytes as text in MB or GB."""
     return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
 
 
 def _cgroup_limits() -> list[float]:
-    """Return the memory limits of the process's control groups (v2 and v1) [byte]."""
+    """Return the memory limits of the process's Linux control groups, versions 1 and 2 [byte]."""
     own = [_CGROUPS / name for name in _own_cgroups()]
     folders = [folder for one in own for folder in (one, *one.parents) if folder.is_relative_to(_CGROUPS)]
     files = [*(folder / "memory.max" for folder in folders), _CGROUPS / "memory" / "memory.limit_in_bytes"]
@@ -173,7 +179,7 @@ def _check_address_space(needed: float, needed_later: float = 0.0) -> None:
 
 
 def _has_drivers() -> bool:
-    """Return whether this process has already loaded drivers."""
+    """Return whether this process has already loaded the Vulkan loader, and with it the drivers."""
     try:
         return "libvulkan" in Path("/proc/self/maps").read_text()
     except OSError:  # not on Linux
@@ -185,7 +191,7 @@ def _per_threads(needed: tuple[float, float]) -> float:
 
 
 def _address_space_limit() -> float:
-    """Return the limit of the process's address space [byte]."""
+    """Return the limit of the process's address space (ulimit -v), infinite if there is none [byte]."""
     try:
         import resource
     except ImportError:  # on Windows
@@ -202,6 +208,6 @@ def _address_space_used() -> float:
 
 
 def _software_threads() -> int:
-    """Return the number of threads that Mesa's software adapter uses."""
+    """Return the number of threads of Mesa's software adapter."""
     threads = os.environ.get("LP_NUM_THREADS", "")
     return int(threads) if threads.isdigit() else min(os.cpu_count() or 1, _MAX_THREADS)

@@ -1,4 +1,4 @@
-"""Programs: compiled WGSL shaders whose resources are bound by name."""
+"""Programs: compiled WGSL shaders whose resources are bound by their names in the shader."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
-from dermis.gpu.bind_groups import UNIFORM, BindGroup, ResourceCache, make_bind_group, resource_key
+from dermis.gpu.bind_groups import UNIFORM_BUFFER, BindGroup, ResourceCache, make_bind_group, resource_key
 from dermis.gpu.dependencies import Access, resource_state, unique_id
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, bindings, make_record, used_members
-from dermis.gpu.types import Bindable, Bindings, Native, UniformRecord, Untyped
+from dermis.gpu.shader_types import Binding, make_record, shader_bindings, used_members
+from dermis.gpu.types import Bindable, Bindings, NativeObject, UniformRecord, Untyped
 from dermis.gpu.uniforms import Uniforms
-from dermis.gpu.wgsl_source import Folder, Source, compose
+from dermis.gpu.wgsl_source import Folder, ShaderSource, compose
 
 Records = Mapping[str, NDArray[np.generic]]
 """Bindings of a shader's uniforms only."""
@@ -28,7 +28,7 @@ P = TypeVar("P")
 
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 
-_LARGE_RECORD = 2048  # bytes; the record of a skin is smaller, of which few shaders read all
+_LARGE_RECORD_BYTES = 2048  # bytes; the record of a skin is smaller, of which few shaders read all
 
 _CACHED_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
 
@@ -37,12 +37,12 @@ Constants = tuple[tuple[str, float], ...]
 
 
 class Program:
-    """Base class of programs: a composed shader with its bindings and layouts.
+    """Base class of programs: a composed shader with its bindings and its pipeline layout.
 
     path : WGSL file
-    folders : folders in which its includes are looked up
+    folders : folders that are searched for included files
     constants : pipeline constants by name
-    stages : wgpu's names of the stages that see the bindings
+    stages : names in `wgpu.ShaderStage` of the shader stages to which the bindings are visible
     """
 
     stages: ClassVar[tuple[str, ...]]
@@ -57,11 +57,11 @@ class Program:
         self.device, self.name = device, path.stem
         self.constants = dict(constants or {})
         self.source = shader_source(path, folders)
-        self.bindings: tuple[Binding, ...] = bindings(self.source.text)
+        self.bindings: tuple[Binding, ...] = shader_bindings(self.source.text)
         self._module = self._compile(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._others = [b for b in self.bindings if not _is_uniform(b)]
-        self._get_others = _getter([b.name for b in self._others])
+        self._get_others = _binding_getter([b.name for b in self._others])
         self._used_members = [(one.name, used_members(self.source.text, one.name)) for one in self._uniforms]
         self.bind_groups: ResourceCache[BindGroup] = ResourceCache()
         self._accesses: ResourceCache[Access] = ResourceCache()
@@ -69,11 +69,11 @@ class Program:
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
     def record(self, struct: str, **values: object) -> UniformRecord:
-        """Return a record of one of the shader's structs: zeros, with the given members set."""
+        """Return a uniform record for a struct of the shader: zeros, except for the given members."""
         return make_record(self.source.text, struct, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
-        """Return the positions of the bound records in uniform memory [byte]."""
+        """Return the positions in uniform memory of the records that are bound to the shader [byte]."""
         records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
@@ -81,13 +81,13 @@ class Program:
             raise self._unbound_error(missing) from None
 
     def bind_group(self, resources: Bindings, uniforms: Uniforms) -> tuple[BindGroup, list[int]]:
-        """Return a bind group and the offsets of its uniforms.
+        """Return the bind group for resources, and the dynamic offsets of its uniform records [byte].
 
-        resources : buffers, textures, texture views, samplers and numpy records by their names in the
-            shader; records are placed in uniform memory
+        resources : buffers, textures, texture views, samplers and NumPy records by their names in the shader;
+            records are placed in uniform memory
         """
         located = [uniforms.locate(position) for position in self.record_positions(resources, uniforms)]
-        bound = [*self._bound(resources), *(buffer for buffer, _ in located)]
+        bound = [*self._bound_resources(resources), *(buffer for buffer, _ in located)]
         key = resource_key(bound)
         group = self.bind_groups.find(key)
         if group is None:
@@ -96,8 +96,8 @@ class Program:
         return group, [offset for _, offset in located]
 
     def access(self, resources: Bindings) -> Access:
-        """Return the resources that a pass of this program reads and writes; records do not count."""
-        bound = self._bound(resources)
+        """Return the resources that a pass with these bindings reads and writes, without uniform records."""
+        bound = self._bound_resources(resources)
         key = resource_key(bound)
         found = self._accesses.find(key)
         if found is None:
@@ -111,7 +111,7 @@ class Program:
         return found
 
     def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
-        """Return the bytes of the bound records that the shader reads.
+        """Return the bytes of the uniform records that the shader reads, as part of a pass's key.
 
         Large records are returned whole, as several passes share their hash.
         """
@@ -120,13 +120,13 @@ class Program:
         try:
             for name, select in self._used_members:
                 raw = uniforms.bytes_of(records[name])
-                found.append(raw if len(raw) > _LARGE_RECORD else select(raw))
+                found.append(raw if len(raw) > _LARGE_RECORD_BYTES else select(raw))
         except KeyError as missing:
             raise self._unbound_error(missing) from None
         return tuple(found)
 
-    def _bound(self, resources: Bindings) -> Sequence[Bindable]:
-        """Return the resources without records, in the order of the shader's bindings."""
+    def _bound_resources(self, resources: Bindings) -> Sequence[Bindable]:
+        """Return the bound resources in the order of the shader's bindings, without uniform records."""
         try:
             return self._get_others(resources)
         except KeyError as missing:
@@ -136,7 +136,7 @@ class Program:
         return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
 
     def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
-        """Return the bind group of the other resources followed by the buffers of the uniforms."""
+        """Create the bind group for bound resources, followed by the buffers of the uniform records."""
         records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(
@@ -155,7 +155,7 @@ class Program:
         import wgpu
 
         visibility = sum(int(getattr(wgpu.ShaderStage, stage)) for stage in self.stages)
-        uniform = {"buffer": {**UNIFORM, "has_dynamic_offset": True}}
+        uniform = {"buffer": {**UNIFORM_BUFFER, "has_dynamic_offset": True}}
         return [
             {"binding": one.index, "visibility": visibility, **(uniform if _is_uniform(one) else one.entry)}
             for one in self.bindings
@@ -163,7 +163,7 @@ class Program:
 
 
 class ComputeProgram(Program):
-    """A compute shader with the entry point `main`, compiled on another thread."""
+    """Compute program with the entry point `main`, whose pipeline is compiled on another thread."""
 
     stages = ("COMPUTE",)
 
@@ -181,22 +181,25 @@ class ComputeProgram(Program):
         )
 
     @cached_property
-    def pipeline(self) -> Native:
-        """Return the pipeline; wait for its compilation if necessary."""
-        pipeline: Native = self._compiled.result()
+    def pipeline(self) -> NativeObject:
+        """Return the compute pipeline, waiting for its compilation if necessary."""
+        pipeline: NativeObject = self._compiled.result()
         return pipeline
 
     def groups_for(self, size: tuple[int, int], tile: int = 8) -> tuple[int, int]:
-        """Return the number of workgroups of tile x tile invocations that cover an image of `size`."""
+        """Return the workgroups along x and y, each of tile x tile invocations, that cover an image.
+
+        size : width and height of the image [texel]
+        """
         return math.ceil(size[0] / tile), math.ceil(size[1] / tile)
 
 
 class RenderProgram(Program):
-    """A shader with the entry points `vertex` and, if there are colour targets, `fragment`.
+    """Render program with the entry points `vertex` and, if it has colour targets, `fragment`.
 
-    targets : formats of the colour targets; none to draw only depth
-    depth_compare : depth test by wgpu's name ("less", "greater"); None for no depth attachment
-    raster : depth test and first target, for a player of captured frames
+    targets : texture formats of the colour targets; empty to draw only depth
+    depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
+    raster : depth test and format of the first target, for players of captured frames
     """
 
     stages = "VERTEX", "FRAGMENT"
@@ -226,7 +229,7 @@ class RenderProgram(Program):
 
 
 def cached_program(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
-    """Return a program of a shader with these pipeline constants, compiled unless it was used recently.
+    """Return the program for a shader and pipeline constants, from the cache if it was used recently.
 
     shader : key that identifies the shader
     make : function that compiles the program
@@ -242,18 +245,21 @@ def cached_program(device: Device, shader: Hashable, constants: Constants, make:
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return those pipeline constants that a shader declares."""
+    """Return the pipeline constants that a shader declares, by name; others would be an error in WebGPU."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 
 
-def shader_source(path: Path, folders: Sequence[Folder]) -> Source:
-    """Return the composed text of a shader, which may include the toolkit's own files."""
+def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
+    """Return a shader with its includes and other directives expanded.
+
+    folders : folders that are searched for included files, before the toolkit's own
+    """
     return compose(path, (*folders, _TOOLKIT_SHADERS))
 
 
-def _getter(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Return a function that takes the named resources out of bindings."""
+def _binding_getter(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
+    """Return a function that selects resources by name from bindings, as a sequence in this order."""
     if len(names) > 1:
         return itemgetter(*names)
     return lambda resources: [
@@ -262,4 +268,4 @@ def _getter(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
 
 
 def _is_uniform(binding: Binding) -> bool:
-    return binding.entry.get("buffer") == UNIFORM
+    return binding.entry.get("buffer") == UNIFORM_BUFFER

@@ -1,4 +1,4 @@
-"""Asynchronous readback of buffers, which the CPU reads while the device continues to work."""
+"""Asynchronous readback: copies of buffers that the CPU reads while the device continues to work."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from dermis.gpu.failures import DeviceLostError
 
 
 class BufferReadback:
-    """Copy of a buffer that becomes readable when a submission is finished.
+    """Copy of a buffer in staging memory, which becomes readable when a submission has finished.
 
-    wgpu's own mapping waits for the newest submission on another thread; here only the reader waits, and only
+    wgpu's own mapping waits on another thread for the newest submission; here only the reader waits, and only
     for the submission that fills the copy.
 
-    size : bytes
+    size : size of the copy [byte]
     """
 
     def __init__(self, device: Device, size: int) -> None:
@@ -28,7 +28,10 @@ class BufferReadback:
         self.buffer = device.acquire_staging(size)
 
     def start(self, submitted: int) -> None:
-        """Request the mapping of the copy after the submission with this number from `Device.submit`."""
+        """Request that the copy is mapped to host memory after a submission.
+
+        submitted : number of the submission that fills the copy, from `Device.submit`
+        """
         ffi, lib = self.device.ffi, self.device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")
         info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _map_callback()
@@ -39,14 +42,14 @@ class BufferReadback:
         self.device.checked.wgpuBufferMapAsync(*arguments)
 
     def on_mapped(self, status: int) -> None:
-        """Store the result of the mapping, as the driver's callback."""
+        """Store the status of the mapping; called by the driver."""
         self._status, self._handle = status, None
         self.device.pending_readbacks.discard(self)
 
     def array(self) -> NDArray[np.uint8]:
-        """Wait for the bytes and return them; can be called once.
+        """Wait for the copy and return its bytes; this can be called once.
 
-        Raises DeviceLostError if the device is lost and DermisError for other failures.
+        Raises DeviceLostError if the device is lost, and DermisError for other failures.
         """
         ffi, checked = self.device.ffi, self.device.checked
         self._check()
@@ -62,14 +65,14 @@ class BufferReadback:
         return copied
 
     def _check(self) -> None:
-        """Raise DeviceLostError for a lost device, whose buffers the library must not touch: it aborts."""
+        """Raise DeviceLostError if the device is lost, as touching its buffers would abort the process."""
         if self.device.is_lost:
             raise DeviceLostError(self.device)
 
 
 @cache
 def _map_callback() -> object:
-    """Return the driver's callback, which all copies share as its creation takes long."""
+    """Return the C callback for finished mappings, which all readbacks share as its creation is slow."""
     from wgpu.backends.wgpu_native import ffi
 
     @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]

@@ -1,4 +1,4 @@
-"""Interface of everything that takes the passes of a frame: to run, replay, capture or list them."""
+"""Interface of objects that accept the passes of a frame, to run, replay, capture or list them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Workgroups = tuple[int, int, int]
 
 
 class DrawTarget(NamedTuple):
-    """Attachments of a render pass, which are cleared first.
+    """Attachments of a render pass, which the pass clears first.
 
-    depth : depth attachment
-    clear_depth : value that the depth attachment is cleared to
+    depth : view of the depth attachment
+    clear_depth : depth to which it is cleared
     colour : colour attachment; None to draw only depth
     """
 
@@ -30,9 +30,9 @@ class DrawTarget(NamedTuple):
 
 
 class Recorder(ABC):
-    """A recorder of passes: a command list, a graph, a recording, a capture or a listing.
+    """Interface for adding passes: to a command list, a graph, a recording, a capture or a listing.
 
-    All record compute passes; recordings and listings of recordings refuse all others.
+    All implementations accept compute passes; recordings and listings of recordings refuse all others.
     """
 
     device: Device
@@ -41,11 +41,13 @@ class Recorder(ABC):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Add a compute pass.
+        """Add a dispatch of a compute program.
 
+        stage : name of the stage, under which the pass is timed
+        resources : resources and uniform records by their names in the shader
         groups : number of workgroups along each axis
-        in_place : name of a resource that the pass only extends from its own content, as gutters are, so that
-            its version does not change
+        in_place : name of a resource that the pass only extends from its own content, such as the gutters of
+            a map; the version of that resource does not change
         """
 
     def compute(
@@ -57,13 +59,13 @@ class Recorder(ABC):
         tile: int = 8,
         in_place: str = "",
     ) -> None:
-        """Add a compute pass of at least size[0] x size[1] invocations, in workgroups of tile x tile."""
+        """Add a dispatch that covers size[0] x size[1] invocations in workgroups of tile x tile."""
         self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), in_place)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Write bytes from the host to the start of a buffer, before all passes of the frame.
 
-        data : pass the same object in each frame if possible, as Python caches the hash of bytes
+        data : bytes, if possible the same object in each frame, as Python caches the hash of bytes
         """
         raise self._refusal(stage)
 
@@ -78,21 +80,23 @@ class Recorder(ABC):
         indices: Buffer | None = None,
         layer: int = 0,
     ) -> None:
-        """Add a render pass of `vertices` / 3 triangles.
+        """Add a render pass of triangles.
 
-        indices : index buffer; None numbers the vertices in order
-        layer : instance index that the shader gets
+        vertices : number of vertices, three per triangle
+        target : depth and colour attachments
+        indices : index buffer; None to number the vertices in order
+        layer : instance index, which shaders use as the layer of a texture array
         """
         raise self._refusal(stage)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a render pass that runs `program` for each texel of its targets."""
+        """Add a render pass that runs a program once per texel of its targets."""
         raise self._refusal(stage)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the compute passes of `record(recorder, *args)`, which depend only on its arguments."""
+        """Add the compute passes that `record(recorder, *args)` adds, which must depend only on `args`."""
         return record(self, *args)
 
     def _refusal(self, stage: str) -> NotImplementedError:

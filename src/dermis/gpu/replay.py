@@ -1,4 +1,4 @@
-"""Recordings of compute passes, which later frames replay while the bound resources stay the same."""
+"""Recordings of compute passes, which later frames replay while the bound resources exist."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.gpu.device import Device
 from dermis.gpu.memo import are_equal, field_names, has_value_equality
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder, Workgroups
-from dermis.gpu.types import Bindings, Buffer, Native
+from dermis.gpu.types import Bindings, Buffer, NativeObject
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
@@ -26,42 +26,42 @@ _CACHED_RECORDINGS = 4  # of a function: two states, each in motion and still
 
 
 class Recording(Recorder):
-    """Dispatches with their bind groups and uniforms.
+    """Recorded dispatches with their bind groups and uniform buffers, ready to be replayed.
 
-    A recording keeps no resource alive. When a resource that it binds is released, the recording becomes
-    invalid and its uniform buffers are released too.
+    A recording keeps no resource alive. When one of its resources is released, the recording becomes invalid
+    and its uniform buffers are released too.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.dispatches: list[Dispatch] = []
         self._chunks: list[Buffer] = []
-        self._uniforms: Uniforms | None = Uniforms(device, partial(_chunk, device, self._chunks))
-        self._pipelines: list[Native] = []
+        self._uniforms: Uniforms | None = Uniforms(device, partial(_uniform_chunk, device, self._chunks))
+        self._pipelines: list[NativeObject] = []
         self._bind_groups: list[weakref.ref[BindGroup]] = []
         self._reads: dict[ResourceState, None] = {}
         self._writes: dict[ResourceState, None] = {}
 
     @cached_property
     def access(self) -> Access:
-        """Return what the finished recording reads and writes, without scratch resources that it writes."""
+        """Return the resources that the recording reads and writes, except scratch that it writes."""
         writes = tuple(state for state in self._writes if not state.scratch)
         return Access(unique_id(), tuple(self._reads), writes)
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
-        """Return the names of the stages, each once."""
+        """Return the names of the recorded stages without duplicates."""
         return tuple(dict.fromkeys(one.stage for one in self.dispatches))
 
     @property
     def is_valid(self) -> bool:
-        """Return whether all resources that the recording binds still exist."""
+        """Return whether all bound resources still exist, so that the recording can be replayed."""
         return len(self.dispatches) == len(self._pipelines)
 
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
     ) -> None:
-        """Record a compute pass, see `Recorder.dispatch`."""
+        """Record a dispatch of a compute program, see `Recorder.dispatch`."""
         chunks, dispatches = self._chunks, self.dispatches  # a reference to self would keep it alive
 
         def invalidate(_: object) -> None:
@@ -81,21 +81,21 @@ class Recording(Recorder):
         self._writes |= dict.fromkeys(state for state in access.writes if state is not unchanged)
 
     def finish(self) -> None:
-        """Upload the uniforms; no pass can be added after this."""
+        """Upload the uniform records; no pass can be added after this."""
         assert self._uniforms is not None
         self._uniforms.upload()
         self._uniforms.finish()
         self._uniforms = None  # it keeps the buffers alive
 
 
-def _chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
+def _uniform_chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
     if index == len(chunks):
         chunks.append(device.uniform_buffer(CHUNK_BYTES))
     return chunks[index]
 
 
 class RecordingCache:
-    """Most recent recordings of each function, for callers that alternate between a few arguments."""
+    """Cache of the most recent recordings per function, for callers that alternate between arguments."""
 
     def __init__(self) -> None:
         self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
@@ -103,7 +103,7 @@ class RecordingCache:
     def get(
         self, device: Device, record: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """Return the passes that `record` adds for these arguments and its result, calling it if needed."""
+        """Return the recording of `record(recorder, *args)` and its result, from the cache if possible."""
         known = self._recordings.setdefault(record, [])
         found = next((one for one in known if one[1].is_valid and _matches(one[0], args)), None)
         if found is None:
@@ -119,14 +119,21 @@ class RecordingCache:
 
 @dataclass(frozen=True)
 class _WeakFields:
-    """Type and weakly referenced fields of a dataclass."""
+    """Copy of a dataclass instance that keeps resources among its fields only by weak references.
+
+    kind : type of the dataclass
+    fields : weak copies of the field values
+    """
 
     kind: type
     fields: tuple[object, ...]
 
 
 def _weak_copy(value: object) -> object:
-    """Return a copy that refers to devices' resources, and other objects without value equality, weakly."""
+    """Return a copy of an argument, for later comparison, that keeps no resource alive.
+
+    Arrays are copied; objects that compare by identity, such as textures, become weak references.
+    """
     if isinstance(value, tuple):
         return tuple(map(_weak_copy, value))
     if isinstance(value, np.ndarray):
@@ -147,7 +154,7 @@ def _is_weak(copy: object) -> bool:
 
 
 def _matches(copy: object, value: object) -> bool:
-    """Return whether a copy made by `_weak_copy` is of this value."""
+    """Return whether an argument equals the one from which `_weak_copy` made a copy."""
     if isinstance(copy, weakref.ref):
         return copy() is value
     if isinstance(copy, tuple):

@@ -1,4 +1,4 @@
-"""Declarations of a WGSL text: struct layouts as NumPy dtypes, and bindings by name.
+"""Parser of WGSL declarations: structs as NumPy dtypes, and resource bindings by name.
 
 Structs and bindings are declared only in shaders, from which Python reads them, so that the two cannot
 differ. Alignment rules: WGSL specification, section "Memory Layout".
@@ -19,7 +19,7 @@ from numpy.typing import DTypeLike
 from dermis.base.errors import DermisError
 from dermis.gpu.types import UniformRecord
 
-Entry = dict[str, str]
+LayoutEntry = dict[str, str]
 """Part of wgpu's bind group layout entry: type, format or dimensions of a resource."""
 _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
@@ -29,7 +29,7 @@ _BINDING = re.compile(
 )
 
 # name -> (numpy base, shape, alignment, size) in bytes
-_TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
+_WGSL_TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
     "f32": ("<f4", (), 4, 4),
     "i32": ("<i4", (), 4, 4),
     "u32": ("<u4", (), 4, 4),
@@ -45,40 +45,46 @@ _TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
 
 @dataclass(frozen=True)
 class Binding:
-    """A resource that a shader declares: index of the binding and wgpu's layout entry for it."""
+    """Resource binding that a shader declares.
+
+    index, name : binding index in group 0, and name of the variable in the shader
+    entry : resource part of wgpu's bind group layout entry, such as {"buffer": {"type": "uniform"}}
+    """
 
     index: int
     name: str
-    entry: dict[str, Entry]
+    entry: dict[str, LayoutEntry]
 
     @property
     def has_content(self) -> bool:
-        """Return whether the resource has content, as all except samplers have."""
+        """Return whether the resource has content, which all resources except samplers have."""
         return "sampler" not in self.entry
 
     @property
     def writes(self) -> bool:
-        """Return whether the shader may write the resource."""
+        """Return whether the binding allows the shader to write the resource."""
         return "storage_texture" in self.entry or self.entry.get("buffer") == {"type": "storage"}
 
     @property
     def reads(self) -> bool:
-        """Return whether the shader may read the resource, as all except write-only textures."""
+        """Return whether the shader may read the resource, which is false for write-only textures."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 
 
 @cache
 def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
-    """Return the NumPy dtype of a WGSL struct, with the offsets that the shader uses.
+    """Return the NumPy dtype of a WGSL struct, with the member offsets of the shader.
 
     A mat4x4f is stored as its transpose, as WGSL stores columns; arrays of structs nest.
+
+    text : text of the shader
     """
-    dtype, _ = _struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
+    dtype, _ = _parse_struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
     return dtype
 
 
 def make_record(text: str, struct: str, **values: object) -> UniformRecord:
-    """Return a record of one of a text's structs: zeros, with the given members set."""
+    """Return a uniform record for a struct in a shader's text: zeros, except for the given members."""
     record = np.zeros((), dtype=struct_dtype(text, struct))
     for member, value in values.items():
         record[member] = value
@@ -86,17 +92,20 @@ def make_record(text: str, struct: str, **values: object) -> UniformRecord:
 
 
 def uniform_type(text: str, name: str) -> str:
-    """Return the name of the struct of a uniform binding."""
+    """Return the name of the struct type of a uniform variable.
+
+    text, name : text of the shader, and name of the variable
+    """
     (struct,) = re.findall(rf"var<uniform>\s*{name}\s*:\s*(\w+)", _COMMENT.sub("", text))
     return str(struct)
 
 
 def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
-    """Return a function that selects the bytes of the members that a shader reads of a uniform record.
+    """Return a function that selects the bytes of a uniform record that the shader reads.
 
-    It selects all bytes if the shader passes the record to a function, or if it is no struct.
+    It selects all bytes if the shader passes the record to a function, or if its type is not a struct.
 
-    name : name of the uniform in the shader
+    text, name : text of the shader, and name of the uniform variable
     """
     code = _COMMENT.sub("", text)
     declared = re.compile(rf"var<uniform>\s*{name}\s*:\s*(\w+)")
@@ -108,7 +117,7 @@ def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
 
 
 def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
-    """Yield the byte range of each run of consecutive members."""
+    """Yield the byte range of each run of consecutive members of a struct that are in `members`."""
     fields = dict(dtype.fields or {})
     for used, names in groupby(fields, members.__contains__):
         if used:
@@ -116,7 +125,7 @@ def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slic
             yield slice(extents[0][0], sum(extents[-1]))
 
 
-def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
+def _parse_struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
     if name not in bodies:
         raise DermisError(f"struct {name}: expected the shader to declare it, but it does not.")
     names: list[str] = []
@@ -124,7 +133,7 @@ def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
     offsets: list[int] = []
     end, align = 0, 4
     for member, kind in _MEMBER.findall(bodies[name]):
-        base, member_align, size = _member(bodies, kind)
+        base, member_align, size = _parse_member(bodies, kind)
         end = _round_up(end, member_align)
         names.append(member)
         formats.append(base)
@@ -135,17 +144,17 @@ def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size}), align
 
 
-def _member(bodies: dict[str, str], kind: str) -> tuple[DTypeLike, int, int]:
+def _parse_member(bodies: dict[str, str], kind: str) -> tuple[DTypeLike, int, int]:
     if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", kind):
-        base, align, size = _member(bodies, array[1])
+        base, align, size = _parse_member(bodies, array[1])
         count = int(array[2])
         if _round_up(size, align) != np.dtype(base).itemsize:
             raise DermisError(f"{kind}: expected array elements without padding between them.")
         return (base, (count,)), align, count * size
-    if kind in _TYPES:
-        scalar, shape, align, size = _TYPES[kind]
+    if kind in _WGSL_TYPES:
+        scalar, shape, align, size = _WGSL_TYPES[kind]
         return (scalar, shape), align, size
-    dtype, align = _struct(bodies, kind)
+    dtype, align = _parse_struct(bodies, kind)
     return dtype, align, dtype.itemsize
 
 
@@ -153,20 +162,22 @@ def _round_up(value: int, step: int) -> int:
     return -(-value // step) * step
 
 
-def bindings(text: str) -> tuple[Binding, ...]:
-    """Return the resources that a shader declares, by index; all are in bind group 0.
+def shader_bindings(text: str) -> tuple[Binding, ...]:
+    """Return the resource bindings that a shader declares, ordered by index; all are in group 0.
 
-    Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless
-    `// non-filtering` follows theirs.
+    Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless `//
+    non-filtering` follows theirs.
+
+    text : text of the shader
     """
     found = [
-        Binding(int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))
+        Binding(int(index), name, _layout_entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))
         for index, space, name, kind, note in _BINDING.findall(text)
     ]
     return tuple(sorted(found, key=lambda one: one.index))
 
 
-def _entry(space: str, kind: str, note: str) -> dict[str, Entry]:
+def _layout_entry(space: str, kind: str, note: str) -> dict[str, LayoutEntry]:
     if space.startswith("uniform"):
         return {"buffer": {"type": "uniform"}}
     if space.startswith("storage"):
@@ -179,10 +190,10 @@ def _entry(space: str, kind: str, note: str) -> dict[str, Entry]:
         dimension = "2d-array" if storage[1] else "2d"
         access = {"write": "write-only", "read": "read-only", "read_write": "read-write"}[storage[3]]
         return {"storage_texture": {"format": storage[2], "access": access, "view_dimension": dimension}}
-    return {"texture": _texture_entry(kind, note)}
+    return {"texture": _texture_layout(kind, note)}
 
 
-def _texture_entry(kind: str, note: str) -> Entry:
+def _texture_layout(kind: str, note: str) -> LayoutEntry:
     dimension = "2d-array" if "_array" in kind else "2d"
     if kind.startswith("texture_depth"):
         return {"sample_type": "depth", "view_dimension": dimension}

@@ -16,7 +16,7 @@ from dermis.gpu.memory import allocation
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.types import Texture, TextureView
 
-_FORMATS: dict[str, tuple[type[np.generic], int]] = {
+_TEXEL_FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "r8unorm": (np.uint8, 1),
     "rgba8unorm": (np.uint8, 4),
     "rgba8unorm-srgb": (np.uint8, 4),
@@ -34,10 +34,10 @@ _FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "depth32float": (np.float32, 1),
 }
 
-FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _FORMATS.items()}
+FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _TEXEL_FORMATS.items()}
 """Bytes of a texel of each format."""
 
-_LARGE = 1 << 24  # bytes
+_LARGE_UPLOAD_BYTES = 1 << 24  # bytes
 
 _PROBE_SIDE = 64
 
@@ -52,14 +52,16 @@ def make_texture(
     use: str = "compute",
     name: str = "texture",
 ) -> Texture:
-    """Create an empty 2-D texture (an array if `layers` > 1).
+    """Create an empty 2-D texture, or a texture array if `layers` > 1.
 
-    size : (width, height) [texel]
-    texel : wgpu's format name
-    use : "compute" (stored to and read), "raster" (drawn to and read), "map" (uploaded and read)
-    name : name of the texture in errors
+    size : width and height [texel]
+    texel : wgpu's name of the texel format, such as "rgba16float"
+    mips : number of mip levels
+    use : how the texture gets its content: "compute" (storage texture), "raster" (render target) or "map"
+        (upload); shaders can read it in any case
+    name : name of the texture, for error messages
 
-    Raises DermisError for sizes over the device's limit, OutOfMemoryError if its memory is full.
+    Raises DermisError for sizes over the device's limit, and OutOfMemoryError if its memory is full.
     """
     import wgpu
 
@@ -95,8 +97,8 @@ def make_view(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
 def upload(
     device: Device, texture: Texture, array: NDArray[np.generic], *, mip: int = 0, layer: int = 0
 ) -> None:
-    """Write an (h, w) or (h, w, c) array to one mip level of one layer of a texture."""
-    kind, channels = _FORMATS[texture.format]
+    """Write an array (h, w) or (h, w, c) to one mip level of one layer of a texture."""
+    kind, channels = _TEXEL_FORMATS[texture.format]
     data = np.ascontiguousarray(array, dtype=kind)
     height, width = data.shape[:2]
     device.handle.queue.write_texture(
@@ -105,7 +107,7 @@ def upload(
         {"bytes_per_row": width * channels * data.itemsize, "rows_per_image": height},
         (width, height, 1),
     )
-    if data.nbytes > _LARGE:
+    if data.nbytes > _LARGE_UPLOAD_BYTES:
         device.handle.queue.submit([])  # starts the copy while Python goes on
 
 
@@ -117,15 +119,19 @@ def texel_bytes(texture: Texture) -> int:
 def texture_from_array(
     device: Device, array: NDArray[np.generic], texel: str, name: str = "texture"
 ) -> Texture:
-    """Create a texture for reading with the texels of an (h, w) or (h, w, c) array."""
+    """Create a texture from an array (h, w) or (h, w, c), for reading in shaders.
+
+    texel : wgpu's name of the texel format, such as "rgba16float"
+    name : name of the texture, for error messages
+    """
     texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map", name=name)
     upload(device, texture, array)
     return texture
 
 
 def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) -> NDArray[Any]:
-    """Return one mip level of one layer of a texture as an (h, w, c) array, or (h, w) for one channel."""
-    kind, channels = _FORMATS[texture.format]
+    """Return one mip level of one layer of a texture as an array (h, w, c), or (h, w) for one channel."""
+    kind, channels = _TEXEL_FORMATS[texture.format]
     width, height = max(1, texture.size[0] >> mip), max(1, texture.size[1] >> mip)
     pitch = width * channels * np.dtype(kind).itemsize
     aligned = -(-pitch // 256) * 256  # WebGPU copies rows at multiples of 256 bytes
@@ -141,7 +147,7 @@ def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) 
 
 
 def half_store_rounding(device: Device) -> str:
-    """Return how stores to rgba16float textures round: "nearest", "toward zero" or "other"."""
+    """Return how a device rounds stores to rgba16float textures: "nearest", "toward zero" or "other"."""
     program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
     texture = make_texture(device, (_PROBE_SIDE, _PROBE_SIDE), "rgba16float")
     frame = CommandList(device)

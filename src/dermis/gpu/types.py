@@ -1,6 +1,6 @@
-"""Protocols for the textures, buffers and samplers of wgpu, which has no types for mypy.
+"""Typing protocols for the textures, buffers and samplers of wgpu, which has no type annotations.
 
-The protocols differ in the types of their native handles.
+The protocols are distinguished by the types of their native handles.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ SamplerHandle = NewType("SamplerHandle", object)
 
 
 class Texture(Protocol):
-    """A 2-D texture, or an array of them.
+    """Protocol of a 2-D texture or a 2-D texture array.
 
-    size : width, height and layers [texel]
-    format : wgpu's name ("rgba32float")
+    size : width and height [texel], and number of layers
+    format : wgpu's name of the texel format, such as "rgba32float"
     usage : flags of `wgpu.TextureUsage`
     """
 
@@ -40,15 +40,16 @@ class Texture(Protocol):
         base_mip_level: int = 0,
         mip_level_count: int | None = None,
     ) -> TextureView:
-        """Return a view of some layers and mip levels, of all by default."""
+        """Return a view of a range of layers and mip levels; of all by default."""
 
     def destroy(self) -> None:
-        """Free the memory."""
+        """Free the memory of the texture at once."""
 
 
 class TextureView(Protocol):
-    """A view of layers and mip levels of a texture.
+    """Protocol of a view of some layers and mip levels of a texture.
 
+    texture : the viewed texture
     layer_and_mip : layer and mip level of a view that `make_view` created
     """
 
@@ -58,9 +59,9 @@ class TextureView(Protocol):
 
 
 class Buffer(Protocol):
-    """A buffer on a device.
+    """Protocol of a buffer on a device.
 
-    size : bytes
+    size : size of the buffer [byte]
     usage : flags of `wgpu.BufferUsage`
     """
 
@@ -69,17 +70,17 @@ class Buffer(Protocol):
     usage: int
 
     def destroy(self) -> None:
-        """Free the memory."""
+        """Free the memory of the buffer at once."""
 
 
 class Sampler(Protocol):
-    """A texture sampler, see `Device.sampler`."""
+    """Protocol of a texture sampler, from `Device.sampler`."""
 
     _internal: SamplerHandle
 
 
-class Native(Protocol):
-    """An object with a handle for calls of the native library: a pipeline, a layout, a bind group."""
+class NativeObject(Protocol):
+    """Protocol of objects with a handle in the native library: pipelines, layouts, bind groups."""
 
     _internal: object
 
@@ -101,20 +102,20 @@ MutableBindings = dict[str, Bindable]
 
 
 def is_texture(value: Bindable) -> TypeGuard[Texture]:
-    """Return whether a resource is a texture, not a view."""
+    """Return whether a bound object is a texture, not a view of one."""
     return hasattr(value, "mip_level_count")
 
 
 def is_view(value: Bindable) -> TypeGuard[TextureView]:
-    """Return whether a resource is a texture view."""
+    """Return whether a bound object is a texture view."""
     return hasattr(value, "texture")
 
 
 def is_buffer(value: Bindable) -> TypeGuard[Buffer]:
-    """Return whether a resource is a buffer."""
+    """Return whether a bound object is a buffer."""
     return hasattr(value, "write_mapped")
 
 
 def is_sampler(value: Bindable) -> TypeGuard[Sampler]:
-    """Return whether a resource is a sampler."""
+    """Return whether a bound object is a sampler."""
     return not (is_texture(value) or is_view(value) or is_buffer(value) or isinstance(value, np.ndarray))

@@ -1,4 +1,4 @@
-"""Uniform data of a frame's passes, collected while passes are recorded and uploaded in one write."""
+"""Uniform records of a frame's passes, collected while passes are recorded and uploaded together."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ _ALIGNMENT = 256  # WebGPU's default alignment of uniforms in a buffer
 
 
 class Uniforms:
-    """Positions of records in the uniform buffers that all frames of a device share.
+    """Allocator of uniform records in buffers that all frames of a device share.
 
-    The queue orders the writes of a frame after the frames that were submitted before it.
+    Sharing is safe because the queue orders the writes of a frame after the submissions of earlier frames.
 
-    chunk : function that returns a buffer of CHUNK_BYTES by its index; the device's buffers if None
+    chunk : function that returns a buffer of CHUNK_BYTES by its index; None for the shared buffers of the
+        device
     """
 
     def __init__(self, device: Device, chunk: Callable[[int], Buffer] | None = None) -> None:
@@ -33,37 +34,40 @@ class Uniforms:
         self._positions: dict[int, int] = {}
 
     def bytes_of(self, record: NDArray[np.generic]) -> bytes:
-        """Return the bytes of a record, which must not be changed until the frame is submitted."""
+        """Return the bytes of a record, which must not change until the frame is submitted."""
         found = self._bytes.get(id(record))
         if found is None:
             found = self._bytes[id(record)] = record.tobytes(), record
         return found[0]
 
     def position(self, record: NDArray[np.generic]) -> int:
-        """Return the position of a record, counted through all buffers [byte]."""
+        """Return the position of a record in uniform memory, placing it on first use [byte].
+
+        Positions are counted through all buffers; `locate` converts them.
+        """
         found = self._positions.get(id(record))
         if found is None:
             found = self._positions[id(record)] = self._add(self.bytes_of(record))
         return found
 
     def locate(self, position: int) -> tuple[Buffer, int]:
-        """Return the buffer that a position is in, and the offset in it [byte]."""
+        """Return the buffer for a position in uniform memory, and the offset in this buffer [byte]."""
         index, offset = divmod(position, CHUNK_BYTES)
         return self._chunk(index), offset
 
     def upload(self) -> None:
-        """Write all records to their buffers before the next submission."""
+        """Write all placed records to their buffers before the next submission runs."""
         for index, staged in enumerate(self._staged):
             last = index == len(self._staged) - 1
             self._device.write(self._chunk(index), staged, self._end if last else CHUNK_BYTES)
 
     def finish(self) -> None:
-        """Drop all records after the last submission, and keep their host memory for other frames."""
+        """Forget all records after the last submission, and keep their host memory for later frames."""
         self._device.spare_chunks.extend(self._staged)
         self.clear()
 
     def clear(self) -> None:
-        """Drop all records."""
+        """Forget all records."""
         self._staged, self._end = [], CHUNK_BYTES
         self._bytes.clear()
         self._positions.clear()

@@ -1,4 +1,4 @@
-"""Preprocessor for WGSL files, with compile errors that name file and line.
+"""Preprocessor for WGSL files, which maps lines of compile errors back to the files.
 
 Each directive is a line of its own:
 
@@ -32,11 +32,11 @@ Words = tuple[tuple[str, str], ...]
 
 
 class Member(NamedTuple):
-    """Member of a list of shaders, such as one model of a registry.
+    """Member of a list that `//#include <list>` and `//#each list` expand, such as one light type.
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
-    file : shader file; None if the member has none
-    words : replacements for other {words} in `//#each` lines
+    file : shader file to include; None if the member has none
+    words : replacements for further {words} in `//#each` lines
     """
 
     name: str
@@ -46,11 +46,12 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ShaderFolder(os.PathLike[str]):
-    """A folder of shaders with the lists, numbers and options of its directives.
+    """Folder of shaders, with the definitions that their directives refer to.
 
-    lists : functions that return the members of each list, called whenever a shader is composed
-    numbers : function that returns the constants that shaders share with Python, called likewise
-    options : names for which `//#if` is true, in shaders of all folders
+    path : path of the folder
+    lists : functions that return the members of each list, by list name; called whenever a shader is composed
+    numbers : function that returns the constants that shaders share with Python, by name; called likewise
+    options : names for which `//#if` is true in the shaders of all folders
     """
 
     path: Path
@@ -59,7 +60,7 @@ class ShaderFolder(os.PathLike[str]):
     options: frozenset[str] = frozenset()
 
     def __fspath__(self) -> str:
-        """Return the path as a string."""
+        """Return the path of the folder, so that it can be used as a path."""
         return str(self.path)
 
 
@@ -67,14 +68,14 @@ Folder = os.PathLike[str]
 
 
 @dataclass(frozen=True)
-class Source:
-    """A composed shader: its text, and the file and line number that each of its lines comes from."""
+class ShaderSource:
+    """Composed shader: its text, with the file and line number from which each line comes."""
 
     text: str
     origin: tuple[tuple[str, int], ...]
 
     def locate(self, message: str) -> str:
-        """Return a message of the compiler with its line numbers replaced by file:line."""
+        """Return a compiler message in which line numbers of the text are replaced by file:line."""
 
         def replacement(match: re.Match[str]) -> str:
             line = int(match[1])
@@ -86,10 +87,11 @@ class Source:
         return _ERROR_LINE.sub(replacement, message)
 
 
-def compose(path: Path, folders: Sequence[Folder]) -> Source:
-    """Return the shader at `path` with its directives expanded.
+def compose(path: Path, folders: Sequence[Folder]) -> ShaderSource:
+    """Return a shader with its directives expanded.
 
-    folders : folders in which includes are looked up that are not beside the including file
+    path : file of the shader
+    folders : folders that are searched for included files which are not beside the including file
 
     Raises DermisError for a missing file, list, {word} or `//#end`.
     """
@@ -100,11 +102,11 @@ def compose(path: Path, folders: Sequence[Folder]) -> Source:
     definitions = _Definitions(
         tuple(map(Path, folders)), tuple(lists.items()), tuple(numbers.items()), options
     )
-    return _compose(path, definitions)
+    return _cached_compose(path, definitions)
 
 
 class _Definitions(NamedTuple):
-    """Folders, lists, numbers and options that directives refer to."""
+    """Folders, lists, numbers and options to which directives refer, hashable as a cache key."""
 
     folders: tuple[Path, ...]
     lists: tuple[tuple[str, tuple[Member, ...]], ...]
@@ -113,17 +115,17 @@ class _Definitions(NamedTuple):
 
 
 @cache
-def _compose(path: Path, definitions: _Definitions) -> Source:
+def _cached_compose(path: Path, definitions: _Definitions) -> ShaderSource:
     composer = _Composer(definitions)
     composer.insert(path)
     text, origin = zip(*composer.lines, strict=True) if composer.lines else ((), ())
-    return Source("\n".join(text), origin)
+    return ShaderSource("\n".join(text), origin)
 
 
 class _Composer:
-    """Expansion of one shader's directives.
+    """Composer that expands the directives of one shader.
 
-    lines : lines so far, each with the file and line number that it comes from
+    lines : composed lines so far, each with the file and line number from which it comes
     """
 
     def __init__(self, definitions: _Definitions) -> None:
@@ -152,13 +154,13 @@ class _Composer:
                     if member.file is not None:
                         self.insert(member.file)
             else:
-                self.lines += [(text, (path.name, number)) for text in self._expanded(directive, path)]
+                self.lines += [(text, (path.name, number)) for text in self._expand_lines(directive, path)]
 
         if conditions:
             raise DermisError(f"{path.name}: expected //#end after //#if, but the file ends.")
 
     def _update_conditions(self, conditions: list[bool], directive: re.Match[str], file: Path) -> None:
-        """Apply an `//#if`, `//#else` or `//#end`."""
+        """Apply a directive `//#if`, `//#else` or `//#end` to the stack of open conditions."""
         if option := directive["option"]:
             conditions.append(option in self._options)
         elif not conditions:
@@ -168,13 +170,13 @@ class _Composer:
         else:
             conditions.pop()
 
-    def _expanded(self, directive: re.Match[str], file: Path) -> list[str]:
-        """Return the lines that `//#each` or `//#fill` expands to."""
+    def _expand_lines(self, directive: re.Match[str], file: Path) -> list[str]:
+        """Return the lines to which a directive `//#each` or `//#fill` expands."""
         if text := directive["filled"]:
-            return [directive["indent"] + _fill(text, self._numbers, file)]
+            return [directive["indent"] + _substitute_words(text, self._numbers, file)]
         members = enumerate(self._members(directive["list"], file))
-        each = [_words(member, number) for number, member in members]
-        return [directive["indent"] + _fill(directive["text"], words, file) for words in each]
+        each = [_member_words(member, number) for number, member in members]
+        return [directive["indent"] + _substitute_words(directive["text"], words, file) for words in each]
 
     def _find(self, name: str, file: Path) -> Path:
         for folder in (file.parent, *self._folders):
@@ -190,12 +192,12 @@ class _Composer:
         return self._lists[name]
 
 
-def _words(member: Member, number: int) -> dict[str, str]:
+def _member_words(member: Member, number: int) -> dict[str, str]:
     name = member.name.replace("-", "_")
     return {"name": name, "NAME": name.upper(), "number": f"{number}u", **dict(member.words)}
 
 
-def _fill(text: str, words: Mapping[str, str], file: Path) -> str:
+def _substitute_words(text: str, words: Mapping[str, str], file: Path) -> str:
     def replacement(match: re.Match[str]) -> str:
         if match[1] not in words:
             raise DermisError(f"{file.name}: expected a word of {', '.join(words)}, but got {match[0]}.")
