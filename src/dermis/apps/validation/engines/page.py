@@ -13,24 +13,24 @@ from dermis.base.console import print_lines
 PAGE = DOCS / "engines.md"
 SKINS = "skin1", "skin2", "dj3", "medium"
 _EXCLUDED = ("maps",)  # a baked light map has no skin parameters
-_COLUMNS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge as one would type it"
+_COLUMNS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge, published values typed in"
 _BLENDER_EDGE_HEADER = (
     "| method | skin | 4.5 against predicted | 5.2 against predicted | noise | 5.2 against the profile"
     " | typed in | light returned |\n|---|---|---|---|---|---|---|---|"
 )
 _BLENDER_HEAD_HEADER = """\
-| Blender | method | outline [px] | lit skin, theirs over ours | relative RMSE | without highlights |
+| Blender | method | outline [px] | lit skin relative to dermis | relative RMSE | without highlights |
 |---|---|---|---|---|---|"""
 
 
 def page() -> None:
-    """Write the tables of docs/engines.md between their marks, and print those of Blender."""
+    """Replace the tables of docs/engines.md, and print those of Blender."""
     write_page(PAGE, fill_tables(in_checkout(PAGE).read_text("utf-8")))
     print_lines(blender_tables())
 
 
 def fill_tables(text: str) -> str:
-    """Return the page with its tables replaced."""
+    """Return the text of the page with new tables between its markers, such as <!-- mitsuba -->."""
     for name, table in {
         "predicted": predicted_table,
         "mitsuba": mitsuba_table,
@@ -43,7 +43,7 @@ def fill_tables(text: str) -> str:
 
 
 def predicted_table() -> str:
-    """Return the predicted errors of all targets in their newest versions and all variants."""
+    """Return a Markdown table of the predicted errors of all targets and variants, newest versions."""
     lines = []
     subjects = [load_subject(name) for name in SKINS]
     for name in sorted(set(TARGETS) - set(_EXCLUDED), key=str.lower):
@@ -58,18 +58,19 @@ def predicted_table() -> str:
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table."""
+    """Return a Markdown table with column titles and rows of cells."""
     return "".join(f"| {' | '.join(row)} |\n" for row in (heads, ["---"] * len(heads), *rows))
 
 
 def rgb_cell(values: Sequence[float]) -> str:
-    """Return red, green and blue as a table cell."""
+    """Return red, green and blue values as a table cell, such as "0.010 / 0.020 / 0.030"."""
     return " / ".join(f"{value + 0.0:.3f}" for value in values)
 
 
 def mitsuba_table() -> str:
-    """Return the table of edges in Mitsuba."""
-    heads = "skin", "surface", "from what was predicted", "standard error", "from the exported curve"
+    """Return a Markdown table of measured edges of light in Mitsuba."""
+    errors = "difference from the prediction", "standard error", "difference from the exported profile"
+    heads = "skin", "boundary", *errors
     edges = read_results(RESULTS / "engines_mitsuba.json")["edges"]
     names = "predicted", "noise", "exported"
     rows = ([row["skin"], row["boundary"], *(rgb_cell(row[name]) for name in names)] for row in edges)
@@ -77,9 +78,9 @@ def mitsuba_table() -> str:
 
 
 def babylon_table() -> str:
-    """Return the table of edges in Babylon.js."""
-    errors = "measured less its samples' prediction", "less true lobes", "less the skin's profile"
-    heads = "profile", "d [mm]", "nearest lobe, measured [mm]", *errors
+    """Return a Markdown table of measured edges of light in Babylon.js."""
+    errors = "difference from the prediction", "from exact lobes", "from the skin's profile"
+    heads = "profile", "d [mm]", "measured width of the nearest lobe [mm]", *errors
     differences = (f"measured_less_{name}" for name in ("predicted", "lobes", "profile"))
     names = ("expected_d_mm", "fitted_d_mm", *differences)
     skins = read_results(RESULTS / "engines_babylon.json")["skins"]
@@ -88,19 +89,19 @@ def babylon_table() -> str:
 
 
 def heads_table() -> str:
-    """Return the table of one head in all programs, compared with ours."""
-    titles = "program", "outline [px]", "lit skin over ours", "relative RMSE", "pixels"
+    """Return a Markdown table that compares a head in all programs with the frame."""
+    titles = "program", "outline [px]", "lit skin relative to dermis", "relative RMSE", "pixels"
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
 
 def _head_row(row: JsonObject) -> list[str]:
-    outline = "ours" if row["pixels_apart"] == 0 else f"{row['outline_px']:.1f}"
+    outline = "that of dermis" if row["pixels_apart"] == 0 else f"{row['outline_px']:.1f}"
     figures = rgb_cell(row["lit_colour"]), f"{row['relative_rmse']:.3f}", str(row["pixels"])
     return [row["program"], outline, *figures]
 
 
 def blender_tables() -> str:
-    """Return the tables of edges and heads in Blender, which have no marks on the page."""
+    """Return Markdown tables of edges and heads in Blender, which are inserted by hand."""
     results = read_results(RESULTS / "engines_blender.json")
     edges, heads = _blender_edges(results["edges"]), _blender_heads(results["heads"])
     return "\n".join([_BLENDER_EDGE_HEADER, *edges, "", _BLENDER_HEAD_HEADER, *heads]) + "\n"
