@@ -24,14 +24,14 @@ from dermis.images.io import read_image
 
 def test_names_are_listed_in_order_and_each_has_a_home() -> None:
     assert dermis.__all__ == sorted(dermis.__all__, key=lambda name: (name[0].islower(), name))
-    assert set(dermis.__all__) == set(dermis._HOME)
+    assert set(dermis.__all__) == set(dermis._MODULE_OF_NAME)
 
 
 @pytest.mark.parametrize("name", dermis.__all__)
 def test_each_name_resolves_and_is_explained(name: str) -> None:
     thing = getattr(dermis, name)
     assert thing.__name__ == name
-    assert inspect.getmodule(thing).__name__ == f"dermis.{dermis._HOME[name]}"
+    assert inspect.getmodule(thing).__name__ == f"dermis.{dermis._MODULE_OF_NAME[name]}"
     text = thing.__doc__ or ""
     assert len(text.splitlines()[0]) > 20, "no docstring of its own"
     assert text != (inspect.getdoc(thing.__mro__[1]) if inspect.isclass(thing) else None)

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
-_HOME = {
+_MODULE_OF_NAME = {
     "Head": "mesh.head",
     "load_head": "scene.heads",
     "Human": "human.person",
@@ -145,13 +145,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Return a public object, whose module is imported on first use to keep `import dermis` fast."""
+    """Return a public object; its module is imported on first use, which keeps `import dermis` fast."""
     from importlib import import_module
 
     if name == "__version__":
         value = import_module(f"{__name__}.base.version").version()
-    elif name in _HOME:
-        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    elif name in _MODULE_OF_NAME:
+        value = getattr(import_module(f"{__name__}.{_MODULE_OF_NAME[name]}"), name)
     elif new := successor(__name__, name):
         return __getattr__(new)
     else:
@@ -161,7 +161,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return all public names, imported or not."""
+    """Return the names of all public objects, whether imported or not."""
     return list({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 

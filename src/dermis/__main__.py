@@ -1,4 +1,4 @@
-"""Command line program: `python -m dermis`."""
+"""Entry point of `python -m dermis`, the command line program."""
 
 from dermis.cli import main
 

@@ -50,7 +50,7 @@ class ShaderFolder(os.PathLike[str]):
 
     path : path of the folder
     lists : functions that return the members of each list, by list name; called whenever a shader is composed
-    numbers : function that returns the constants that shaders share with Python, by name; called likewise
+    numbers : function that returns constants shared by shaders and Python, by name; called at each composition
     options : names for which `//#if` is true in the shaders of all folders
     """
 
