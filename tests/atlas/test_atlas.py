@@ -208,11 +208,11 @@ def test_the_scan() -> None:
     """Check that the eye shells are collapsed and the eight other islands fill most of the map."""
     from loaded_mesh import load_mesh
 
-    from dermis.formats.samples import fetch
+    from dermis.formats.samples import fetch_sample
 
     sample = SAMPLES["lee_perry_smith"]
     mesh = load_mesh(
-        fetch("lee_perry_smith")["mesh"], unit_mm=sample.unit_mm, v_origin=sample.v_origin or "auto"
+        fetch_sample("lee_perry_smith")["mesh"], unit_mm=sample.unit_mm, v_origin=sample.v_origin or "auto"
     )
     atlas = build_atlas(mesh, 256)
     assert 0.5 < atlas.coverage.mean() < 1.0

@@ -196,9 +196,9 @@ def test_unknown_direction_of_green_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 def test_head_scan_normals_lean_as_its_heights_do() -> None:
-    from dermis.formats.samples import SAMPLES, fetch
+    from dermis.formats.samples import SAMPLES, fetch_sample
 
-    files, height_mm = fetch("lee_perry_smith"), SAMPLES["lee_perry_smith"].height_mm
+    files, height_mm = fetch_sample("lee_perry_smith"), SAMPLES["lee_perry_smith"].height_mm
     maps = load_maps(normal=files["normal"], height=files["height"], height_mm=height_mm)
     assert maps.height is not None
     assert maps.normal is not None
@@ -210,9 +210,9 @@ def test_head_scan_normals_lean_as_its_heights_do() -> None:
 
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 def test_head_scan_has_no_other_normal_map() -> None:
-    from dermis.formats.samples import fetch
+    from dermis.formats.samples import fetch_sample
 
-    files = fetch("lee_perry_smith")
+    files = fetch_sample("lee_perry_smith")
     for role in ("colour", "specular"):
         with pytest.raises(DermisError, match=files[role].name):
             load_maps(normal=files[role])

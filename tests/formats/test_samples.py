@@ -16,7 +16,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.formats import samples
-from dermis.formats.samples import SAMPLES, Sample, SampleFile, fetch, is_available
+from dermis.formats.samples import SAMPLES, Sample, SampleFile, fetch_sample, is_available
 
 CONTENT = b"a small environment"
 
@@ -93,7 +93,7 @@ def test_registry_cannot_be_changed() -> None:
 
 
 def test_unknown_sample_is_refused_with_the_known_ones() -> None:
-    for ask in (fetch, is_available):
+    for ask in (fetch_sample, is_available):
         with pytest.raises(DermisError, match=r"'mine'.*lee_perry_smith, royal_esplanade, lebombo"):
             ask("mine")
 
@@ -102,14 +102,14 @@ def test_unknown_sample_is_refused_with_the_known_ones() -> None:
 def test_other_file_in_the_data_folder_is_refused() -> None:
     assert not is_available("lebombo")
     with pytest.raises(DermisError, match=r"lebombo_1k\.hdr.*differs"):
-        fetch("lebombo")
+        fetch_sample("lebombo")
 
 
 @pytest.mark.usefixtures("data")
 def test_missing_file_in_the_data_folder_is_refused() -> None:
     assert not is_available("royal_esplanade")
     with pytest.raises(DermisError, match=r"royal_esplanade_1k\.hdr.*not there"):
-        fetch("royal_esplanade")
+        fetch_sample("royal_esplanade")
 
 
 def test_offline_says_how_to_get_the_files(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +122,7 @@ def test_offline_says_how_to_get_the_files(cache: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(pooch.HTTPDownloader, "__call__", no_network)
     assert not is_available("lee_perry_smith")
     with pytest.raises(DermisError) as caught:
-        fetch("lee_perry_smith")
+        fetch_sample("lee_perry_smith")
     message = str(caught.value)
     assert all(file.url in message for file in SAMPLES["lee_perry_smith"].files.values())
     assert "DERMIS_DATA=" in message
@@ -136,7 +136,7 @@ def test_download_is_kept(
     import pooch
 
     _register(monkeypatch, _sample(f"{home}/tiny.hdr"))
-    paths = fetch("tiny")
+    paths = fetch_sample("tiny")
     assert paths == {"environment": cache / "env" / "tiny.hdr"}
     assert paths["environment"].read_bytes() == CONTENT
     shown = capsys.readouterr()
@@ -144,7 +144,7 @@ def test_download_is_kept(
     assert shown.out == ""
     monkeypatch.delattr(pooch, "retrieve")  # from here on, no network
     assert is_available("tiny")
-    assert fetch("tiny") == paths
+    assert fetch_sample("tiny") == paths
 
 
 @pytest.mark.parametrize("damage", ["cut", "a link to nowhere", "a pipe"])
@@ -161,24 +161,24 @@ def test_damaged_file_in_the_cache_is_fetched_again(
     else:
         file.symlink_to("nowhere")
     assert not is_available("tiny")
-    assert fetch("tiny")["environment"].read_bytes() == CONTENT
+    assert fetch_sample("tiny")["environment"].read_bytes() == CONTENT
 
 
 def test_changed_file_at_home_is_refused(cache: Path, home: str, monkeypatch: pytest.MonkeyPatch) -> None:
     _register(monkeypatch, _sample(f"{home}/tiny.hdr", content=b"what it was"))
     with pytest.raises(DermisError, match="the file has changed"):
-        fetch("tiny")
+        fetch_sample("tiny")
     assert not (cache / "env" / "tiny.hdr").exists()
 
 
 def test_file_gone_from_home_is_refused(cache: Path, home: str, monkeypatch: pytest.MonkeyPatch) -> None:
     _register(monkeypatch, _sample(f"{home}/gone/tiny.hdr"))
     with pytest.raises(DermisError, match=r"(?s)HTTPError.*gone/tiny\.hdr"):
-        fetch("tiny")
+        fetch_sample("tiny")
 
 
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 @pytest.mark.parametrize("name", SAMPLES)
 def test_data_folder_has_every_sample(name: str) -> None:
     assert is_available(name)
-    assert all(path.is_file() for path in fetch(name).values())
+    assert all(path.is_file() for path in fetch_sample(name).values())

@@ -13,7 +13,7 @@ from painted_ball import ball, paint
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, mitsuba_sensor, mitsuba_variant
 from dermis.apps.truths.person import shapes as eyes
 from dermis.apps.truths.person.person import Person
-from dermis.mesh.eye_look import LIMITS
+from dermis.mesh.eye_look import EYE_LOOK_RANGES
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.scene.camera import Camera
 
@@ -109,7 +109,7 @@ def test_the_white_turns_clear_at_the_limbus() -> None:
 def test_the_iris_reaches_the_ball_and_is_wider_than_a_pupil() -> None:
     flat, _, radius = eyes.iris_disc()
     assert np.linalg.norm(flat, axis=1).max() < SCLERA_MM
-    assert radius > LIMBUS_MM - 0.2 > LIMITS["pupil_mm"][1]
+    assert radius > LIMBUS_MM - 0.2 > EYE_LOOK_RANGES["pupil_mm"][1]
 
 
 def test_eyes_stand_where_their_frames_say() -> None:

@@ -23,14 +23,14 @@ from dermis.base.errors import DermisError, error_text, refuse
 MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
 MAX_TEXT_BYTES = 1 << 20  # of settings: scenes, lights, tables
-_PAGE = 1 << 16
+_MIN_READ_BYTES = 1 << 16
 _MAX_BITS = 64  # of an integer, as in TOML; each can be converted to a float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
-_LONG_KEY = re.compile(
+_LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
     f"{{{_MAX_KEY_PARTS}}}"
 )
-_NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+_OPEN_FLAGS = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 def read_file(path: str | Path, expected: str, max_bytes: int, name: object = None) -> bytes:
@@ -46,7 +46,9 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
     try:
         with os.fdopen(_open_regular(path, culprit, expected), "rb") as file:
             size = os.fstat(file.fileno()).st_size
-            limit = min(max_bytes, max(size, _PAGE))  # system files such as /proc report a size of 0
+            limit = min(
+                max_bytes, max(size, _MIN_READ_BYTES)
+            )  # system files such as /proc report a size of 0
             data = file.read(limit + 1) if size <= max_bytes else b""
     except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; not a name
         refuse(culprit, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
@@ -103,7 +105,7 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     """
     text = read_text(path, expected)
     with parsing(path, expected):
-        if _LONG_KEY.search(text):
+        if _LONG_KEY_PATTERN.search(text):
             raise ValueError(f"a key has more than {_MAX_KEY_PARTS} parts with dots between them")
         tables = tomllib.loads(text)
         _check_integers(tables)
@@ -157,7 +159,7 @@ def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterato
 
 def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
     """Open a regular file and return its descriptor; pipes and devices are refused without blocking."""
-    descriptor = os.open(path, os.O_RDONLY | _NONBLOCKING)
+    descriptor = os.open(path, os.O_RDONLY | _OPEN_FLAGS)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         refuse(culprit, expected, "it is not a regular file", "Copy its contents to a file first")

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from dermis.base.console import note
 from dermis.base.errors import DermisError, refuse
 from dermis.cli.options import Options, check_fields, model_options
-from dermis.mesh.eye_look import LIMITS
+from dermis.mesh.eye_look import EYE_LOOK_RANGES
 from dermis.scene.head_table import HeadTable
 
 HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
@@ -43,7 +43,7 @@ def check_head(name: str, options: Options) -> None:
 
 
 EYE = "--eye"
-_MIN_PUPIL_MM, _MAX_PUPIL_MM = LIMITS["pupil_mm"]
+_MIN_PUPIL_MM, _MAX_PUPIL_MM = EYE_LOOK_RANGES["pupil_mm"]
 EyeOptions = Annotated[
     list[str] | None,
     Parameter(

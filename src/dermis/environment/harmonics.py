@@ -87,7 +87,7 @@ def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: i
 
 
 def _complex_product(matrix: Floats, values: Complex) -> Complex:
-    """Return the product of a real and a complex matrix, without NumPy's conversion of the real one."""
+    """Return the product of a real and a complex matrix, without converting the real one to complex."""
     return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
 

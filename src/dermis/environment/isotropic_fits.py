@@ -174,7 +174,7 @@ def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbou
     regularisation = _REGULARISATION * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
-    def reduced(vector: bytes) -> Floats:
+    def reduced_system(vector: bytes) -> Floats:
         """Return Jacobian and residual at parameters, reduced by QR from about 8,000 to 16 rows."""
         x = np.frombuffer(vector)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
@@ -187,10 +187,10 @@ def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbou
         return qr_factor(np.vstack([system.real, system.imag]))
 
     def residual(vector: Floats) -> Floats:
-        return reduced(vector.tobytes())[:, -1]
+        return reduced_system(vector.tobytes())[:, -1]
 
     def jacobian_at(vector: Floats) -> Floats:
-        return reduced(vector.tobytes())[:, :-1]
+        return reduced_system(vector.tobytes())[:, :-1]
 
     inside = np.clip(first, low + 1e-4, high - 1e-4)
     solution = least_squares(

@@ -1,4 +1,4 @@
-"""Tables of isotropic lobes that approximate specular lobes, so that prefiltered panoramas can be used."""
+"""Tables of isotropic lobes that approximate specular lobes, for lookups in prefiltered panoramas."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def isotropic_lobe_constants() -> dict[str, float]:
-    """Return the `override` constants of environment.wgsl for the table: its sizes and roughness range."""
+    """Return the values of environment.wgsl's `#fill` constants for the table: sizes and roughness range."""
     return {
         "mirror_rough": ROUGHNESS_COUNT,
         "mirror_views": VIEW_COUNT,

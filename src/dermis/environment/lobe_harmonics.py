@@ -45,9 +45,9 @@ class LobeTarget(NamedTuple):
 
 
 class IsotropicLobes(NamedTuple):
-    """Five isotropic lobes, by the fields (5,) below.
+    """Parameters of five isotropic lobes, (5,) each.
 
-    angle : of the direction from the normal, in the plane of incidence [rad]
+    angle : angle of the direction from the normal, in the plane of incidence [rad]
     out_of_plane : angle of the direction from the plane of incidence [rad]
     log_roughness : logarithm of the roughness
     weight : weights, which sum to 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
-from dermis.formats.samples import SAMPLES, fetch
+from dermis.formats.samples import SAMPLES, fetch_sample
 from dermis.images.colour import luminance
 from dermis.images.io import read_image
 
@@ -118,7 +118,7 @@ def panorama_file(name: str) -> Path | None:
     if sample.kind != "environment":
         known = ", ".join(_sample_names())
         refuse(name, "an environment", f"this sample is a {sample.kind}", f"Use one of {known}")
-    return fetch(name)["environment"]
+    return fetch_sample(name)["environment"]
 
 
 def _sample_names() -> list[str]:

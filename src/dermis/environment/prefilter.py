@@ -17,7 +17,7 @@ SMOOTHEST, ROUGHEST = 0.018, 1.0
 ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
 """Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
 LAYER_HEIGHT = 192
-_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
+_MAX_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
 def isotropic_lobe(theta: Floats, m: float) -> Floats:
@@ -35,7 +35,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Return the `override` constants of environment.wgsl for reflection layers: number and roughnesses."""
+    """Return the values of environment.wgsl's `#fill` constants for the layers: number, roughness range."""
     return {
         "reflections": len(ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
@@ -68,8 +68,8 @@ def prefilter(name: str) -> Prefiltered:
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
     """
     radiance, suns = split_suns(load_panorama(name))
-    coefficients = analyse_panorama(radiance, _DEGREE)
-    kernels = [zonal_factors(np.cos, _DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
+    coefficients = analyse_panorama(radiance, _MAX_DEGREE)
+    kernels = [zonal_factors(np.cos, _MAX_DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
     layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
@@ -79,5 +79,5 @@ def isotropic_kernel(m: float) -> Floats:
 
     The lobe is normalised to unit integral.
     """
-    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _DEGREE)
+    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_DEGREE)
     return np.asarray(factors / factors[0])

@@ -40,7 +40,7 @@ _ARRAY_NAMES = [
     *(f"target {name}" for name in _TARGET_FIELDS),
     *(f"bone {name}" for name in _SKELETON_FIELDS),
 ]
-_EMPTY = np.zeros(0, np.float32)
+_EMPTY_ARRAY = np.zeros(0, np.float32)
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _EYE_WORDS = "eyes?|eyeballs?|sclerae?|corneas?|iris|irises|pupils?"
 _EYE_PATTERN = re.compile(rf"(?:l|r|left|right)?(?:{_EYE_WORDS})(?:l|r|left|right)?", re.IGNORECASE)
@@ -202,7 +202,7 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
     mesh, rig = rigged
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
-    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY)
+    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
     if rig is not None:
         metadata |= {"targets": list(rig.targets.names), "bones": None}
         rig_arrays["control"] = rig.positions_mm
@@ -216,7 +216,7 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
 
 def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[str]) -> Arrays:
     arrays = {f"{prefix} {name}": getattr(value, name) for name in names}
-    return {name: _EMPTY if array is None else array for name, array in arrays.items()}
+    return {name: _EMPTY_ARRAY if array is None else array for name, array in arrays.items()}
 
 
 def _from_arrays(arrays: Arrays) -> RiggedMesh:

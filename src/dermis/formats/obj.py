@@ -33,11 +33,11 @@ from dermis.mesh.maps import Maps
 _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
 _GROUP_LINE = re.compile(r"^[ \t]*(usemtl|g)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _FACE_OR_NUMBER = re.compile(r"^(?:usemtl (\d+)|f([ \t].*))$", re.MULTILINE)
-_MAX_LINE, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
+_MAX_LINE_LENGTH, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
 _ZERO_INDEX = re.compile(r"(?<![^ \t/])0+(?![^ \t/])")
 _GROUP_OR_FACE = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _RELIEF_ROLES = ("normal", "height")
-_SAMPLES_PER_SIDE = 256  # texels that are compared along a side
+_GREY_TEST_SAMPLES = 256  # texels that are compared along a side
 _MAP_ROLES = {
     "map_kd": "colour",
     "map_ks": "specular",
@@ -46,15 +46,15 @@ _MAP_ROLES = {
     "map_bump": "bump",
     "bump": "bump",
 }
-_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER_REGEX = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXTURE_OPTION = re.compile(
-    rf"-(?:bm\s+(?P<factor>{_NUMBER})"
-    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
+    rf"-(?:bm\s+(?P<factor>{_NUMBER_REGEX})"
+    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER_REGEX}(?=\s)){{1,3}})"
     r"|mm\s+\S+\s+\S+"
     r"|(?:blendu|blendv|boost|cc|clamp|imfchan|texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
-_NUMBER_PATTERN = re.compile(_NUMBER)
+_NUMBER_PATTERN = re.compile(_NUMBER_REGEX)
 _MAX_MTL_LINE = 4096  # characters
 _LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 
@@ -84,8 +84,8 @@ def _check_lines(path: Path, data: Bytes) -> None:
     starts = np.concatenate([[0], ends + 1])
     length = np.diff(starts, append=len(data) + 1)
     vertex = data[np.minimum(starts, len(data) - 1)] == ord("v") if len(data) else np.zeros(1, bool)
-    if length.max() > _MAX_LINE or length[vertex].max(initial=0) > _MAX_VERTEX_LINE:
-        expected = f"lines of at most {_MAX_LINE:,} characters, {_MAX_VERTEX_LINE} for vertices"
+    if length.max() > _MAX_LINE_LENGTH or length[vertex].max(initial=0) > _MAX_VERTEX_LINE:
+        expected = f"lines of at most {_MAX_LINE_LENGTH:,} characters, {_MAX_VERTEX_LINE} for vertices"
         refuse(path, expected, f"one has {length.max():,}", limits.DAMAGED_ADVICE)
     items = "lines of vertices, uv and normals"
     limits.check_limit(path, int(vertex.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE)
@@ -244,7 +244,7 @@ def _unused_files_note(path: Path, faults: list[str]) -> str:
 
 
 def _load_map(
-    role: str, file: Path, texture: Texture, height_mm: float | None, normal_y: Literal["up", "down"]
+    role: str, file: Path, texture: MtlTexture, height_mm: float | None, normal_y: Literal["up", "down"]
 ) -> dict[str, Any]:
     """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
 
@@ -263,7 +263,7 @@ def _load_map(
 def _is_grey(file: Path) -> bool:
     """Return whether a picture is grey up to JPEG artefacts; large pictures are subsampled."""
     picture = read_image(file)
-    step = max(min(picture.shape[:2]) // _SAMPLES_PER_SIDE, 1)
+    step = max(min(picture.shape[:2]) // _GREY_TEST_SAMPLES, 1)
     samples = picture[::step, ::step, :3].astype(float)
     largest = float(samples.max()) or 1.0
     return bool((abs(samples - samples[..., :1]) <= 0.02 * largest).all())
@@ -286,7 +286,7 @@ def _skin_material(text: str, materials: dict[str, MtlMaterial], opaque: Collect
 
 
 @dataclass(frozen=True)
-class Texture:
+class MtlTexture:
     """Picture that a material of an .mtl file references.
 
     key : statement that references it, such as map_Kd
@@ -310,7 +310,7 @@ class MtlMaterial:
     """
 
     kd: list[str] = field(default_factory=list)
-    textures: dict[str, Texture] = field(default_factory=dict)
+    textures: dict[str, MtlTexture] = field(default_factory=dict)
 
 
 @dataclass
@@ -357,7 +357,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
     return materials
 
 
-def _parse_texture(key: str, statement: str) -> Texture:
+def _parse_texture(key: str, statement: str) -> MtlTexture:
     """Parse a texture statement of an .mtl file; its file name extends to the end of the line.
 
     key : statement, such as map_Kd
@@ -374,7 +374,7 @@ def _parse_texture(key: str, statement: str) -> Texture:
     match name.rsplit(maxsplit=2):
         case [first, last, number] if last.lower() == "-bm" and _NUMBER_PATTERN.fullmatch(number):
             factor, name = float(number), first  # some programs write the option after the name
-    return Texture(key, name, factor, transformed)
+    return MtlTexture(key, name, factor, transformed)
 
 
 def library_names(text: str) -> list[str]:

@@ -129,10 +129,10 @@ def trimesh_parts(
     for mesh in (scene.geometry[name] for name in names or scene.geometry):
         if isinstance(mesh, trimesh.Trimesh):
             tag = getattr(getattr(mesh.visual, "material", None), "name", None)
-            yield _part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
+            yield _to_mesh_part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
 
 
-def _part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
+def _to_mesh_part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
     """Convert a trimesh mesh to a `MeshPart`."""
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None

@@ -19,10 +19,10 @@ from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, trimesh_parts
 
-_MAX_HEADER = 1 << 16  # bytes
+_MAX_HEADER_BYTES = 1 << 16  # bytes
 _MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
 _MAX_PROPERTIES = 256
-MAX_UV = 1e4
+MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
@@ -36,7 +36,7 @@ def check_ply(path: Path, data: bytes) -> bytes:
 
     Raises DermisError for an invalid header.
     """
-    end = data.find(b"end_header", 0, _MAX_HEADER)
+    end = data.find(b"end_header", 0, _MAX_HEADER_BYTES)
     if not data.startswith(b"ply") or end < 0:
         refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
     header = data[:end]
@@ -78,7 +78,7 @@ def read_ply(path: Path) -> MeshFile:
     return MeshFile([replace(part, normals=None) for part in parts] if by_corner else parts)
 
 
-READERS: dict[str, Callable[[Path], MeshFile]] = {
+MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".obj": read_obj,
@@ -103,7 +103,10 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
         np.vstack(uv),
         np.vstack([_part_normals(part) for part in parts]),
         np.vstack([part.triangles + offset for part, offset in zip(parts, start, strict=False)]),
-        {name: (np.concatenate(i), np.concatenate(d)) for name, (i, d) in _transposed(targets).items()},
+        {
+            name: (np.concatenate(i), np.concatenate(d))
+            for name, (i, d) in _transpose_targets(targets).items()
+        },
         _stack_padded([part.bone for part in parts]),
         _stack_padded([part.weight for part in parts]),
         np.vstack([part.quads + offset for part, offset in zip(parts, faces, strict=False)]),
@@ -128,7 +131,7 @@ def select_vertices(part: MeshPart, used: Index) -> MeshPart:
     return replace(part, positions=part.positions[used], targets=targets, bone=bone, weight=weight)
 
 
-def _transposed(
+def _transpose_targets(
     rows: dict[str, list[tuple[Index, Doubles]]],
 ) -> dict[str, tuple[list[Index], list[Doubles]]]:
     items = rows.items()
@@ -155,8 +158,8 @@ def _part_uv(part: MeshPart, source: Path) -> Doubles:
     if part.uv is None or part.uv.shape != (len(part.positions), 2):
         advice = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
         refuse(source, "uv at every vertex", f"{name!r} has none", advice)
-    if not np.abs(part.uv).max() <= MAX_UV:
-        actual = f"{name!r} has some that are NaN, infinite or beyond {MAX_UV:g}"
+    if not np.abs(part.uv).max() <= MAX_ABSOLUTE_UV:
+        actual = f"{name!r} has some that are NaN, infinite or beyond {MAX_ABSOLUTE_UV:g}"
         refuse(source, "finite uv", actual, limits.DAMAGED_ADVICE)
     return part.uv
 
@@ -166,10 +169,10 @@ def read_mesh_file(source: Path) -> MeshFile:
 
     Raises DermisError for every fault of the file.
     """
-    reader = READERS.get(source.suffix.lower())
+    reader = MESH_READERS.get(source.suffix.lower())
     if reader is None:
         actual = f"the suffix is {source.suffix!r}"
-        refuse(source, f"a mesh file ({', '.join(READERS)})", actual, "Export it as one of these")
+        refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, "Export it as one of these")
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     # trimesh raises any exception for damaged files

@@ -67,7 +67,7 @@ def _sample(name: str, entry: dict[str, Any]) -> Sample:
 SAMPLES = _load_registry()
 
 
-def fetch(name: str) -> dict[str, Path]:
+def fetch_sample(name: str) -> dict[str, Path]:
     """Return the paths of a sample's files by role; missing files are downloaded.
 
     name : a key of `SAMPLES`

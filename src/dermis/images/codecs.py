@@ -222,7 +222,7 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
 
 
 def _compressed_pixels(data: bytes) -> bytes | None:
-    """Return the compressed pixels, or None if other chunks change their meaning."""
+    """Return the compressed pixels of a PNG file; None if a tRNS chunk makes one colour transparent."""
     parts = list[memoryview]()
     for kind, content in png_chunks(data):
         if kind == b"tRNS":

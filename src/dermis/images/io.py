@@ -30,7 +30,7 @@ from dermis.images.sizes import MAX_FILE_BYTES, TooLargeError
 
 OUTPUT_SUFFIXES = (".png", ".exr")
 T = TypeVar("T")
-_READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
+_EXPECTED_PICTURE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
     C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA. Colour profiles and camera orientation
     are ignored, as usual for textures.
 
-    path : PNG, JPEG or TIFF, returned as uint8 or uint16 (a float TIFF as float32), or EXR or HDR, returned as
-        linear float32; the format is recognised by content, not by suffix
+    path : PNG, JPEG or TIFF, returned as uint8 or uint16 (a float TIFF as float32), or EXR or HDR, returned
+        as linear float32; the format is recognised by content, not by suffix
 
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
@@ -89,7 +89,7 @@ def _apply_codec(
     kinds = {EXR_SIGNATURE: exr, RADIANCE_SIGNATURE: radiance} | dict.fromkeys(PILLOW_SIGNATURES, pillow)
     codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
     if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
-        refuse(path, _READABLE, "its first bytes match none of these formats", "Convert it to PNG")
+        refuse(path, _EXPECTED_PICTURE, "its first bytes match none of these formats", "Convert it to PNG")
     try:
         return codec(data)
     except TooLargeError as fault:
@@ -98,7 +98,7 @@ def _apply_codec(
         raise DermisError(f"{path}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         raise DermisError(
-            f"{path}: expected {_READABLE}, but it cannot be decoded ({error_text(fault)}). "
+            f"{path}: expected {_EXPECTED_PICTURE}, but it cannot be decoded ({error_text(fault)}). "
             "It is truncated, damaged or of an unsupported kind: download or export it again."
         ) from fault
 
@@ -220,4 +220,4 @@ def read_bytes(path: str | Path | EmbeddedPicture) -> bytes:
     """
     if isinstance(path, EmbeddedPicture):
         return path.data
-    return read_file(path, _READABLE, MAX_FILE_BYTES)
+    return read_file(path, _EXPECTED_PICTURE, MAX_FILE_BYTES)

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 from dermis.base.quantities import check_fields
 
-LIMITS = {"eumelanin": (0.0, 1.0), "pupil_mm": (1.0, 4.0), "redness": (0.0, 1.0), "seed": (0, 2**32 - 1)}
+EYE_LOOK_RANGES = {
+    "eumelanin": (0.0, 1.0),
+    "pupil_mm": (1.0, 4.0),
+    "redness": (0.0, 1.0),
+    "seed": (0, 2**32 - 1),
+}
 """Bounds of the fields of `EyeLook`."""
 
 
@@ -44,4 +49,4 @@ class EyeLook:
 
     def __post_init__(self) -> None:
         """Check the ranges of all fields."""
-        check_fields(self, LIMITS, "eyes: ")
+        check_fields(self, EYE_LOOK_RANGES, "eyes: ")

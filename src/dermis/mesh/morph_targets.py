@@ -59,5 +59,5 @@ class MorphTargets(ShortRepr):
 
 
 def no_targets() -> MorphTargets:
-    """Return morph targets without any target."""
+    """Return an empty set of morph targets."""
     return MorphTargets((), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3), np.float32))

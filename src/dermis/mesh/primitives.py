@@ -11,7 +11,7 @@ from dermis.mesh.mesh import Material, Mesh, build_mesh
 SKIN = (Material("skin"),)
 # Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and
 # left, top and side length of its chart.
-_FACES = (
+_WEDGE_FACES = (
     (((0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1)), (0.02, 0.02, 0.45)),
     (((1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0)), (0.52, 0.02, 0.45)),
     (((1, 1, 1), (1, 1, 0), (1, 0, 0), (1, 0, 1)), (0.02, 0.52, 0.2)),
@@ -95,7 +95,7 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Me
     a = row * (cells + 1) + column
     quads = np.column_stack((a, a + cells + 1, a + cells + 2, a, a + cells + 2, a + 1)).reshape(-1, 3)
     positions, uv, normals, triangles = [], [], [], []
-    for index, (corners, (left, top, size)) in enumerate(_FACES):
+    for index, (corners, (left, top, size)) in enumerate(_WEDGE_FACES):
         c = np.array(corners, float)
         c[:, 2] = (c[:, 2] - 0.5) * np.where(c[:, 0] > 0, thick_mm, thin_mm)
         c[:, :2] = (c[:, :2] - 0.5) * side_mm

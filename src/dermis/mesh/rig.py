@@ -156,9 +156,9 @@ class Rig(ShortRepr):
         return self._outline_at(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_at(self, positions: Floats) -> RigOutline:
-        """Return the outline for other rest positions (p, 3) of the control points [mm].
+        """Return the outline of the rig with other rest positions (p, 3) of its control points [mm].
 
-        The last outline is cached and used again if its points did not move.
+        The last outline is cached; it is returned again for rest positions with the same outline points.
         """
         points, outline = self._last_outline
         if not np.array_equal(positions[points].T, outline.rest_mm[:3]):

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from dermis.base.errors import format_value, refuse
 from dermis.formats.size_limits import MAX_RELIEF_MM
-from dermis.mesh.eye_look import LIMITS
+from dermis.mesh.eye_look import EYE_LOOK_RANGES
 from dermis.scene.field_errors import InvalidFieldsError, Keywords, Reason
 from dermis.scene.frozen_model import FrozenModel
 
@@ -38,7 +38,7 @@ _UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.
 
 
 def _eye_limits(name: str) -> Any:
-    low, high = LIMITS[name]
+    low, high = EYE_LOOK_RANGES[name]
     return Field(ge=low, le=high)
 
 

@@ -18,7 +18,7 @@ from dermis.formats.maps import load_maps
 from dermis.formats.mesh_checks import check_head_height
 from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
-from dermis.formats.samples import SAMPLES, Sample, fetch
+from dermis.formats.samples import SAMPLES, Sample, fetch_sample
 from dermis.human.regions.apply import with_default_regions
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
@@ -151,7 +151,7 @@ def load_head(
     sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
     if sample is not None:
         _check_sample_kind(sample)
-        files = fetch(name)
+        files = fetch_sample(name)
         path = files["mesh"]
         mesh_options["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
         mesh_options["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin

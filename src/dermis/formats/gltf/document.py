@@ -25,8 +25,8 @@ Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
 """JSON of another program, whose values are checked where they are used."""
 
-_MAGIC = 0x46546C67
-_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_GLB_MAGIC = 0x46546C67
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _MIN_READ_COST = 512  # components whose decoding takes as long as the overhead of an accessor
@@ -186,12 +186,12 @@ def read_document(path: Path) -> Document:
         if path.suffix.lower() != ".glb":
             return Document(path, _parse_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)
-        if magic != _MAGIC or version != 2:
+        if magic != _GLB_MAGIC or version != 2:
             raise ValueError("it does not start like a .glb file of version 2")
         if length > len(data):
             raise ValueError(f"it should have {length} bytes and has {len(data)}")
-        chunks = dict(_chunks(data))
-        return Document(path, _parse_tree(path, chunks[_JSON]), chunks.get(_BINARY, b""))
+        chunks = dict(_glb_chunks(data))
+        return Document(path, _parse_tree(path, chunks[_JSON_CHUNK]), chunks.get(_BINARY_CHUNK, b""))
 
 
 def _parse_tree(path: Path, text: bytes) -> Tree:
@@ -209,7 +209,7 @@ def _parse_tree(path: Path, text: bytes) -> Tree:
     return tree
 
 
-def _chunks(data: bytes) -> list[tuple[int, bytes]]:
+def _glb_chunks(data: bytes) -> list[tuple[int, bytes]]:
     """Return type and bytes of the chunks of a .glb file, last first: in a dict the first of a type wins."""
     chunks, offset = [], 12
     while offset + 8 <= len(data):

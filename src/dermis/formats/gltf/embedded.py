@@ -15,8 +15,8 @@ from dermis.images.io import EmbeddedPicture, read_size
 from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.eye_look import EyeLook
 
-_READABLE = {"image/png", "image/jpeg"}
-ROLES = ("normal", "height", "specular", "roughness", "region")
+_READABLE_MIME_TYPES = {"image/png", "image/jpeg"}
+EMBEDDED_ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
 def embedded_maps(path: Path) -> Tree:
@@ -57,7 +57,7 @@ def _map_options(document: Document) -> Tree:
     if extras is None:
         options["normal"] = picture(skin.get("normalTexture"))
     else:
-        options |= {role: picture(extras.get(role)) for role in ROLES}
+        options |= {role: picture(extras.get(role)) for role in EMBEDDED_ROLES}
         options["colour"] = picture(extras.get("colour")) or options["colour"]
         options["height_mm"] = _checked_relief(extras.get("height_mm"))
     return {role: value for role, value in options.items() if value is not None}
@@ -77,13 +77,13 @@ def _embedded_picture(document: Document, source: int) -> EmbeddedPicture | Path
     image = document.item("images", source)
     name = f"{document.path}, image {image.get('name', source)}"
     if "bufferView" in image:
-        if image.get("mimeType") not in _READABLE:
+        if image.get("mimeType") not in _READABLE_MIME_TYPES:
             return None
         return EmbeddedPicture(name, bytes(document.read_view(image["bufferView"])))
     uri = image["uri"]
     if uri.startswith("data:"):
         kind, _, text = uri[5:].partition(";base64,")
-        return EmbeddedPicture(name, base64.b64decode(text)) if kind in _READABLE else None
+        return EmbeddedPicture(name, base64.b64decode(text)) if kind in _READABLE_MIME_TYPES else None
     file = resolve_uri(document.path, uri)
     return file if file.suffix.lower() in (".png", ".jpg", ".jpeg") else None
 

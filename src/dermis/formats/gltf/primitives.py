@@ -21,10 +21,10 @@ from dermis.mesh.strands import Roots, Strands, quad_weights, root_frames
 _METRES_PER_MM = 1e-3
 HAIR_COLOURS = 64
 """Number of colours into which the hairs of a head are sorted."""
-_SIDES = 3
-_RADIUS_FACTOR = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # the mean width equals that of a circle
+_TUBE_SIDES = 3
+_RADIUS_FACTOR = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))  # the mean width equals that of a circle
 _MIN_DISPLACEMENT_MM = 0.01  # smaller displacements count as 0
-_ALBEDO = 5.89  # of fibres of roughness 0.3 in hair: [Chiang2016] equation 9
+_ALBEDO_EXPONENT = 5.89  # of fibres of roughness 0.3 in hair: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
@@ -71,7 +71,7 @@ class SurfacePrimitive:
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
-        attributes = _attributes(binary, self.points.positions_mm[used], self.points.normals[used], uv)
+        attributes = _vertex_attributes(binary, self.points.positions_mm[used], self.points.normals[used], uv)
         attributes |= _bone_attributes(binary, self.points, used)
         primitive: Tree = {"attributes": attributes, "indices": index}
         flags = {"quads": self._has_quads(), "alone": self._is_separate()}
@@ -115,7 +115,7 @@ class HairPrimitive:
     fibres: FibreTubes
 
     @cached_property
-    def _rest(self) -> Doubles:
+    def _rest_points(self) -> Doubles:
         return replace(self.points.head.mesh, positions=self.points.positions_mm).points_mm
 
     def primitive(self, binary: BufferBuilder) -> Tree:
@@ -123,9 +123,9 @@ class HairPrimitive:
 
         Its extras mark it as hair, which `read_gltf` skips.
         """
-        positions, normals = self.fibres.pose_vertices(self._rest)
+        positions, normals = self.fibres.pose_vertices(self._rest_points)
         _, uv = self.fibres.colours()
-        attributes = _attributes(binary, positions, normals.astype(np.float32), uv)
+        attributes = _vertex_attributes(binary, positions, normals.astype(np.float32), uv)
         attributes |= _bone_attributes(
             binary, self.points, np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair)
         )
@@ -134,9 +134,9 @@ class HairPrimitive:
 
     def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
         """Append position displacements to the buffer and return their accessor; normals do not change."""
-        delta, mesh = np.zeros_like(self._rest), self.points.head.mesh
+        delta, mesh = np.zeros_like(self._rest_points), self.points.head.mesh
         delta[mesh.point[target.vertex]] = target.delta_mm
-        vertex, displacement = self.fibres.displacements_at(self._rest, delta)
+        vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
         (accessor,) = binary.add_displacements(vertex, [to_metres(displacement)], self.fibres.vertex_count)
         return {"POSITION": accessor}
 
@@ -146,7 +146,7 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     return (positions_mm.astype(np.float64) * _METRES_PER_MM).astype(np.float32)
 
 
-def _attributes(
+def _vertex_attributes(
     binary: BufferBuilder, positions_mm: NDArray[np.floating], normals: Floats, uv: Floats
 ) -> dict[str, int]:
     return {
@@ -210,7 +210,7 @@ class FibreTubes:
     @property
     def vertices_per_hair(self) -> int:
         """Return the number of vertices of a hair: a ring at each knot, and a single vertex at the tip."""
-        return _SIDES * (self._knots - 1) + 1
+        return _TUBE_SIDES * (self._knots - 1) + 1
 
     @property
     def vertex_count(self) -> int:
@@ -231,7 +231,7 @@ class FibreTubes:
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _TINY)
-        angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
+        angle = 2.0 * np.pi * np.arange(_TUBE_SIDES) / _TUBE_SIDES
         side = np.eye(3)[np.abs(tangent[:, 0]).argmin(axis=1)]
         positions, normals = list[Doubles](), list[Doubles]()
         for k in range(self._knots - 1):
@@ -276,13 +276,16 @@ class FibreTubes:
 
     def triangles(self) -> Index:
         """Return the vertex indices of the tubes' triangles, (f, 3)."""
-        side, following = np.arange(_SIDES), (np.arange(_SIDES) + 1) % _SIDES
+        side, following = np.arange(_TUBE_SIDES), (np.arange(_TUBE_SIDES) + 1) % _TUBE_SIDES
         faces = list[Index]()
         for k in range(self._knots - 2):
-            a, b = _SIDES * k + side, _SIDES * k + following
-            faces += [np.stack([a, b, b + _SIDES], axis=1), np.stack([a, b + _SIDES, a + _SIDES], axis=1)]
-        last = _SIDES * (self._knots - 2)
-        tip = np.full(_SIDES, self.vertices_per_hair - 1)
+            a, b = _TUBE_SIDES * k + side, _TUBE_SIDES * k + following
+            faces += [
+                np.stack([a, b, b + _TUBE_SIDES], axis=1),
+                np.stack([a, b + _TUBE_SIDES, a + _TUBE_SIDES], axis=1),
+            ]
+        last = _TUBE_SIDES * (self._knots - 2)
+        tip = np.full(_TUBE_SIDES, self.vertices_per_hair - 1)
         faces.append(np.stack([last + side, last + following, tip], axis=1))
         start = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
@@ -290,7 +293,7 @@ class FibreTubes:
     def colours(self) -> tuple[Floats, Floats]:
         """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
-        albedo = np.exp(-_ALBEDO * np.sqrt(absorbance.astype(np.float64)))
+        albedo = np.exp(-_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")
         group = np.empty(len(order), np.int64)
         group[order] = np.arange(len(order)) * HAIR_COLOURS // len(order)

@@ -18,7 +18,7 @@ from dermis.mesh.rig import INFLUENCES
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
-_BATCH = 1 << 16  # vertices
+_BATCH_VERTICES = 1 << 16  # vertices
 
 
 class SkinInfluences(NamedTuple):
@@ -126,8 +126,8 @@ def read_influences(
         inverse_bind = document.read_floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
     resting = nodes.world[skin["joints"]] @ inverse_bind[: len(skin["joints"])]
     matrices = np.empty((len(joint), 4, 4))
-    for start in range(0, len(joint), _BATCH):
-        batch = slice(start, start + _BATCH)
+    for start in range(0, len(joint), _BATCH_VERTICES):
+        batch = slice(start, start + _BATCH_VERTICES)
         matrices[batch] = np.einsum("vk,vkij->vij", weight[batch], resting[joint[batch]])
     bone = np.array([armature.bone_of_node[k] for k in skin["joints"]])
     return SkinInfluences(bone[joint], weight), np.asarray(matrices)

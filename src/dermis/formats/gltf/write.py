@@ -27,7 +27,7 @@ from dermis.mesh.skeleton import Skeleton
 
 BROWS, HAIR = "brows and lashes", "hair"
 """Names of the materials and pictures of hairs."""
-_KNOTS = {BROWS: 5, HAIR: 4}
+_KNOTS_PER_HAIR = {BROWS: 5, HAIR: 4}
 _MAX_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
 _METRES_PER_MM = 1e-3
 
@@ -69,7 +69,7 @@ def encode_head(
     textures = {name: index for index, name in enumerate(pictures)}
     nodes, roots, skins = _gltf_nodes(head, binary)
     tree = {
-        "asset": _asset(head, notes),
+        "asset": _gltf_asset(head, notes),
         "extensionsUsed": sorted({name for material in materials for name in material.get("extensions", {})}),
         "scene": 0,
         "scenes": [{"nodes": roots}],
@@ -111,14 +111,14 @@ def _primitive_sources(
         materials.append(surface_material(own, pictures, roles, roughness) if eye < 0 else eye_material(own))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
-            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS[name])
+            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
             parts.append(HairPrimitive(points, fibres))
             materials.append(hair_material(name))
             pictures[name] = colours_png(fibres.colours()[0])
     return parts, materials
 
 
-def _asset(head: Head, notes: FrozenTree | None) -> Tree:
+def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
     asset: Tree = {"version": "2.0", "generator": "dermis"}
     if head.attribution:
         asset["copyright"] = head.attribution

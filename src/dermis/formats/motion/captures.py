@@ -25,8 +25,8 @@ _RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
 _PREFIX_WORDS = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|skel|j|c|x|m")
 """Words that programs add to the names of bones."""
-_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_NECKS, _EYES = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
+_SIDE_OF_WORD = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_NECK_WORDS, _EYE_WORDS = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
 _HEAD_FRACTION = 0.5  # of a head rotation; the neck bones rotate by the rest
 
 
@@ -177,13 +177,13 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
     words = [_bone_words(name) for name in skeleton.names]
     heads = [bone for bone, (kind, side) in enumerate(words) if kind == ["head"] and not side]
     head = heads[0] if heads else None
-    necks = [bone for bone, (kind, side) in enumerate(words) if kind in _NECKS and not side]
+    necks = [bone for bone, (kind, side) in enumerate(words) if kind in _NECK_WORDS and not side]
     if head is not None:
         ancestors = _ancestors(skeleton, head)
         necks = [bone for bone in necks if bone in ancestors]
     eyes: dict[str, str] = {}
     for bone, (kind, side) in enumerate(words):
-        if kind in _EYES and side:
+        if kind in _EYE_WORDS and side:
             eyes.setdefault(side, skeleton.names[bone])
     fractions = {bone: (1 - _HEAD_FRACTION if head is not None else 1.0) / len(necks) for bone in necks}
     if head is not None:
@@ -235,5 +235,5 @@ def _bone_words(name: str) -> tuple[list[str], str]:
     """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
-    sides = [_SIDES[word] for word in words if word in _SIDES]
-    return [word for word in words if word not in _SIDES], sides[0] if len(sides) == 1 else ""
+    sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]
+    return [word for word in words if word not in _SIDE_OF_WORD], sides[0] if len(sides) == 1 else ""

@@ -30,10 +30,10 @@ from dermis.mesh.head import Head
 _TIME_KEYS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
 _SHAPE_KEYS = ("blendshapes", "face_blendshapes", "faceBlendshapes")
 _MATRIX_KEYS = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
-_NEUTRAL = "_neutral"  # score of the neutral face, not a blend shape
-_MAX_TIME = 1e15  # milliseconds
+_NEUTRAL_SCORE = "_neutral"  # score of the neutral face, not a blend shape
+_MAX_TIME_MS = 1e15  # milliseconds
 _MAX_MATRIX_VALUE = 1e6
-_ADVICE = "Correct or remove the line"
+_LINE_ADVICE = "Correct or remove the line"
 
 
 class _CapturedFrame(NamedTuple):
@@ -104,11 +104,11 @@ def _parse_frame(
 ) -> _CapturedFrame:
     record = parse_json(line, culprit, "an object in JSON")
     if not isinstance(record, dict):
-        refuse(culprit, "an object in JSON", f"got {line.strip():.40}", _ADVICE)
+        refuse(culprit, "an object in JSON", f"got {line.strip():.40}", _LINE_ADVICE)
     shapes = next((record[key] for key in _SHAPE_KEYS if key in record), None)
     if shapes is None:
         actual = f"it has {', '.join(record) or 'nothing'}"
-        refuse(culprit, "blendshapes", actual, _ADVICE)
+        refuse(culprit, "blendshapes", actual, _LINE_ADVICE)
     matrix = next((record[key] for key in _MATRIX_KEYS if record.get(key) is not None), None)
     seconds = _frame_seconds(culprit, number, record, fps)
     scores = _shape_scores(culprit, shapes)
@@ -123,7 +123,9 @@ def _parse_frame(
 def _frame_seconds(culprit: str, number: int, record: Mapping[str, object], fps: float | None) -> float:
     for key, scale in _TIME_KEYS.items():
         if key in record:
-            return scale * quantities.checked_number(f"{culprit}: {key}", record[key], -_MAX_TIME, _MAX_TIME)
+            return scale * quantities.checked_number(
+                f"{culprit}: {key}", record[key], -_MAX_TIME_MS, _MAX_TIME_MS
+            )
     if fps is None:
         refuse(culprit, f"a time ({', '.join(_TIME_KEYS)})", "it has none", "Set the frame rate (fps)")
     return (number - 1) / fps
@@ -138,14 +140,14 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
         categories = [item if isinstance(item, dict) else {} for item in shapes]
         names = [item.get("categoryName", item.get("category_name")) for item in categories]
         if None in names or any("score" not in item for item in categories):
-            refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _ADVICE)
+            refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _LINE_ADVICE)
         shapes = {str(name): item["score"] for name, item in zip(names, categories, strict=True)}
     if not isinstance(shapes, dict):
-        refuse(culprit, "blendshapes by name or as a list", f"got {format_value(shapes)}", _ADVICE)
+        refuse(culprit, "blendshapes by name or as a list", f"got {format_value(shapes)}", _LINE_ADVICE)
     for name, score in shapes.items():
         if type(score) not in (int, float):
-            refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _ADVICE)
-    return {name: score for name, score in shapes.items() if name != _NEUTRAL}
+            refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
+    return {name: score for name, score in shapes.items() if name != _NEUTRAL_SCORE}
 
 
 def _facial_transformation(culprit: str, value: object) -> Doubles:
@@ -159,7 +161,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles:
         f"{culprit}: matrix", value, shape, -_MAX_MATRIX_VALUE, _MAX_MATRIX_VALUE
     ).reshape(4, 4)
     if not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
-        refuse(culprit, "an invertible matrix", "its determinant is 0", _ADVICE)
+        refuse(culprit, "an invertible matrix", "its determinant is 0", _LINE_ADVICE)
     return matrix.T if matrix[3, :3].any() and not matrix[:3, 3].any() else matrix
 
 

@@ -27,10 +27,10 @@ from dermis.mesh.geometry import compact_vertices
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 
-SUFFIXES = (".obj", ".ply")
-DEFAULT_RATE = 30.0
+FRAME_SUFFIXES = (".obj", ".ply")
+DEFAULT_FRAME_RATE = 30.0
 _FRAME_TOLERANCE = 1e-6
-_SIZE_RANGE = (0.33, 3.0)
+_RELATIVE_SIZE_RANGE = (0.33, 3.0)
 _NUMBER_FIELD = re.compile(r"%0?\d*d")
 _VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
 _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
@@ -39,7 +39,7 @@ _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 def is_sequence(path: Path) -> bool:
     """Return whether a path is a folder, a pattern (face_%05d.obj) or a mesh file, which could be a frame."""
     is_pattern = bool(_NUMBER_FIELD.search(path.name)) or "*" in path.name
-    return is_pattern or _is_folder(path) or path.suffix.lower() in SUFFIXES
+    return is_pattern or _is_folder(path) or path.suffix.lower() in FRAME_SUFFIXES
 
 
 def frame_files(path: Path) -> list[Path]:
@@ -50,7 +50,7 @@ def frame_files(path: Path) -> list[Path]:
     Raises DermisError when there are no files, or files of several formats.
     """
     if _is_folder(path):
-        files = [one for one in path.iterdir() if one.suffix.lower() in SUFFIXES]
+        files = [one for one in path.iterdir() if one.suffix.lower() in FRAME_SUFFIXES]
     elif _NUMBER_FIELD.search(path.name):
         before, after = _NUMBER_FIELD.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
@@ -62,12 +62,12 @@ def frame_files(path: Path) -> list[Path]:
         files = [path]
     kinds = sorted({file.suffix.lower() for file in files})
     if not files:
-        refuse(path, f"frames as {' or '.join(SUFFIXES)} files", "there are none", "Check the name")
-    if len(kinds) > 1 or kinds[0] not in SUFFIXES:
+        refuse(path, f"frames as {' or '.join(FRAME_SUFFIXES)} files", "there are none", "Check the name")
+    if len(kinds) > 1 or kinds[0] not in FRAME_SUFFIXES:
         actual = f"there are {', '.join(kinds)}"
         refuse(
             path,
-            f"frames of one kind ({' or '.join(SUFFIXES)})",
+            f"frames of one kind ({' or '.join(FRAME_SUFFIXES)})",
             actual,
             "Use a pattern for one of them, such as face_%05d.obj",
         )
@@ -87,7 +87,7 @@ def load_sequence(
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
     """
-    files, rate = frame_files(path), DEFAULT_RATE if fps is None else fps
+    files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
     frames = _FrameCache(tuple(files), head, FrameReader(unit_mm, up))
     for index in {0, len(files) // 2, len(files) - 1}:
         frames.positions(index)
@@ -153,7 +153,7 @@ class _FrameCache:
 
     def _check_size(self, file: Path, positions: Floats) -> None:
         sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (positions, self.head.positions_mm)]
-        if not _SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _SIZE_RANGE[1]:
+        if not _RELATIVE_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _RELATIVE_SIZE_RANGE[1]:
             actual = f"it is {sizes[0] / sizes[1]:.3g} times as large"
             refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
 

@@ -11,15 +11,15 @@ from dermis.base.arrays import Doubles, Index
 from dermis.mesh.geometry import components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
-RADIUS_MM = 8.0, 20.0
+RADIUS_RANGE_MM = 8.0, 20.0
 """Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
 MAX_DEVIATION = 0.06
 """Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
 _MIN_POINTS = 20  # points
 _MIN_COVERED = 0.25  # fraction of the sphere
-_PART_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
+_MAX_PART_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
 _FOCUS_MM = 1000.0  # distance of the point that eyes without a cornea look at
-_ITERATIONS = 12
+_FIT_ITERATIONS = 12
 _MIN_BULGE, _MIN_CORNEA = 0.025, 0.045
 """Heights above the sphere, in radii: that of points which may be a cornea, and least height of a cornea."""
 _MIN_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
@@ -55,7 +55,7 @@ class _EyePiece:
     @property
     def fault(self) -> str:
         """Return why this connected piece is not an eyeball, as a verb phrase; empty if it is one."""
-        (low, high), (_, radius, deviation) = RADIUS_MM, self.sphere
+        (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
         if deviation > MAX_DEVIATION:
@@ -128,7 +128,7 @@ def _add_gaze(
     balls = []
     for ball in (left, right):
         farthest = [0.0 if p is ball else _distance_in_radii(positions[p.points], ball).max() for p in pieces]
-        parts = [piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _PART_RADII]
+        parts = [piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _MAX_PART_RADII]
         points, area = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "area"))
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
         gaze = centre + _FOCUS_MM * ahead - ball.sphere.centre if axis is None else axis
@@ -161,7 +161,7 @@ def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
     weight, fraction = np.ones(len(points)), area / area.sum()
     start = points.mean(axis=0)
     p = points - start
-    for _ in range(_ITERATIONS):
+    for _ in range(_FIT_ITERATIONS):
         root = np.sqrt(weight * fraction)[:, None]
         rows = np.column_stack((2 * p, np.ones(len(p))))
         solution = np.linalg.lstsq(rows * root, (p * p).sum(axis=1) * root[:, 0], rcond=None)[0]
@@ -192,14 +192,14 @@ def corneal_axis(points: Doubles, area: Doubles, ball: Sphere, ahead: Doubles) -
     if not bulges.any() or height[bulges].max() < _MIN_CORNEA:
         return None
     volume = (area * height)[bulges]
-    mean = _unit((volume[:, None] * offset[bulges]).sum(axis=0))
+    mean = _normalise((volume[:, None] * offset[bulges]).sum(axis=0))
     if volume[offset[bulges] @ mean < _MIN_COSINE * distance[bulges]].sum() > 0.1 * volume.sum():
         return None
     if np.count_nonzero(bulges) < 8:
         return mean
-    axis = _unit(fit_sphere(points[bulges], area[bulges]).centre - ball.centre)
+    axis = _normalise(fit_sphere(points[bulges], area[bulges]).centre - ball.centre)
     return axis if axis @ mean > 0.95 else mean
 
 
-def _unit(vector: Doubles) -> Doubles:
+def _normalise(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))

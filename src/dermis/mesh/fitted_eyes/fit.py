@@ -52,13 +52,13 @@ class _EyeShape(NamedTuple):
 
 @logged_step("fitting the eyes")
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
-    """Return a head whose two eyeballs from a file are replaced by the package's own.
+    """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
-    The new eyeballs have the radius and position of the old ones, look along their corneas or straight ahead,
-    and follow their bones and targets rigidly. If they cannot be fitted, the head is returned as it is, with
-    the reason in its `note`.
+    The fitted eyeballs have the radius and position of those of the file, look along the axis of their
+    corneas or straight ahead, and follow their bones and morph targets rigidly. If the file has no two
+    eyeballs, the head is returned unchanged, with the reason in its `note`.
 
-    coarse : for a subdivided head its mesh before subdivision, when the lids still touched the eyeballs
+    coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
     look : appearance of the eyes
     """
     mesh, control = head.mesh, head.control

@@ -12,7 +12,7 @@ from dermis.mesh.eyeball import CORNEA_MM, limbus_plane_mm
 from dermis.mesh.fitted_eyes.balls import Sphere
 from dermis.mesh.geometry import cross_2d, expand_runs
 
-_RAYS, _EXTENT = 49, 0.9
+_RAYS_PER_SIDE, _HALF_SIDE_RADII = 49, 0.9
 """Rays along each side of the square before the eye, and half its side in radii of the ball."""
 _IRIS_HALF_WIDTH = 0.25  # in radii
 _IRIS_ABOVE_CENTRE = 0.08  # of the opening's height: the upper lid covers the iris, the lower one touches it
@@ -38,7 +38,7 @@ class Lids:
     @cached_property
     def ray_positions(self) -> Doubles:
         """Return the positions (n, 2) of the rays across and up, relative to the ball's centre [mm]."""
-        line = np.linspace(-_EXTENT, _EXTENT, _RAYS) * self.ball.radius
+        line = np.linspace(-_HALF_SIDE_RADII, _HALF_SIDE_RADII, _RAYS_PER_SIDE) * self.ball.radius
         x, y = np.meshgrid(line, line)
         return np.stack([x.ravel(), y.ravel()], axis=1)
 
@@ -61,7 +61,7 @@ class Lids:
         area = np.where(np.abs(area) < 1e-9, np.inf, area)
         u, v = cross_2d(p, c) / area, cross_2d(b, p) / area
         depth = a[:, 2] + u * b[:, 2] + v * c[:, 2]
-        front = np.full(_RAYS**2, -np.inf)
+        front = np.full(_RAYS_PER_SIDE**2, -np.inf)
         inside = (u >= 0) & (v >= 0) & (u + v <= 1)
         np.maximum.at(front, ray[inside], depth[inside])
         return front
@@ -71,14 +71,14 @@ class Lids:
 
         corners : (f, 3, 3) corners of the triangles [mm]
         """
-        extent = _EXTENT * self.ball.radius
-        cell = (corners[:, :, :2] + extent) * (_RAYS - 1) / (2 * extent)
+        extent = _HALF_SIDE_RADII * self.ball.radius
+        cell = (corners[:, :, :2] + extent) * (_RAYS_PER_SIDE - 1) / (2 * extent)
         first = np.maximum(np.ceil(cell.min(axis=1)), 0).astype(np.int64)
-        last = np.minimum(np.floor(cell.max(axis=1)), _RAYS - 1).astype(np.int64)
+        last = np.minimum(np.floor(cell.max(axis=1)), _RAYS_PER_SIDE - 1).astype(np.int64)
         size = np.maximum(last - first + 1, 0)
         triangle, index = expand_runs(np.zeros_like(size[:, 0]), size.prod(axis=1))
         row, column = np.divmod(index, size[triangle, 0])
-        return triangle, (first[triangle, 1] + row) * _RAYS + first[triangle, 0] + column
+        return triangle, (first[triangle, 1] + row) * _RAYS_PER_SIDE + first[triangle, 0] + column
 
     @property
     def opening_angles(self) -> tuple[float, float]:
@@ -121,7 +121,7 @@ class Lids:
 
 
 def lids_in_front(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
-    """Return the surfaces in front of an eyeball.
+    """Return the surfaces in front of an eyeball, mostly its lids.
 
     corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs, in head space
     ball : sphere of the eyeball
