@@ -9,7 +9,7 @@ import pytest
 
 from dermis.base.tables import read_rows
 from dermis.human.labels.classes import label_classes
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 
 PAGE = (Path(__file__).parents[1] / "docs" / "labels.md").read_text("utf-8")
 
@@ -20,7 +20,7 @@ def test_all_classes_are_listed() -> None:
     assert [one.number for one in label_classes()] == list(range(len(label_classes())))
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", LANDMARK_SETS)
 def test_all_sets_are_listed_with_their_counts(name: str) -> None:
     rows = read_rows("dermis.human.landmarks", name)
     assert f"| `{name}` | {len(rows)} |" in PAGE

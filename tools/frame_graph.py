@@ -11,7 +11,7 @@ from dermis.apps.validation.benchmarks.cases import pose_at_moment, with_test_ri
 from dermis.apps.validation.pages import template_path
 from dermis.base.command_line import run_script
 from dermis.formats.samples import is_available
-from dermis.gpu.graph import ListedPass, Listing
+from dermis.gpu.graph import FrameListing, ListedPass
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
 SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52
@@ -33,14 +33,14 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
     }
 
 
-def full_listing(renderer: dermis.Renderer, scene: dermis.Scene) -> Listing:
+def full_listing(renderer: dermis.Renderer, scene: dermis.Scene) -> FrameListing:
     """Return the listing of a frame in which all passes run."""
-    renderer.graph.listing = listing = Listing()
+    renderer.graph.listing = listing = FrameListing()
     renderer.draw(scene, SETTINGS, force=True)
     return listing
 
 
-def stage_rows(listing: Listing, ms: dict[str, float], marks: dict[str, set[str]]) -> Iterable[str]:
+def stage_rows(listing: FrameListing, ms: dict[str, float], marks: dict[str, set[str]]) -> Iterable[str]:
     """Yield the table row of each stage."""
     for stage in dict.fromkeys(one.stage for one in listing.passes):
         own = [one for one in listing.passes if one.stage == stage]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.observation import Landmarks, Observation
 from dermis.frame.renderer import Renderer
 from dermis.human.labels.classes import class_number
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -73,5 +73,5 @@ def observed(renderer: Renderer) -> dict[str, Observation]:
     """Return an observation of each person."""
     scenes = people()
     outputs = "label", "label_face_synthetics", "triangle", "depth"
-    found = renderer.observe(scenes.values(), SETTINGS, outputs=outputs, landmarks=SETS)
+    found = renderer.observe(scenes.values(), SETTINGS, outputs=outputs, landmarks=LANDMARK_SETS)
     return dict(zip(scenes, found, strict=True))

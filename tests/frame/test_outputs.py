@@ -16,7 +16,7 @@ from dermis.frame.limits import frame_bytes
 from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.frame.request import FrameRequest
-from dermis.gpu.graph import Listing
+from dermis.gpu.graph import FrameListing
 from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
@@ -254,7 +254,7 @@ def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
     """Outputs add passes after those of a frame without outputs, and change none of them."""
 
     def passes(**given: Any) -> list[str]:
-        renderer.graph.listing = listing = Listing()
+        renderer.graph.listing = listing = FrameListing()
         renderer.draw(SCENE, settings_of(size=SIZE, samples=4), **given)
         return [f"{one.stage} {one.shader} {one.bindings.keys()}" for one in listing.passes]
 

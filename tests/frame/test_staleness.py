@@ -17,7 +17,7 @@ from setups import front_camera, head_of, settings_of
 
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.gpu.graph import Listing
+from dermis.gpu.graph import FrameListing
 from dermis.images.io import write_png
 from dermis.mesh.pose import Pose
 from dermis.mesh.primitives import uv_sphere
@@ -231,7 +231,7 @@ def test_everything_runs_when_asked(renderer: Renderer) -> None:
 def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
     """Each stage is listed with its shader, in order; stages that a camera move leaves valid are marked."""
     renderer.draw(BASE, SETTINGS)
-    listing = renderer.graph.listing = Listing()
+    listing = renderer.graph.listing = FrameListing()
     renderer.draw(replace(BASE, camera=SCENES["camera"]), SETTINGS)
     stages = list(dict.fromkeys(one.stage for one in listing.passes))
     assert stages == [

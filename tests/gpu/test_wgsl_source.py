@@ -8,7 +8,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.gpu import ComputeProgram, Device
-from dermis.gpu.wgsl_source import Member, ShaderFolder, compose
+from dermis.gpu.wgsl_source import ShaderFolder, ShaderListMember, compose
 
 
 def write(folder: Path, **files: str) -> Path:
@@ -78,13 +78,13 @@ def test_a_list_is_included_and_repeated_as_it_grows(tmp_path: Path) -> None:
         cat="// cat",
         emu="// emu",
     )
-    pets = [Member("tom-cat", tmp_path / "cat.wgsl", (("legs", "4"),))]
+    pets = [ShaderListMember("tom-cat", tmp_path / "cat.wgsl", (("legs", "4"),))]
     folder = ShaderFolder(tmp_path, {"pets": lambda: pets})
     assert compose(tmp_path / "main.wgsl", (folder,)).text.splitlines() == [
         "// cat",
         "    tom_cat TOM_CAT 0u 4",
     ]
-    pets.append(Member("emu", tmp_path / "emu.wgsl", (("legs", "2"),)))
+    pets.append(ShaderListMember("emu", tmp_path / "emu.wgsl", (("legs", "2"),)))
     source = compose(tmp_path / "main.wgsl", (folder,))
     assert source.text.splitlines()[1:] == ["// emu", "    tom_cat TOM_CAT 0u 4", "    emu EMU 1u 2"]
     assert source.origin[-2:] == (("main.wgsl", 2), ("main.wgsl", 2))
@@ -107,7 +107,7 @@ def test_numbers_of_python_are_filled_in(tmp_path: Path) -> None:
 )
 def test_what_nobody_gives_is_named(tmp_path: Path, text: str, error: str) -> None:
     write(tmp_path, main=text)
-    pets = [Member("cat", tmp_path / "cat.wgsl")]
+    pets = [ShaderListMember("cat", tmp_path / "cat.wgsl")]
     folder = ShaderFolder(tmp_path, {"pets": lambda: pets}, lambda: {"a": 1})
     with pytest.raises(DermisError, match=f"main.wgsl: expected .*{error}"):
         compose(tmp_path / "main.wgsl", (folder,))

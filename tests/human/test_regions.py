@@ -160,7 +160,7 @@ def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
     person = Human(asian=1, african=0, caucasian=0, sex=0, age=30)
     heads = [AVERAGE_HUMAN.head(layout="hm08"), AVERAGE_HUMAN.head(subdivide=0), person.head(subdivide=2)]
     for head in heads:
-        found = _at_landmarks(head, 2048)
+        found = _at_landmarks(head, 1024)
         same = [found[place] == region for place, region in wanted.items()]
         assert np.mean(same) > 0.8  # those on a border may fall to either side
 
@@ -227,7 +227,7 @@ def test_landmarks_of_another_head_are_refused(tmp_path: Path) -> None:
 
 
 def test_soft_maps_stay_within_the_table_and_have_no_edge(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apply, "SIZE", 256)
+    monkeypatch.setattr(apply, "MIN_MAP_SIDE", 256)
     region = np.repeat(np.array([[3, 9]], np.uint8), 64, axis=1).repeat(128, axis=0)
     table = load_region_table("default")
     head, rho_s = apply.with_regions(Head("card", _quad(), Maps(region=region)), table)
@@ -242,7 +242,7 @@ def test_soft_maps_stay_within_the_table_and_have_no_edge(monkeypatch: pytest.Mo
 
 
 def test_specks_in_the_dark_of_the_own_map_do_not_outshine_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apply, "SIZE", 256)
+    monkeypatch.setattr(apply, "MIN_MAP_SIDE", 256)
     specks = np.full((256, 256), 0.5, np.float32)
     specks[:, 128:] = 0.001
     specks[40:200:40, 160:240:20] = 1.0
@@ -254,7 +254,7 @@ def test_specks_in_the_dark_of_the_own_map_do_not_outshine_all(monkeypatch: pyte
 
 
 def test_fine_detail_of_the_own_map_stays_and_its_level_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apply, "SIZE", 256)
+    monkeypatch.setattr(apply, "MIN_MAP_SIDE", 256)
     stripes = np.tile(np.float32([0.5, 0.5, 1.0, 1.0]), (256, 64))
     maps = Maps(region=np.full((8, 8), 4, np.uint8), specular=stripes)
     head, rho_s = apply.with_regions(Head("card", _quad(), maps), _table(0.3, 0.2))

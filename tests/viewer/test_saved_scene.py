@@ -98,7 +98,7 @@ def test_the_command_renders_what_the_viewer_shows(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("dermis.human.regions.apply.SIZE", 64)
+    monkeypatch.setattr("dermis.human.regions.apply.MIN_MAP_SIDE", 64)
     shown = STATES[name](state, tmp_path).with_settings(size=SIZE)
     view_renderer.screenshot(tmp_path / "shown.png", shown, SIZE)
     save_state(tmp_path / "scene.toml", shown)

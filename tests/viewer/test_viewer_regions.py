@@ -29,7 +29,7 @@ def table(tmp_path: Path) -> str:
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.human.regions.apply.SIZE", 64)
+    monkeypatch.setattr("dermis.human.regions.apply.MIN_MAP_SIDE", 64)
 
 
 def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: ViewerState, table: str) -> None:

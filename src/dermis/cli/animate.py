@@ -16,7 +16,7 @@ from cyclopts import Parameter
 from dermis.base.console import note, print_report, progress_bar, spinner
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
-from dermis.cli.options import AdapterOption, Flag, Integer, JsonOption, Options, OutputPath
+from dermis.cli.options import AdapterOption, FlagOption, IntegerOption, JsonOption, Options, OutputPath
 from dermis.cli.output_options import AnimationOutput
 from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene, note_subdivision
 
@@ -64,9 +64,9 @@ def animate(
     motion_fps: float | None = None,
     begin: Annotated[float | None, Parameter(name="--from")] = None,
     end: Annotated[float | None, Parameter(name="--to")] = None,
-    crf: Integer = None,
+    crf: IntegerOption = None,
     overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
-    names: Flag = False,
+    names: FlagOption = False,
     scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,

@@ -53,8 +53,8 @@ def bench(
     as_json:
         Print one JSON object with all timings.
     """
-    from dermis.apps.validation.benchmarks.cases import PRESETS
-    from dermis.apps.validation.benchmarks.report import as_json as to_json
+    from dermis.apps.validation.benchmarks.cases import BENCHMARK_PRESETS
+    from dermis.apps.validation.benchmarks.report import benchmark_json as to_json
     from dermis.apps.validation.benchmarks.report import write_report
     from dermis.apps.validation.benchmarks.run import run_benchmark
     from dermis.base.atomic_write import check_output
@@ -71,7 +71,7 @@ def bench(
         name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
     check_head(head, file)
     is_software = select_adapters(adapter)[0][0].kind == "CPU"
-    cases = PRESETS[preset or ("cpu" if is_software else "interactive")].cases()
+    cases = BENCHMARK_PRESETS[preset or ("cpu" if is_software else "interactive")].cases()
     with progress_bar("measuring") as report_progress:
         benchmark = run_benchmark(cases, name, adapter, report_progress, file)
     print_report(as_json, to_json(benchmark), lambda: _report_lines(benchmark))
@@ -88,7 +88,7 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     default_lines = ["", "the default frame:", *stages] if stages else []
     published_lines = ["", text] if (text := report.published_text(benchmark)) else []
     table_lines = [*rows, *report.skipped_lines(benchmark)]
-    return [report.summary(benchmark), "", *table_lines, *default_lines, *published_lines]
+    return [report.summary_line(benchmark), "", *table_lines, *default_lines, *published_lines]
 
 
 def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:

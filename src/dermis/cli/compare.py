@@ -19,7 +19,7 @@ from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
 from dermis.cli.options import (
     NO_OPTIONS,
     AdapterOption,
-    Integer,
+    IntegerOption,
     JsonOption,
     OptionalOutputPath,
     Options,
@@ -37,7 +37,7 @@ from dermis.specular.models import MODELS
 
 _PATH_TRACERS = ("path-traced", "cycles")
 _DEFAULT_SIZES = {"size": (256, 256), "atlas": 1024}
-_DIRECTION = {"direction": "that of the truth's skin"}
+_DIRECTION_DEFAULT = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     SkinOptions = Options
 else:
     SizeOptions = model_options(Settings, only=_DEFAULT_SIZES, defaults=_DEFAULT_SIZES)
-    SkinOptions = model_options(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
+    SkinOptions = model_options(Skin, only=("direction", "roughness"), defaults=_DIRECTION_DEFAULT)
 
 
 def compare(
@@ -64,7 +64,7 @@ def compare(
     sizes: SizeOptions = NO_OPTIONS,
     skin: SkinOptions = NO_OPTIONS,
     shape: ShapeOptions = NO_OPTIONS,
-    samples: Integer = None,
+    samples: IntegerOption = None,
     output: OptionalOutputPath = None,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,

@@ -11,7 +11,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head
-from dermis.cli.options import NO_OPTIONS, AdapterOption, Flag, JsonOption, OutputPath, drop_none
+from dermis.cli.options import NO_OPTIONS, AdapterOption, FlagOption, JsonOption, OutputPath, drop_none
 
 if TYPE_CHECKING:
     TargetName = str
@@ -29,14 +29,14 @@ def export(
     output: OutputPath,
     version: str | None = None,
     variant: str | None = None,
-    diffuse_transmission: Flag = False,
+    diffuse_transmission: FlagOption = False,
     model: Model | None = None,
     profile: str | None = None,
     library: Path | None = None,
     map_side: int = 2048,
     head: HeadOptions = NO_OPTIONS,
     adapter: AdapterOption = "auto",
-    naive: Flag = False,
+    naive: FlagOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Export a skin or a head to another program, and report the remaining error.

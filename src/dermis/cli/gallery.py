@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.base.console import note, print_report, progress_bar
-from dermis.cli.options import AdapterOption, Integer, JsonOption, OutputPath
+from dermis.cli.options import AdapterOption, IntegerOption, JsonOption, OutputPath
 
 if TYPE_CHECKING:
     from dermis.apps.gallery.script import GalleryPicture
@@ -20,7 +20,7 @@ def gallery(
     *,
     only: Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)] = None,
     head: str | None = None,
-    size: Integer = None,
+    size: IntegerOption = None,
     output: OutputPath = Path("gallery"),
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,

@@ -12,7 +12,15 @@ from cyclopts import Parameter
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
-from dermis.cli.options import AdapterOption, Flag, Integer, JsonOption, Options, OutputPath, drop_none
+from dermis.cli.options import (
+    AdapterOption,
+    FlagOption,
+    IntegerOption,
+    JsonOption,
+    Options,
+    OutputPath,
+    drop_none,
+)
 
 if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
@@ -24,14 +32,14 @@ if TYPE_CHECKING:
 
 Look = TypeVar("Look", "SkinLook", "EyeLook", "HairLook")
 TARGET, EXPRESSION = "--target", "--expression"
-_Values = Parameter(negative="", metavar="NAME=VALUE,...", show_default=False)
-_Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
+_ValuesParameter = Parameter(negative="", metavar="NAME=VALUE,...", show_default=False)
+_WeightsParameter = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
 
 def head(
     *,
     output: OutputPath = Path("head.glb"),
-    seed: Integer = None,
+    seed: IntegerOption = None,
     african: float | None = None,
     asian: float | None = None,
     caucasian: float | None = None,
@@ -39,19 +47,19 @@ def head(
     age: float | None = None,
     weight: float | None = None,
     muscle: float | None = None,
-    target: Annotated[list[str] | None, _Pairs] = None,
-    expression: Annotated[list[str] | None, _Pairs] = None,
-    skin: Annotated[list[str] | None, _Pairs] = None,
-    eye: Annotated[list[str] | None, _Pairs] = None,
-    hair: Annotated[list[str] | None, _Values] = None,
+    target: Annotated[list[str] | None, _WeightsParameter] = None,
+    expression: Annotated[list[str] | None, _WeightsParameter] = None,
+    skin: Annotated[list[str] | None, _WeightsParameter] = None,
+    eye: Annotated[list[str] | None, _WeightsParameter] = None,
+    hair: Annotated[list[str] | None, _ValuesParameter] = None,
     colour: Path | None = None,
     normal: Path | None = None,
     roughness: Path | None = None,
     size: int = 1024,
     layout: Literal["own", "hm08"] = "own",
-    subdivide: Integer = None,
+    subdivide: IntegerOption = None,
     adapter: AdapterOption = "auto",
-    list_targets: Flag = False,
+    list_targets: FlagOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Create a person of the parametric human and write it as glTF.

@@ -57,13 +57,13 @@ AdapterOption = Annotated[
 _OUTPUT_NAMES = Parameter(name=("--output", "-o"))
 OptionalOutputPath = Annotated[Path | None, _OUTPUT_NAMES]
 OutputPath = Annotated[Path, _OUTPUT_NAMES]
-Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+FlagOption = Annotated[bool, Parameter(negative="", show_default=False)]
 _LENGTH_RANGE_MM = 1e-6, 1e4
 Options = dict[str, Any]
 """Values of options by the name of the model field."""
 NO_OPTIONS: Options = {}
 """Default of a parameter of type `Options`."""
-Integer = Annotated[int | None, Parameter(converter=_to_int)]
+IntegerOption = Annotated[int | None, Parameter(converter=_to_int)]
 """Integer option; unlike cyclopts' own conversion it refuses 64.5 instead of rounding it."""
 
 

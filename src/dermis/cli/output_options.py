@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.console import note
 from dermis.base.errors import refuse
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.scene.outputs import OUTPUTS, check_outputs
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _split_names(typed: str) -> list[str]:
 
 _LANDMARKS_HELP = (
     "Landmark sets to write beside the image, such as face.landmarks.json, with camera, head pose and gaze: "
-    f"{', '.join(SETS)}, or a .csv file of name,vertex; separated by commas."
+    f"{', '.join(LANDMARK_SETS)}, or a .csv file of name,vertex; separated by commas."
 )
 LandmarksOption = Annotated[
     str | None, Parameter(name="--landmarks", help=_LANDMARKS_HELP, metavar="SET,...")

@@ -133,7 +133,7 @@ _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if
 _SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
 _RETRY_S = 0.02
 _UNSAFE_PACKAGES = {"importlib", "pydantic"}  # half-imported modules, and callbacks from Rust
-_DRIVERS = {"wgpu", "glfw"}
+_DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
@@ -263,7 +263,7 @@ def _would_be_swallowed(frame: FrameType | None) -> bool:
     """
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
-        if package in _UNSAFE_PACKAGES or (package in _DRIVERS and "callback" in name):
+        if package in _UNSAFE_PACKAGES or (package in _DRIVER_PACKAGES and "callback" in name):
             return True
         frame = frame.f_back
     return False

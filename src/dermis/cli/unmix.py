@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_json, print_lines, progress_bar
-from dermis.cli.options import AdapterOption, Flag, JsonOption, Options, OutputPath, drop_none
+from dermis.cli.options import AdapterOption, FlagOption, JsonOption, Options, OutputPath, drop_none
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ def unmix(
     model_eumelanin: float = DEFAULT_SKIN.eumelanin,
     epidermis_mm: float = DEFAULT_SKIN.epidermis_mm,
     noise: float = 0.01,
-    shading: Flag = False,
-    widths: Flag = False,
+    shading: FlagOption = False,
+    widths: FlagOption = False,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
 ) -> int:

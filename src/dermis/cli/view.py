@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dermis.base.console import note, print_lines, spinner
 from dermis.base.errors import refuse
-from dermis.cli.options import AdapterOption, Flag, Integer
+from dermis.cli.options import AdapterOption, FlagOption, IntegerOption
 from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene
 
 if TYPE_CHECKING:
@@ -23,9 +23,9 @@ def view(
     /,
     *,
     browser: bool = False,
-    port: Integer = None,
+    port: IntegerOption = None,
     host: str | None = None,
-    token: Flag = False,
+    token: FlagOption = False,
     motion: str | None = None,
     motion_fps: float | None = None,
     scene: SceneOptions = DEFAULT_SCENE_OPTIONS,

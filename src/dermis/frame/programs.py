@@ -16,7 +16,7 @@ from dermis.frame.lights.kind import KINDS, light_shaders
 from dermis.frame.lights.records import light_shader_constants
 from dermis.gpu import ComputeProgram, Constants, Device, cached_program
 from dermis.gpu.program import used_constants
-from dermis.gpu.wgsl_source import Folder, Member, ShaderFolder
+from dermis.gpu.wgsl_source import Folder, ShaderFolder, ShaderListMember
 from dermis.scene.outputs import OUTPUTS
 from dermis.specular.models import MODELS
 
@@ -60,7 +60,7 @@ def shader_folders(*options: str) -> tuple[Folder, ...]:
         **isotropic_lobe_constants(),
         **reflection_constants(),
     }
-    lists: dict[str, Callable[[], Sequence[Member]]] = {"lights": light_shaders}
+    lists: dict[str, Callable[[], Sequence[ShaderListMember]]] = {"lights": light_shaders}
     for feature in _features():
         numbers |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()

@@ -402,7 +402,7 @@ class Renderer:
             Scene before the first one, for motion vectors between consecutive scenes of the same head; or the
             previous scene of each scene.
         landmarks : iterable of str
-            Names of landmark sets (`dermis.human.landmarks.sets.SETS`), or files with rows name,vertex.
+            Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 
         Yields
         ------

@@ -19,7 +19,7 @@ _ALL_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
 
 _ASPECT_ALL = 1  # WGPUTextureAspect_All
 
-Key = tuple[int, ...]
+ResourceKey = tuple[int, ...]
 
 T = TypeVar("T")
 
@@ -74,8 +74,10 @@ class ResourceCache(Generic[T]):
     """
 
     def __init__(self) -> None:
-        self._entries: dict[Key, T] = {}
-        self._keys: dict[int, tuple[weakref.ref[object], set[Key]]] = {}  # of each resource, by its id
+        self._entries: dict[ResourceKey, T] = {}
+        self._keys: dict[
+            int, tuple[weakref.ref[object], set[ResourceKey]]
+        ] = {}  # of each resource, by its id
 
     def __len__(self) -> int:
         """Return the number of cached entries."""
@@ -86,17 +88,17 @@ class ResourceCache(Generic[T]):
         """Return the number of resources whose release the cache watches."""
         return len(self._keys)
 
-    def find(self, key: Key) -> T | None:
+    def find(self, key: ResourceKey) -> T | None:
         """Return the cached entry for a key of `resource_key`, or None."""
         return self._entries.get(key)
 
-    def add(self, key: Key, resources: Sequence[object], entry: T) -> None:
+    def add(self, key: ResourceKey, resources: Sequence[object], entry: T) -> None:
         """Add an entry that is kept until one of its resources is released."""
         self._entries[key] = entry
         for resource in resources:
             self._keys_of(resource).add(key)
 
-    def _keys_of(self, resource: object) -> set[Key]:
+    def _keys_of(self, resource: object) -> set[ResourceKey]:
         """Return the cache keys that contain a resource, and start to watch its release if it is new."""
         identity = id(resource)
         if identity not in self._keys:
@@ -118,7 +120,7 @@ class ResourceCache(Generic[T]):
                 self._keys[other][1].discard(key)
 
 
-def resource_key(resources: Sequence[object]) -> Key:
+def resource_key(resources: Sequence[object]) -> ResourceKey:
     """Return the cache key of a sequence of resources: their Python ids in order."""
     return tuple(map(id, resources))
 

@@ -11,7 +11,7 @@ from dermis.base.errors import DermisError, notify
 from dermis.gpu.device import Device, open_device
 
 T = TypeVar("T")
-_ADVICE = "Close other programs that use the GPU, or try --adapter cpu"
+_LOST_DEVICE_ADVICE = "Close other programs that use the GPU, or try --adapter cpu"
 
 
 class DeviceError(DermisError):
@@ -23,12 +23,14 @@ class DeviceLostError(DeviceError):
 
     def __init__(self, device: Device) -> None:
         self.name = device.adapter.name
-        super().__init__(f"{self.name}: expected the device to last, but its driver lost it. {_ADVICE}.")
+        super().__init__(
+            f"{self.name}: expected the device to last, but its driver lost it. {_LOST_DEVICE_ADVICE}."
+        )
 
     def lost_twice(self) -> DeviceError:
         """Return the error to raise when the reopened device is lost as well."""
         return DeviceError(
-            f"device: expected {self.name} to last for a frame, but it was lost twice. {_ADVICE}."
+            f"device: expected {self.name} to last for a frame, but it was lost twice. {_LOST_DEVICE_ADVICE}."
         )
 
 

@@ -48,7 +48,7 @@ class ListedPass:
 
 
 @dataclass
-class Listing:
+class FrameListing:
     """Listing of a frame for inspection: its passes in order, and the resources that they bind.
 
     resources : descriptions such as "rgba32float 512 x 512 x 7" or "buffer 4096"
@@ -115,7 +115,7 @@ class ListingRecorder(Recorder):
     index : index of the recording among the declared passes
     """
 
-    def __init__(self, device: Device, listing: Listing, index: int) -> None:
+    def __init__(self, device: Device, listing: FrameListing, index: int) -> None:
         self.device, self._listing, self._index = device, listing, index
 
     def dispatch(
@@ -167,7 +167,7 @@ class Graph(Recorder):
         self.device = device
         self.recordings = RecordingCache()
         self.executed_stages: list[str] = []
-        self.listing: Listing | None = None
+        self.listing: FrameListing | None = None
         self._epoch = 0
         self._passes: list[DeclaredPass] = []
         self._uniforms = Uniforms(device)

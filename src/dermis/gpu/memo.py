@@ -13,7 +13,7 @@ import numpy as np
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-Key = tuple[Callable[..., object], str]
+FunctionKey = tuple[Callable[..., object], str]
 """A function and the owner that it is called for."""
 
 
@@ -29,8 +29,8 @@ class CachedResult:
 
     args: tuple[object, ...]
     value: Any = None  # of the type that the function returns
-    parts: list[tuple[Key, CachedResult]] = field(default_factory=list)
-    keys: set[Key] = field(default_factory=set)
+    parts: list[tuple[FunctionKey, CachedResult]] = field(default_factory=list)
+    keys: set[FunctionKey] = field(default_factory=set)
 
 
 class Memo:
@@ -44,10 +44,14 @@ class Memo:
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
         self._cache_size = cache_size
-        self._results: dict[Key, list[CachedResult]] = {}  # of each function, the most recently used first
-        self._recent_keys: deque[set[Key]] = deque([set()], maxlen=max(cache_ttl, cache_size * cache_size))
+        self._results: dict[
+            FunctionKey, list[CachedResult]
+        ] = {}  # of each function, the most recently used first
+        self._recent_keys: deque[set[FunctionKey]] = deque(
+            [set()], maxlen=max(cache_ttl, cache_size * cache_size)
+        )
         self._pending: list[CachedResult] = []  # the function calls that are running, innermost last
-        self._hits: list[tuple[Key, CachedResult]] = []  # of this frame, without parts
+        self._hits: list[tuple[FunctionKey, CachedResult]] = []  # of this frame, without parts
 
     @overload
     def get(self, function: Callable[[*Ts], T], *args: *Ts, owner: str = "") -> T: ...
@@ -128,13 +132,13 @@ class Memo:
             self._pending.pop()
         return result
 
-    def _mark_hits_used(self, key: Key | None = None) -> None:
+    def _mark_hits_used(self, key: FunctionKey | None = None) -> None:
         """Mark results used in this frame as most recently used: all, or those that depend on a key."""
         for one, result in self._hits:
             if key is None or key in result.keys:
                 self._mark_used(one, result)
 
-    def _mark_used(self, key: Key, result: CachedResult) -> None:
+    def _mark_used(self, key: FunctionKey, result: CachedResult) -> None:
         """Move a result and its parts to the front of the cache, as most recently used."""
         self._recent_keys[-1].add(key)
         results = self._results.setdefault(key, [])

@@ -31,7 +31,7 @@ _OUT_OF_MEMORY = "out of memory", "not enough memory"  # in errors of the librar
 
 _RAISE_LIMIT = "Raise it: ulimit -v unlimited"
 
-_SMALLER = "Choose smaller ones"
+_SMALLER_SIZES = "Choose smaller ones"
 
 _SMALLER_FRAME = (
     "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu"
@@ -84,7 +84,7 @@ def check_memory(
     needed: float,
     option: str,
     sizes: str,
-    advice: Callable[[float], str] = lambda _: _SMALLER,
+    advice: Callable[[float], str] = lambda _: _SMALLER_SIZES,
 ) -> None:
     """Raise DermisError if textures of a software adapter would not fit into main memory.
 

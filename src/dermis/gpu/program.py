@@ -21,7 +21,7 @@ from dermis.gpu.types import Bindable, Bindings, NativeObject, UniformRecord, Un
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, ShaderSource, compose
 
-Records = Mapping[str, NDArray[np.generic]]
+UniformRecords = Mapping[str, NDArray[np.generic]]
 """Bindings of a shader's uniforms only."""
 
 P = TypeVar("P")
@@ -74,7 +74,7 @@ class Program:
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
         """Return the positions in uniform memory of the records that are bound to the shader [byte]."""
-        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
+        records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
         except KeyError as missing:
@@ -116,7 +116,7 @@ class Program:
         Large records are returned whole, as several passes share their hash.
         """
         found: list[Hashable] = []
-        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
+        records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             for name, select in self._used_members:
                 raw = uniforms.bytes_of(records[name])
@@ -137,7 +137,7 @@ class Program:
 
     def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
         """Create the bind group for bound resources, followed by the buffers of the uniform records."""
-        records: Records = resources  # type: ignore[assignment]  # no cast, which costs time
+        records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(
             self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes

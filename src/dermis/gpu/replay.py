@@ -105,7 +105,7 @@ class RecordingCache:
     ) -> tuple[Recording, T]:
         """Return the recording of `record(recorder, *args)` and its result, from the cache if possible."""
         known = self._recordings.setdefault(record, [])
-        found = next((one for one in known if one[1].is_valid and _matches(one[0], args)), None)
+        found = next((one for one in known if one[1].is_valid and _matches_copy(one[0], args)), None)
         if found is None:
             recording = Recording(device)
             result = record(recording, *args)
@@ -153,16 +153,16 @@ def _is_weak(copy: object) -> bool:
     )
 
 
-def _matches(copy: object, value: object) -> bool:
+def _matches_copy(copy: object, value: object) -> bool:
     """Return whether an argument equals the one from which `_weak_copy` made a copy."""
     if isinstance(copy, weakref.ref):
         return copy() is value
     if isinstance(copy, tuple):
-        return isinstance(value, tuple) and len(copy) == len(value) and all(map(_matches, copy, value))
+        return isinstance(value, tuple) and len(copy) == len(value) and all(map(_matches_copy, copy, value))
     if isinstance(copy, _WeakFields):
         kind: Any = type(value)
         if kind is not copy.kind:
             return False
         parts = (getattr(value, name) for name in field_names(kind) or ())
-        return all(map(_matches, copy.fields, parts))
+        return all(map(_matches_copy, copy.fields, parts))
     return are_equal(copy, value)

@@ -25,13 +25,13 @@ _DIRECTIVE = re.compile(
     r'^(?P<indent>\s*)//#(?:include "(?P<file>[\w./]+)"|include <(?P<files>\w+)>'
     r"|each (?P<list>\w+): (?P<text>.*)|fill (?P<filled>.*)|if (?P<option>\w+)|(?P<turn>else|end))\s*$"
 )
-_WORD = re.compile(r"\{(\w+)\}")
+_WORD_PATTERN = re.compile(r"\{(\w+)\}")
 _ERROR_LINE = re.compile(r"(?:wgsl|shader[^:\n]*|source):(\d+):(\d+)")
 
-Words = tuple[tuple[str, str], ...]
+WordReplacements = tuple[tuple[str, str], ...]
 
 
-class Member(NamedTuple):
+class ShaderListMember(NamedTuple):
     """Member of a list that `//#include <list>` and `//#each list` expand, such as one light type.
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
@@ -41,7 +41,7 @@ class Member(NamedTuple):
 
     name: str
     file: Path | None
-    words: Words = ()
+    words: WordReplacements = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,12 @@ class ShaderFolder(os.PathLike[str]):
 
     path : path of the folder
     lists : functions that return the members of each list, by list name; called whenever a shader is composed
-    numbers : function that returns constants shared by shaders and Python, by name; called at each composition
+    numbers : function that returns constants shared by shaders and Python, by name; called as `lists` are
     options : names for which `//#if` is true in the shaders of all folders
     """
 
     path: Path
-    lists: Mapping[str, Callable[[], Sequence[Member]]] = field(default_factory=dict)
+    lists: Mapping[str, Callable[[], Sequence[ShaderListMember]]] = field(default_factory=dict)
     numbers: Callable[[], Mapping[str, float]] = dict
     options: frozenset[str] = frozenset()
 
@@ -109,8 +109,8 @@ class _Definitions(NamedTuple):
     """Folders, lists, numbers and options to which directives refer, hashable as a cache key."""
 
     folders: tuple[Path, ...]
-    lists: tuple[tuple[str, tuple[Member, ...]], ...]
-    numbers: Words
+    lists: tuple[tuple[str, tuple[ShaderListMember, ...]], ...]
+    numbers: WordReplacements
     options: frozenset[str]
 
 
@@ -184,7 +184,7 @@ class _Composer:
                 return folder / name
         raise DermisError(f'{file.name}: expected to find the include "{name}", but no shader folder has it.')
 
-    def _members(self, name: str, file: Path) -> Sequence[Member]:
+    def _members(self, name: str, file: Path) -> Sequence[ShaderListMember]:
         if name not in self._lists:
             raise DermisError(
                 f"{file.name}: expected to find the list <{name}>, but no shader folder has it."
@@ -192,7 +192,7 @@ class _Composer:
         return self._lists[name]
 
 
-def _member_words(member: Member, number: int) -> dict[str, str]:
+def _member_words(member: ShaderListMember, number: int) -> dict[str, str]:
     name = member.name.replace("-", "_")
     return {"name": name, "NAME": name.upper(), "number": f"{number}u", **dict(member.words)}
 
@@ -203,4 +203,4 @@ def _substitute_words(text: str, words: Mapping[str, str], file: Path) -> str:
             raise DermisError(f"{file.name}: expected a word of {', '.join(words)}, but got {match[0]}.")
         return words[match[1]]
 
-    return _WORD.sub(replacement, text)
+    return _WORD_PATTERN.sub(replacement, text)

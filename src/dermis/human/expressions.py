@@ -11,7 +11,7 @@ from dermis.base.registry import Registry
 from dermis.human.makehuman import EXPRESSION_PREFIX, target_deltas
 
 Weights = Mapping[str, float]
-SIDES = "Left", "Right"
+TARGET_SIDES = "Left", "Right"
 EXPRESSIONS: Registry[Weights] = Registry(
     "expression", tomllib.loads(resources.files(__package__).joinpath("expressions.toml").read_text("utf-8"))
 )
@@ -36,7 +36,7 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 def expand_sides(name: str) -> tuple[str, ...]:
     """Return the left and the right target for a name without side, or the name itself if it has no sides."""
-    return tuple(f"{name}{side}" for side in SIDES) if f"{name}Left" in _arkit_names() else (name,)
+    return tuple(f"{name}{side}" for side in TARGET_SIDES) if f"{name}Left" in _arkit_names() else (name,)
 
 
 @cache

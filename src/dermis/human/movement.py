@@ -22,9 +22,9 @@ _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the posi
     "eye.L": ("l-eye", "l-eye", 0.0),
     "eye.R": ("r-eye", "r-eye", 0.0),
 }
-_PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
-_PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
-_PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
+_BONE_PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
+_BONE_PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
+_BONE_PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
 _SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = 28.0, 20.0, 22.0  # rotation of an eye at a weight of 1
 _GAZE_ANGLES = {
     "In": (0.0, -_SIDEWAYS_DEGREES, 0.0),
@@ -83,7 +83,7 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
     origins_mm = np.array(
         [(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BONE_ORIGINS[name] for name in names)]
     )
-    parent = np.array([names.index(_PARENTS[n]) if n in _PARENTS else -1 for n in names], np.int32)
+    parent = np.array([names.index(_BONE_PARENTS[n]) if n in _BONE_PARENTS else -1 for n in names], np.int32)
     local, bind = (np.tile(np.eye(4), (len(names), 1, 1)) for _ in range(2))
     local[:, :3, 3] = origins_mm - np.where(parent[:, None] >= 0, origins_mm[parent], 0.0)
     bind[:, :3, 3] = -origins_mm

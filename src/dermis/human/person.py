@@ -54,9 +54,9 @@ _SIDE_DEVIATION = 0.2  # difference between left and right, as a fraction of the
 _ASYMMETRY_DEVIATION = 0.1
 _HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MAX_SHAPE_WEIGHT = 0.3
-_ANCESTRY = "african", "asian", "caucasian"
+_ANCESTRIES = "african", "asian", "caucasian"
 _LOOK_FIELDS = "targets", "skin", "eyes", "hair"
-_RANGES = {
+_FIELD_RANGES = {
     "african": (0.0, 1.0),
     "asian": (0.0, 1.0),
     "caucasian": (0.0, 1.0),
@@ -93,7 +93,7 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
     }
-    fields |= dict(zip(_ANCESTRY, map(float, ancestry), strict=True)) | macro
+    fields |= dict(zip(_ANCESTRIES, map(float, ancestry), strict=True)) | macro
     african, asian, caucasian = ancestry
     demographics = Demographics(african, asian, caucasian, fields["sex"], fields["age"])
     skin, eyes = sample_skin(rng, demographics), sample_eyes(rng, demographics)
@@ -107,9 +107,9 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ancestry fractions (3,): the given weights divided by their sum, or the sampled fractions."""
-    if not any(name in given for name in _ANCESTRY):
+    if not any(name in given for name in _ANCESTRIES):
         return sampled
-    weights = np.array([given.get(name, 0.0) for name in _ANCESTRY])
+    weights = np.array([given.get(name, 0.0) for name in _ANCESTRIES])
     if not weights.sum() > 0:
         refuse("ancestry", "a weight of african, asian or caucasian above 0", "all given are 0", "Raise one")
     return np.asarray(weights / weights.sum())
@@ -252,7 +252,7 @@ class Human:
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
-        check_fields(self, _RANGES)
+        check_fields(self, _FIELD_RANGES)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a weight of african, asian or caucasian above 0", "all are 0", "Raise one")
         if not isinstance(self.targets, Mapping):
@@ -294,8 +294,8 @@ class Human:
         >>> dermis.Human.drawn(7, age=70).age
         70.0
         """
-        for name in given.keys() & _RANGES.keys():
-            checked_number(name, given[name], *_RANGES[name])
+        for name in given.keys() & _FIELD_RANGES.keys():
+            checked_number(name, given[name], *_FIELD_RANGES[name])
         return cls(**sample_fields(seed, given))
 
     def head(
@@ -418,7 +418,7 @@ class Human:
         total = self.african + self.asian + self.caucasian
         return {
             f"macrodetails/{people}-{kind}": getattr(self, people) / total * fraction
-            for people in _ANCESTRY
+            for people in _ANCESTRIES
             for kind, fraction in self._adult_fractions().items()
         }
 

@@ -55,14 +55,18 @@ def read_person(path: Path) -> Human:
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
     parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
-    looks = {name: _build(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
-    human = _build(path, Human, person | looks)
+    looks = {
+        name: _build_dataclass(path, kind, person[name])
+        for name, kind in parts
+        if person.get(name) is not None
+    }
+    human = _build_dataclass(path, Human, person | looks)
     with error_context(path):
         check_targets(human.targets)
     return human
 
 
-def _build(path: Path, kind: type[T], numbers: Any) -> T:
+def _build_dataclass(path: Path, kind: type[T], numbers: Any) -> T:
     """Return an instance of a dataclass, such as `Human` or `SkinLook`, from its fields in a file."""
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):

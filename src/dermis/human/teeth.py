@@ -16,7 +16,7 @@ ARCH_MM, CROWN_MM = 160.0, 40.0
 """Lengths of a unit of u and of v [mm]."""
 MIDDLE, BITE = 0.5, 0.02
 """u between the first teeth, and v of the biting edge."""
-_SAMPLES = 2000
+_ARCH_SAMPLES = 2000
 
 
 @cache
@@ -39,6 +39,6 @@ def _arc_length(angle: Doubles, across: float, deep: float) -> Doubles:
     angle : (n,) parameter of the ellipse [rad]
     across, deep : half axes of the ellipse, sideways and backwards [mm]
     """
-    t = np.linspace(0.0, np.pi / 2, _SAMPLES)
+    t = np.linspace(0.0, np.pi / 2, _ARCH_SAMPLES)
     step = np.hypot(across * np.cos(t), deep * np.sin(t)) * (t[1] - t[0])
     return np.asarray(np.sign(angle) * np.interp(np.abs(angle), t, np.cumsum(step) - step[0]))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
-_HOMES = {
+_NAMES_BY_MODULE = {
     "camera": ("Camera", "portrait", "side", "three_quarter"),
     "environment": ("Environment",),
     "files": ("load_camera", "load_lights", "load_scene"),
@@ -44,7 +44,7 @@ def __getattr__(name: str) -> Any:
     """Return a public object, whose module is imported on first use to keep the command line's help fast."""
     if new := successor(__name__, name):
         return __getattr__(new)
-    home = next((home for home, names in _HOMES.items() if name in names), "lights")
+    home = next((home for home, names in _NAMES_BY_MODULE.items() if name in names), "lights")
     module = import_module(f"{__name__}.{home}")
     if name.startswith("_") or not hasattr(module, name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

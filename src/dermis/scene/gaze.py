@@ -23,7 +23,7 @@ Doubles = NDArray[np.float64]
 MAX_GAZE_WEIGHT = 1.3
 """Largest weight of a gaze target."""
 _MAX_BONE_DEGREES = 36.0
-_ITERATIONS = 6
+_ROTATION_ITERATIONS = 6
 _SIDES = "Left", "Right"
 _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
 
@@ -78,7 +78,7 @@ def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
 def _rotation_angles(direction: Doubles, axis: Doubles) -> tuple[float, float]:
     """Return the angles about x and y of a rotation from the unit vector `axis` to `direction` [rad]."""
     x, y = 0.0, 0.0
-    for _ in range(_ITERATIONS):
+    for _ in range(_ROTATION_ITERATIONS):
         current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
         x += _pitch(direction) - _pitch(current)
         y += math.remainder(_yaw(direction) - _yaw(current), math.tau)

@@ -21,7 +21,7 @@ from dermis.base.tables import read_rows
 from dermis.formats.samples import SAMPLES
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import read_landmark_table
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.model import CREDIT
 from dermis.scene.outputs import OUTPUTS
 
@@ -178,7 +178,7 @@ def label_names(spec: Spec) -> dict[str, dict[int, str]]:
 
 def landmark_names(name: str, spec: Spec) -> list[str]:
     """Return the ordered names of the landmarks of a preset set or of a landmark table of the spec."""
-    if name in SETS:
+    if name in LANDMARK_SETS:
         return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[name])]
 

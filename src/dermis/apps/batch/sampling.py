@@ -19,7 +19,7 @@ from dermis.apps.batch.spec_tables import (
     table_values,
 )
 from dermis.base.tables import read_rows
-from dermis.human.expressions import SIDES, Weights, expand_sides, expand_targets
+from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand_targets
 
 Parameters = dict[str, float | int | str]
 _JAW = "jawOpen"
@@ -143,7 +143,7 @@ def _is_one_sided(name: str) -> bool:
 
     Targets such as mouthLeft and jawRight move the middle of the face sideways.
     """
-    return name.endswith(SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
+    return name.endswith(TARGET_SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from dermis.base.errors import error_context, format_value, refuse
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
 from dermis.human.expressions import EXPRESSIONS, expand_targets
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.outputs import check_outputs
@@ -119,7 +119,7 @@ class Spec(FrozenModel):
     @property
     def landmark_tables(self) -> Mapping[str, str]:
         """Return each landmark set by name: the name of a preset set, or the path of a landmark table."""
-        return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
+        return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
     def pose_targets(self) -> frozenset[str]:
@@ -192,7 +192,7 @@ def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
     spec = _build_model(Spec, "", fields | {"folder": folder})
-    names = [name for name in spec.landmarks if name not in SETS]
+    names = [name for name in spec.landmarks if name not in LANDMARK_SETS]
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
         names += map(str, spec.distributions[parameter].support)
     hashes = _file_hashes(names, folder)

@@ -15,7 +15,7 @@ from dermis.formats.samples import SAMPLES
 from dermis.human.expressions import Weights
 from dermis.human.hair.look import HairLook
 from dermis.human.landmarks.points import read_landmark_table
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.makehuman import human_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
@@ -57,10 +57,12 @@ def check_spec(
 def check_landmarks(names: Sequence[str], folder: Path) -> None:
     """Refuse names that are neither a preset landmark set nor a readable landmark table."""
     for name in names:
-        if name in SETS:
+        if name in LANDMARK_SETS:
             continue
         if not name.endswith(".csv") or not is_file(folder / name):
-            expected = f"any of {', '.join(SETS)}, or tables of name,vertex (.csv) in the spec's folder"
+            expected = (
+                f"any of {', '.join(LANDMARK_SETS)}, or tables of name,vertex (.csv) in the spec's folder"
+            )
             refuse("landmarks", expected, f"got {shorten(name, _MAX_NAME_LENGTH)!r}", "Correct it")
         read_landmark_table(str(folder / name))
 

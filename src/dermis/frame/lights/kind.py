@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dermis.base.registry import Registry
 from dermis.frame.projection import Triple, vector_between, view_axes
-from dermis.gpu.wgsl_source import Member
+from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
 
@@ -152,9 +152,11 @@ def override_name(name: str) -> str:
     return f"{name.replace('-', '_').upper()}_LIGHT"
 
 
-def light_shaders() -> list[Member]:
+def light_shaders() -> list[ShaderListMember]:
     """Return the shaders of all kinds of lights, which lights.wgsl includes and numbers in this order."""
     return [
-        Member(name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower())))
+        ShaderListMember(
+            name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower()))
+        )
         for name, kind in KINDS.items()
     ]

@@ -15,7 +15,7 @@ from dermis.human.hair.skin_surface import tangent_component
 
 _CELL_MM = 2.5
 _GRID_LOW, _GRID_HIGH = (1.0, -2.0), (64.0, 40.0)  # grid around the left brow and the tips of its hairs [mm]
-KNOTS = 9
+KNOTS_PER_HAIR = 9
 _MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
@@ -163,7 +163,7 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
     return np.stack([angle, bend, length, rise, radius])
 
 
-def grow(
+def grow_brow_hairs(
     skin: BrowSurface, root_mm: Doubles, side: Doubles, front_mm: Doubles, shape: Doubles
 ) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of brow hairs traced over the skin [mm].
@@ -174,15 +174,15 @@ def grow(
     shape : (5, n) shape parameters from `sample_shapes`
     """
     (x, y), (first_angle, bend, length, rise, radius) = front_mm, shape
-    t = np.linspace(0.0, 1.0, KNOTS)
+    t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
     skin_points = skin.sample(side, x, y)
     root_offset = tangent_component(root_mm - skin_points.position_mm, skin_points.normal)
     base_points, normals = [skin_points.position_mm + root_offset], [skin_points.normal]
-    for k in range(2, KNOTS, 2):  # odd knots are interpolated, with an error of at most 0.16 mm
+    for k in range(2, KNOTS_PER_HAIR, 2):  # odd knots are interpolated, with an error of at most 0.16 mm
         angle = first_angle + bend * (t[k - 1] + t[k]) / 2
         direction = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
-        across, up = skin_points.step(direction, 2 * length / (KNOTS - 1))
+        across, up = skin_points.step(direction, 2 * length / (KNOTS_PER_HAIR - 1))
         x, y = x + across, y + up
         skin_points = skin.sample(side, x, y)
         base = skin_points.position_mm + root_offset

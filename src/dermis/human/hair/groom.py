@@ -16,7 +16,7 @@ from dermis.human.hair.brows import BrowSurface
 from dermis.human.hair.density import skin_vertices_near_hair
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.root_finder import SIDES, RootFinder, eye_centres
+from dermis.human.hair.root_finder import SIDE_SIGNS, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, Strands, to_frames
@@ -46,7 +46,7 @@ def add_hair(
     """
     skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
     surface = GrowthSurface(head, control_head.mesh, skin, hairs)
-    rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
+    rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
     left, right = _grow_brows(surface, root_finder, look, rngs)
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
@@ -72,7 +72,7 @@ def _grow_brows(
 ) -> Iterator[HairGroup]:
     """Yield the hairs of the left and then of the right brow, which are computed in one batch for speed."""
     roots, parameters = [], []
-    for side, rng in zip(SIDES, rngs, strict=True):
+    for side, rng in zip(SIDE_SIGNS, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)
         found, hit = root_finder.front_roots(side * x, y)
         index = np.flatnonzero(hit)[: brows.hair_count(look)]
@@ -82,7 +82,7 @@ def _grow_brows(
     frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
     brow_surface = BrowSurface(*surface.skin.project(grid_mm))
-    knots, radius = brows.grow(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
+    knots, radius = brows.grow_brow_hairs(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
     yield from _split_group(_hair_group(frames, knots, radius, 1.0), [len(part.quad) for part in roots])
 
 
@@ -94,7 +94,7 @@ def _grow_lashes(
     eyes : (2, 3) centres of the left and the right eye [mm]
     """
     roots, parameters, clumps = [], [], 0
-    for side, eye, rng in zip(SIDES, eyes, rngs, strict=True):
+    for side, eye, rng in zip(SIDE_SIGNS, eyes, rngs, strict=True):
         for row in (lashes.UPPER_LASHES, lashes.LOWER_LASHES):
             u, across = lashes.sample_positions(row, rng)
             roots.append(root_finder.lid_edge_roots(row, side, u, across))
@@ -102,7 +102,7 @@ def _grow_lashes(
             parameters.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
             clumps += len(u) + 1
     frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
-    knots, radius = lashes.grow(frames.positions_mm, hair[1:4].T, hair[0], hair[4:])
+    knots, radius = lashes.grow_lashes(frames.positions_mm, hair[1:4].T, hair[0], hair[4:])
     group = _hair_group(frames, knots, radius, _LASH_PIGMENT_FACTOR)
     yield from _split_group(group, [len(part.quad) for part in roots])
 

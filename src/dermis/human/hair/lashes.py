@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
-from dermis.human.hair.brows import KNOTS
+from dermis.human.hair.brows import KNOTS_PER_HAIR
 
-_ALONG = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
+_LENGTH_POSITIONS = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
 class LashRow(NamedTuple):
@@ -19,7 +19,7 @@ class LashRow(NamedTuple):
     edge_points : control points along the edge of the left lid, from the nose outwards
     hairs : number of lashes
     start, end : ends of the row, as fractions of the arc length of the edge
-    length : (7,) lengths of lashes at the fractions `_ALONG` of the row, interpolated between them [mm]
+    length : (7,) lengths of lashes at the positions `_LENGTH_POSITIONS` along the row [mm]
     rise : elevation of lashes above the forward direction at root and tip, negative downwards [rad]
     splay : sideways inclination of lashes at the inner and the outer end of the row [-]
     radius : radius of the lashes at the root [mm]
@@ -81,7 +81,7 @@ def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clum
     splay = np.interp(fraction, [0, 1], row.splay) + rng.normal(0, 0.1, n)
     first = row.rise[0] + rng.normal(0, 0.12, n)
     last = row.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(fraction, _ALONG, row.length) * rng.uniform(0.7, 1.08, n)
+    length = np.interp(fraction, _LENGTH_POSITIONS, row.length) * rng.uniform(0.7, 1.08, n)
     clump = np.empty(n)  # neighbours that stick together
     clump[np.argsort(u)] = first_clump + np.cumsum(rng.random(n) < 0.4)
     pull = rng.uniform(0.2, 0.7, n)
@@ -89,7 +89,7 @@ def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clum
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 
-def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
+def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
     root_mm, eye_mm : (n, 3) roots on the lids, and for each lash the centre of its eye [mm]
@@ -102,12 +102,12 @@ def grow(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tu
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     up = np.array([0.0, 1.0, 0.0])
     out = np.cross(up, ahead) * side[:, None]
-    t = np.linspace(0.0, 1.0, KNOTS)
-    angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS - 1)) ** 0.8)[:, None]
+    t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
+    angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS_PER_HAIR - 1)) ** 0.8)[:, None]
     directions = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
     directions += (splay * (0.4 + 0.6 * t[1:, None]))[..., None] * out
     directions /= np.sqrt((directions**2).sum(axis=-1, keepdims=True))
-    steps = (length / (KNOTS - 1))[:, None] * directions
+    steps = (length / (KNOTS_PER_HAIR - 1))[:, None] * directions
     knots = np.cumsum(np.concatenate([[root_mm - 0.25 * ahead], steps]), axis=0).swapaxes(0, 1)
     clumped = _clump_tips(knots, clump.astype(np.int64), pull, t)
     return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)

@@ -14,7 +14,7 @@ from dermis.human.skin.look import Demographics
 
 Style = Literal["none", "cropped", "short"]
 STYLES: tuple[Style, ...] = get_args(Style)
-RANGES = {
+FIELD_RANGES = {
     "length_mm": (1.0, 60.0),
     "beard_mm": (0.0, 30.0),
     "eumelanin": (0.0, 10.0),
@@ -86,7 +86,9 @@ class HairLook:
         """Raise DermisError for an unknown style and for fields out of range."""
         if self.style not in STYLES:
             refuse("style", f"one of {', '.join(STYLES)}", f"got {format_value(self.style)}", "Choose one")
-        check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})
+        check_fields(
+            self, {field.name: FIELD_RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]}
+        )
 
 
 def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: float) -> HairLook:

@@ -16,7 +16,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners
 
 Index = NDArray[np.int64]
-SIDES = 1.0, -1.0
+SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
 _MIN_WEIGHT = -1e-9  # tolerance of barycentric weights
@@ -109,7 +109,9 @@ class RootFinder:
     def brow_grid_roots(self) -> Roots:
         """Return roots at the nodes of `grid_points`, first of the left and then of the right brow."""
         x, y = grid_points()
-        return self.front_roots(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
+        return self.front_roots(
+            np.concatenate([side * x for side in SIDE_SIGNS]), np.tile(y, len(SIDE_SIGNS))
+        )[0]
 
     def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
         """Return lash roots along a lid's edge, on the adjacent quads of the outer side of the lid.

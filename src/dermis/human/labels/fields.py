@@ -45,8 +45,8 @@ SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
 _OUTSIDE_MM = -1.0
 _MIN_BROW_Z = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height above the hairline that separates hair of the head from the beard
-_LEVELS = 2
-SIDES = "right", "left"
+_DENSE_LEVELS = 2
+SIDE_NAMES = "right", "left"
 _PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
 _CACHE_SIZE = 3
 _LOCK = Lock()
@@ -82,7 +82,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
     The fields are the signed distances of `label_fields`, interpolated on a subdivided mesh.
     """
-    head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
+    head = AVERAGE_HUMAN.head(subdivide=_DENSE_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
     fields = head.control.stencils.points(label_fields().T.copy())[skin].T
@@ -148,7 +148,7 @@ def _brow_field(points: Doubles) -> Doubles:
     return np.where(points[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_MM)
 
 
-_CACHE: dict[bytes, MeshLabels] = {}
+_LABEL_CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
@@ -172,16 +172,18 @@ def mesh_labels(head: Head) -> MeshLabels:
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
     key = digest + bytes([head.strands is not None])
     with _LOCK:
-        if key not in _CACHE:
-            while len(_CACHE) >= _CACHE_SIZE:
-                _CACHE.pop(next(iter(_CACHE)))
-            _CACHE[key] = _build_labels(head)
-        return _CACHE[key]
+        if key not in _LABEL_CACHE:
+            while len(_LABEL_CACHE) >= _CACHE_SIZE:
+                _LABEL_CACHE.pop(next(iter(_LABEL_CACHE)))
+            _LABEL_CACHE[key] = _build_labels(head)
+        return _LABEL_CACHE[key]
 
 
 def _build_labels(head: Head) -> MeshLabels:
     material_classes = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
-    for material, side in zip(() if head.eyes is None else head.eyes.material, reversed(SIDES), strict=False):
+    for material, side in zip(
+        () if head.eyes is None else head.eyes.material, reversed(SIDE_NAMES), strict=False
+    ):
         material_classes[material] = class_number(f"{side}_eye")
     fields = _iris_fields(head.template or head) | _skin_fields(head)
     none = np.zeros((int(head.mesh.point.max()) + 1, 0))
@@ -207,7 +209,7 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     mesh, points = head.mesh, head.mesh.points_mm
     fields = {}
     frames = head.eyes.frames(head.control, head.control.rest)
-    for frame, material, side in zip(frames, head.eyes.material, reversed(SIDES), strict=False):
+    for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
         inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_MM)

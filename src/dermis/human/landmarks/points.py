@@ -14,7 +14,7 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, parsing, read_text
 from dermis.base.tables import Rows, parse_rows, read_rows
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.regions.average import average_head, is_human
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
@@ -42,12 +42,12 @@ class LandmarkPoints:
 def landmark_points(head: Head, name: str) -> LandmarkPoints:
     """Return the landmarks of a head, from a published set or from a table of vertices.
 
-    name : one of `SETS`, or a CSV file with columns name,vertex, where vertex is an index into
+    name : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index into
         `Head.positions_mm`
 
     Raises DermisError for a published set on a head of another topology, and for tables that cannot be read.
     """
-    if name not in SETS:
+    if name not in LANDMARK_SETS:
         return _table_landmarks(head, name)
     if not is_human(head):
         actual = f"{head.name!r} has a topology of its own"
@@ -62,8 +62,8 @@ def check_landmarks(name: object) -> str:
     Raises DermisError if it is neither.
     """
     text = str(checked_path(name, "a set of landmarks or its table"))
-    if text not in SETS and not text.endswith(".csv"):
-        expected = f"{', '.join(SETS)} or a CSV table"
+    if text not in LANDMARK_SETS and not text.endswith(".csv"):
+        expected = f"{', '.join(LANDMARK_SETS)} or a CSV table"
         refuse("landmarks", expected, f"got {format_value(text)}", "Correct the name")
     return text
 

@@ -1,6 +1,6 @@
 """Names and descriptions of the published landmark sets that the parametric human has."""
 
-SETS = {
+LANDMARK_SETS = {
     "ibug-68": "the 68 of iBUG's 300-W",
     "face-synthetics-70": "those of ibug-68 and both pupils, as in FaceSynthetics",
     "mediapipe": "142 of MediaPipe's 478: outlines, the middle of the nose, both irises",

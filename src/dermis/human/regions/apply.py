@@ -14,13 +14,19 @@ from dermis.base.disk import Array, Arrays, cached_arrays
 from dermis.base.errors import DermisError
 from dermis.base.progress import logged_step
 from dermis.human.regions.labels import known_landmarks, label_texels
-from dermis.human.regions.region_table import DEFAULT_TABLE, LIMITS, Doubles, RegionTable, load_region_table
+from dermis.human.regions.region_table import (
+    DEFAULT_TABLE,
+    VALUE_LIMITS,
+    Doubles,
+    RegionTable,
+    load_region_table,
+)
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
 Floats = NDArray[np.float32]
 
-SIZE = 1024
+MIN_MAP_SIDE = 1024
 """Minimum side of the maps [texel]; larger maps of the head keep their size."""
 EDGE_MM = 2.5
 """Standard deviation of the blur of borders between regions [mm]."""
@@ -28,7 +34,7 @@ _DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest fro
 _MIN_LOCAL_MEAN, _MAX_DETAIL = 0.4, 3.0  # relative to the mean of the map, and to its local mean
 _CELL_MM = 2.0
 _MAX_CELLS = 256  # along the longest side of the grid
-_TRUNCATE = 3  # radius of the blur kernel in standard deviations
+_BLUR_TRUNCATION = 3  # radius of the blur kernel in standard deviations
 _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for the same head
 
 
@@ -70,17 +76,17 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
     """
     if not isinstance(table, RegionTable):
         table = load_region_table(table)
-    atlas = build_atlas(head.mesh, SIZE)
+    atlas = build_atlas(head.mesh, MIN_MAP_SIDE)
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
     smoothed = gaussian_mean(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
     own_maps = (head.maps.roughness, head.maps.specular)
     roughness, specular = (
         np.clip(_region_map(atlas, points, smoothed[:, k], own_maps[k]), *limits)
-        for k, limits in enumerate(LIMITS.values())
+        for k, limits in enumerate(VALUE_LIMITS.values())
     )
     y, x = np.nonzero(atlas.coverage)
     height, width = specular.shape
-    mean = float(specular[y * height // SIZE, x * width // SIZE].mean())
+    mean = float(specular[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].mean())
     return replace(head, maps=replace(head.maps, roughness=roughness, specular=specular)), mean
 
 
@@ -97,15 +103,15 @@ def _region_map(
         return _texel_image(atlas, level)
     y, x = np.nonzero(atlas.coverage)
     height, width = own_maps.shape
-    values = own_maps[y * height // SIZE, x * width // SIZE].astype(np.float64)
+    values = own_maps[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
     local_mean = gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0]
     local_mean = np.maximum(local_mean, _MIN_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
-    shape = max(height, SIZE), max(width, SIZE)
+    shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
-        _resized(own_maps, shape) / _resized(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
+        _resize_map(own_maps, shape) / _resize_map(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
     )
-    return np.asarray(detail * _resized(_texel_image(atlas, level), shape))
+    return np.asarray(detail * _resize_map(_texel_image(atlas, level), shape))
 
 
 def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
@@ -118,7 +124,7 @@ def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
     return np.asarray(image[y, x])
 
 
-def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
+def _resize_map(picture: Floats, shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
     if picture.shape == shape:
@@ -145,7 +151,7 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
 
     def blur(quantity: Doubles) -> Doubles:
         grid = np.divide(quantity, count, out=np.zeros(len(count)), where=count > 0).reshape(shape)
-        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_TRUNCATE)
+        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_BLUR_TRUNCATION)
         return np.asarray(map_coordinates(smooth, position.T, order=1))
 
     weight = blur(count.astype(np.float64))
@@ -171,7 +177,7 @@ def with_default_regions(head: Head) -> Head:
         return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
 
     try:
-        arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {SIZE} {head.name}", missing, make)
+        arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make)
     except DermisError:  # another head with a known name
         return head
     return replace(head, maps=replace(head.maps, **arrays))

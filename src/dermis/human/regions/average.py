@@ -16,7 +16,7 @@ from dermis.human.regions.region_table import Doubles, classify_regions
 from dermis.mesh.head import Head
 
 AVERAGE_HUMAN = Human(sex=0.5, age=35.0)
-_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
+_DENSE_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
 _EYE_LANDMARKS = ("left eye", "right eye")  # names of landmarks and of the materials whose centres they are
 _MOUTH_MATERIALS = ("upper teeth", "lower teeth", "tongue")
 
@@ -47,7 +47,7 @@ def average_skin() -> DenseSkin:
     """Return dense samples of the average human's outer skin, without the inside of the mouth."""
     from scipy.spatial import cKDTree
 
-    head = AVERAGE_HUMAN.head(subdivide=_LEVELS)
+    head = AVERAGE_HUMAN.head(subdivide=_DENSE_LEVELS)
     mesh = head.mesh
     quad_index = control_quads(head, np.arange(len(mesh.triangles)))
     is_outer = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])

@@ -47,7 +47,7 @@ _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
 _MIN_NOSE_Z, _JAW_Y = -20.0, -108.0
 DEFAULT_TABLE = "default"
 """Name of the package's table, which has artist's values."""
-LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
+VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
 _FILE_KEYS = ("landmarks", "labels")
 
 
@@ -141,9 +141,9 @@ def _build_table(entries: dict[str, Any], path: Path) -> RegionTable:
 
 def _region_values(path: Path, region: str, entry: Any) -> list[float]:
     label = f"{path}: {region}"
-    if not isinstance(entry, dict) or entry.keys() != LIMITS.keys():
+    if not isinstance(entry, dict) or entry.keys() != VALUE_LIMITS.keys():
         refuse(label, "m and rho_s", f"got {format_value(entry)}", "Give both, and nothing else")
-    return [checked_number(f"{label}: {name}", entry[name], *limits) for name, limits in LIMITS.items()]
+    return [checked_number(f"{label}: {name}", entry[name], *limits) for name, limits in VALUE_LIMITS.items()]
 
 
 def _file_path(path: Path, key: str, name: Any) -> Path:

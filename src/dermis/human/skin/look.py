@@ -13,7 +13,7 @@ from dermis.human.makehuman import OLD, YOUNG
 from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
-RANGES = {"seed": (0, 2**32 - 1)}
+FIELD_RANGES = {"seed": (0, 2**32 - 1)}
 """Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
 _TYPICAL_MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
@@ -98,7 +98,7 @@ class SkinLook:
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
-        check_fields(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
+        check_fields(self, {field.name: FIELD_RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})
 
 
 class Demographics(NamedTuple):

@@ -57,7 +57,7 @@ def _load_array(name: str) -> Floats:
         return np.asarray(vertices_mm[name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
 
 
-_CACHE: dict[bytes, PaintedSurface] = {}
+_SURFACE_CACHE: dict[bytes, PaintedSurface] = {}
 _CACHE_SIZE = 3
 _LOCK = Lock()
 
@@ -87,11 +87,11 @@ def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
     """
     key = mesh.topology_key
     with _LOCK:
-        if key not in _CACHE:
-            while len(_CACHE) >= _CACHE_SIZE:
-                _CACHE.pop(next(iter(_CACHE)))
-            _CACHE[key] = _build_surface(mesh, stencils)
-        return _CACHE[key]
+        if key not in _SURFACE_CACHE:
+            while len(_SURFACE_CACHE) >= _CACHE_SIZE:
+                _SURFACE_CACHE.pop(next(iter(_SURFACE_CACHE)))
+            _SURFACE_CACHE[key] = _build_surface(mesh, stencils)
+        return _SURFACE_CACHE[key]
 
 
 def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:

@@ -1,4 +1,4 @@
-"""Camera, focal length and identity from landmarks in a photograph, by least squares."""
+"""Camera and identity of a head from landmarks in a photograph, by least squares."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.base.errors import refuse
 from dermis.base.reading import parse_json, parsing, read_text
 from dermis.base.tables import parse_rows
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
-from dermis.human.landmarks.sets import SETS
+from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.makehuman import OLD, YOUNG, human_targets
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -39,10 +39,13 @@ _FRAME_MM = 300.0
 
 
 def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[int, int]) -> FitSubject:
-    """Return the subject with the camera and identity that project its landmarks into the photograph.
+    """Return the subject with the camera, and for a human the identity, that project landmarks onto a photo.
 
-    For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors at the
-    given person. Other heads keep their shape and need a table of their own landmarks.
+    For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors centred
+    on the given person. Other heads keep their shape and need a file with landmarks of the head.
+
+    landmarks : file with landmarks in the photograph
+    size : width and height of the photograph [pixel]
 
     Raises DermisError for files without landmarks, and for heads without landmarks.
     """
@@ -66,11 +69,14 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
 
 @dataclass(frozen=True, eq=False)
 class _LandmarkModel:
-    """Positions of landmarks on a head, and their derivatives by its identity.
+    """Linear model of landmark positions on a head, as a function of the identity of a person.
 
-    positions : (n, 3) relative to the head's centre [mm]
-    derivatives : (u, n, 3) by the unknowns of the identity in units of the priors
-    prior : person at the mean of the priors
+    names : names of the n landmarks
+    positions : (n, 3) positions at the mean of the priors, relative to the head's centre [mm]
+    derivatives : (u, n, 3) derivatives of the positions by the u unknowns, in standard deviations of their
+        priors [mm]
+    prior : person at the mean of the priors, None for heads of fixed shape
+    details : names of the MakeHuman targets that are unknowns
     """
 
     names: tuple[str, ...]
@@ -83,7 +89,11 @@ class _LandmarkModel:
     def for_head(
         cls, person: Human | None, head: Head, name: str, pixels_by_name: dict[str, Floats]
     ) -> _LandmarkModel:
-        """Return the model of a person, or of a head without unknowns."""
+        """Return the model of a person, or of a head of fixed shape, for the landmarks in a photograph.
+
+        name : name of the landmark set
+        pixels_by_name : pixel (2,) of each landmark
+        """
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
         points = landmark_points(plain, name)
         indices = np.array([k for k, one in enumerate(points.names) if one in pixels_by_name])
@@ -104,11 +114,15 @@ class _LandmarkModel:
 
     @property
     def count(self) -> int:
-        """Return the number of unknowns of the identity."""
+        """Return the number u of unknowns of the identity, 0 for heads of fixed shape."""
         return len(self.derivatives)
 
     def person(self, identity: Floats) -> Human:
-        """Return the given person changed by the identity, in units of the priors."""
+        """Return the person with a given identity.
+
+        identity : (u,) differences of the unknowns from the prior's person, in standard deviations of their
+            priors
+        """
         assert self.prior is not None
         macro: dict[str, Any] = {
             name: float(np.clip(getattr(self.prior, name) + _prior_sd(name) * step, *_limits(name)))
@@ -121,7 +135,10 @@ class _LandmarkModel:
 
 
 def _derivative(model: _LandmarkModel, positions_of: Callable[[Human], Floats], k: int) -> Floats:
-    """Return the derivative (n, 3) by one unknown of the identity, in the direction away from its limit."""
+    """Return the derivative (n, 3) of landmark positions by the k-th unknown of the identity.
+
+    The finite difference is taken away from the limit of the unknown, if the prior is at it.
+    """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
         identity = np.zeros(len(_MACRO_NAMES) + len(model.details))
         identity[k] = step
@@ -132,7 +149,10 @@ def _derivative(model: _LandmarkModel, positions_of: Callable[[Human], Floats], 
 
 
 def _log_focal(size: tuple[int, int]) -> float:
-    """Return the logarithm of a portrait's focal length [pixel], the mean of its prior."""
+    """Return the logarithm of the focal length of a usual portrait [pixel], the mean of the prior.
+
+    size : width and height of the photograph [pixel]
+    """
     return float(np.log(size[1] * _DISTANCE_MM / _FRAME_MM))
 
 
@@ -149,7 +169,12 @@ def _interpolate(points: LandmarkPoints, indices: NDArray[np.int64], positions: 
 
 
 def _solve(model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
-    """Return rotation, translation, logarithm of the focal length and identity by least squares."""
+    """Fit camera and identity to landmarks; return rotation, translation, log focal length and identity.
+
+    pixels : (n, 2) landmarks in the photograph
+    size : width and height of the photograph [pixel]
+    start : (7 + u,) unknowns to start from, in the order of the result
+    """
     from scipy.optimize import least_squares
 
     prior_median = _log_focal(size)
@@ -164,7 +189,10 @@ def _solve(model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: 
 
 
 def _project(x: Floats, positions: Floats, size: tuple[int, int]) -> Floats:
-    """Return the pixels (n, 2) of positions."""
+    """Project positions (n, 3) into the photograph; return pixels (n, 2).
+
+    x : (7 + u,) unknowns in the order of `_solve`, of which the camera's seven are used
+    """
     from scipy.spatial.transform import Rotation
 
     camera_space = positions @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
@@ -186,13 +214,14 @@ _MIN_LANDMARKS = 6
 
 
 def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Return the name of the landmark set, and the pixel (2,) of each landmark.
+    """Read landmarks in a photograph; return the name of the landmark set, and each landmark's pixel (2,).
 
-    The centre of the first pixel is 0.
+    Pixel coordinates are 0 at the centre of the first pixel.
 
-    size : width and height of the photograph, for MediaPipe's relative coordinates [pixel]
+    size : width and height of the photograph, by which MediaPipe's relative coordinates are multiplied
+        [pixel]
 
-    Raises DermisError for files without landmarks, and for unknown sets.
+    Raises DermisError for files without landmarks, and for unknown landmark sets.
     """
     text = read_text(path, _EXPECTED)
     if Path(path).suffix.lower() == ".json":
@@ -204,14 +233,14 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
         name = _BY_COUNT.get(len(pixels), "")
     if len(pixels) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in pixels.values()):
         refuse(path, f"at least {_MIN_LANDMARKS} landmarks", f"got {len(pixels)}", "Correct the file")
-    if name not in SETS:
+    if name not in LANDMARK_SETS:
         expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
         refuse(path, expected, f"got {len(pixels)}", "Give all landmarks of a set")
     return name, pixels
 
 
 def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Return the landmarks of `dermis render --landmarks`, or MediaPipe's in relative coordinates."""
+    """Return set name and pixels from JSON written by `dermis render --landmarks` or by MediaPipe."""
     with parsing(path, _EXPECTED, KeyError, TypeError, IndexError):
         if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
             name, rows = next(iter(data["landmarks"].items()))

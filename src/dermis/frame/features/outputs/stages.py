@@ -17,7 +17,7 @@ from dermis.frame.features.shape import shape
 from dermis.frame.features.visibility.layers import draw_layers
 from dermis.frame.projection import PIXEL_CENTRE, Views
 from dermis.gpu import Bindings, Graph
-from dermis.gpu.wgsl_source import Member
+from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.scene.outputs import OUTPUTS, Output
 
 DrawStage = Callable[[Graph, Planes, Resources, StageInputs], None]
@@ -113,14 +113,18 @@ DRAW_STAGES: Registry[DrawStage] = Registry(
 """Stages by the names of their shaders, features/outputs/STAGE.wgsl."""
 
 
-def shader_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
+def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
     """Return the outputs of each stage, which `//#each` lines of features/outputs/STAGE.wgsl expand."""
     stages = {one.stage for one in OUTPUTS.values()}
     return {f"{stage}_outputs": partial(_stage_members, stage) for stage in sorted(stages)}
 
 
-def _stage_members(stage: str) -> list[Member]:
-    return [Member(one.name, one.shader, _wgsl_type(one)) for one in OUTPUTS.values() if one.stage == stage]
+def _stage_members(stage: str) -> list[ShaderListMember]:
+    return [
+        ShaderListMember(one.name, one.shader, _wgsl_type(one))
+        for one in OUTPUTS.values()
+        if one.stage == stage
+    ]
 
 
 def _wgsl_type(output: Output) -> tuple[tuple[str, str], ...]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.gpu.shader_types import struct_dtype
-from dermis.gpu.wgsl_source import Member
+from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human import teeth
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
@@ -29,9 +29,9 @@ _NO_BAND = -1.0
 _MAX_OFFSET_MM = 3.0  # limit, as the surface is flat only near a texel
 
 
-def lobe_shaders() -> list[Member]:
+def lobe_shaders() -> list[ShaderListMember]:
     """Return the shaders of the specular lobes, which lobe.wgsl includes and numbers in this order."""
-    return [Member(name, model.shader) for name, model in MODELS.items()]
+    return [ShaderListMember(name, model.shader) for name, model in MODELS.items()]
 
 
 def lobe_constants() -> dict[str, float]:

@@ -33,7 +33,7 @@ from dermis.gpu import (
 from dermis.gpu.program import shader_source
 from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
-from dermis.gpu.wgsl_source import Member
+from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human.skin import face, textures
 from dermis.human.skin.face import FOLD_MOVEMENTS, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
 from dermis.human.skin.look import SkinLook
@@ -65,7 +65,7 @@ _MAP_NAMES = ("colour", "specular", "roughness")
 _FOLDING_FLOATS = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
 
 
-def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
+def texture_names() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
     """Return the names of noises, dot layers, zone amounts and noise regions, in the order of shaders."""
     return {name: _as_members(names) for name, names in _LIST_NAMES.items()}
 
@@ -78,8 +78,8 @@ def painting_constants() -> dict[str, float]:
     return sizes | counts | rows | {"folding": FOLD_MOVEMENTS, "wander_rows": ZONE_BORDER_NOISES}
 
 
-def _as_members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
-    return lambda: [Member(name, Path()) for name in names]
+def _as_members(names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
+    return lambda: [ShaderListMember(name, Path()) for name in names]
 
 
 class PaintInputs(NamedTuple):
