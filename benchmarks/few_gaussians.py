@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from dermis.apps.validation.benchmarks.cases import Case, case_scenes, case_settings
+from dermis.apps.validation.benchmarks.cases import BenchmarkCase, case_scenes, case_settings
 from dermis.apps.validation.benchmarks.measure import CPU_FRAME_COUNTS, FrameCounts, stage_ms
 from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file, check_output
@@ -29,7 +29,7 @@ from dermis.scene.heads import load_head
 from dermis.scene.techniques import TECHNIQUES
 
 _AT_ONCE = "at-once"
-_ON_GPU, _ON_CPU = Case(), Case((512, 512), atlas=1024)
+_ON_GPU, _ON_CPU = BenchmarkCase(), BenchmarkCase((512, 512), atlas=1024)
 _COUNTS = (1, 2, 3, 4, 6)
 
 
@@ -63,11 +63,11 @@ def main(
         check_output(output, (".json",))
     renderer, loaded = Renderer(adapter), load_head(head)
     software = renderer.device.adapter.kind == "CPU"
-    usual = _ON_CPU if software else _ON_GPU
-    usual = replace(usual, atlas=atlas or usual.atlas)
+    base_case = _ON_CPU if software else _ON_GPU
+    base_case = replace(base_case, atlas=atlas or base_case.atlas)
     effort = CPU_FRAME_COUNTS if software else FrameCounts(warmup=60, sequence=1, timed=15)
-    rows = [measured(renderer, loaded, replace(usual, gaussians=count), effort) for count in _COUNTS]
-    found = {"adapter": renderer.device.adapter.name, "atlas": usual.atlas, "rows": rows}
+    rows = [measured(renderer, loaded, replace(base_case, gaussians=count), effort) for count in _COUNTS]
+    found = {"adapter": renderer.device.adapter.name, "atlas": base_case.atlas, "rows": rows}
     if output is not None:
         with atomic_file(output) as partial:
             partial.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
@@ -75,7 +75,7 @@ def main(
     return 0
 
 
-def measured(renderer: Renderer, head: Head, case: Case, effort: FrameCounts) -> JsonObject:
+def measured(renderer: Renderer, head: Head, case: BenchmarkCase, effort: FrameCounts) -> JsonObject:
     """Return the device times of both variants [ms], and the relative RMSE of their pictures."""
     row: JsonObject = {"gaussians": case.gaussians}
     pictures = []

@@ -20,7 +20,7 @@ from dermis.apps.inverse.fitting.fit import fit
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
 from dermis.apps.truths.path_traced import PathTraced, Variant
-from dermis.apps.validation.comparisons.person import trace_view
+from dermis.apps.validation.comparisons.person import path_trace_view
 from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.command_line import run_script
@@ -128,7 +128,7 @@ def photograph(
     paint = replace(paint, colour=_measured(paint.colour))
     rough = np.clip(paint.roughness * (one.roughness / DEFAULT_ROUGHNESS), 0.05, 1.0).astype(np.float32)
     paint = replace(paint, roughness=rough)
-    return trace_view(renderer, one.scene, paint, (side, side), samples, variant=variant)
+    return path_trace_view(renderer, one.scene, paint, (side, side), samples, variant=variant)
 
 
 def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:

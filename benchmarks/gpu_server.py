@@ -31,10 +31,15 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 import dermis
-from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, PRESETS, Case, case_scenes
+from dermis.apps.validation.benchmarks.cases import (
+    BENCHMARK_PRESETS,
+    FRAGMENT_TECHNIQUE,
+    BenchmarkCase,
+    case_scenes,
+)
 from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
 from dermis.apps.validation.benchmarks.measure import FrameCounts, sequence_ms, stage_ms
-from dermis.apps.validation.benchmarks.report import as_json
+from dermis.apps.validation.benchmarks.report import benchmark_json
 from dermis.apps.validation.benchmarks.run import run_benchmark as run_benchmark
 from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.atomic_write import check_output
@@ -120,9 +125,9 @@ class Plan:
 
     adapter: str
     head: str
-    usual: Case
-    cases: list[Case]
-    film: list[Case]
+    base_case: BenchmarkCase
+    cases: list[BenchmarkCase]
+    film: list[BenchmarkCase]
     effort: FrameCounts
     images: int
     image: JsonObject
@@ -131,48 +136,55 @@ class Plan:
 
 def plan_of(adapter: str, head: str) -> Plan:
     """Return the plan with the sizes of the documentation."""
-    film = PRESETS["film"]
-    usual, *others = film.cases()
+    film = BENCHMARK_PRESETS["film"]
+    base_case, *others = film.cases()
     largest = [
         case
         for case in others
         if case.technique == FRAGMENT_TECHNIQUE or case.subdivide == max(film.subdivide)
     ]
     settings = {"size": (512, 512), "atlas": 1024}
-    interactive = PRESETS["interactive"]
+    interactive = BENCHMARK_PRESETS["interactive"]
     return Plan(
-        adapter, head, interactive.usual, interactive.cases(), [usual, *largest], FrameCounts(), 500, settings
+        adapter,
+        head,
+        interactive.base_case,
+        interactive.cases(),
+        [base_case, *largest],
+        FrameCounts(),
+        500,
+        settings,
     )
 
 
 def quick_plan(adapter: str, head: str) -> Plan:
     """Return a plan with sizes that any machine renders quickly."""
-    usual = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=1)
-    cases = [usual, replace(usual, technique=FRAGMENT_TECHNIQUE, varies="technique")]
+    base_case = BenchmarkCase((48, 32), atlas=64, gaussians=2, lights=1, samples=1)
+    cases = [base_case, replace(base_case, technique=FRAGMENT_TECHNIQUE, varies="technique")]
     effort = FrameCounts(warmup=0, between=0, timed=1, sequence=1)
     image = {"size": (32, 32), "atlas": 64}
     small = ("--size", "240x160", "--atlas", "64", "--frames", "2")
-    return Plan(adapter, head, usual, cases, cases[:1], effort, 4, image, small)
+    return Plan(adapter, head, base_case, cases, cases[:1], effort, 4, image, small)
 
 
 def bench(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Measure the frames of `dermis bench` at all sizes, and the passes of 2007."""
-    return as_json(run_benchmark(plan.cases, plan.head, plan.adapter))
+    return benchmark_json(run_benchmark(plan.cases, plan.head, plan.adapter))
 
 
 def film(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Measure film frames: the default one, the fragment shaders of 2007, and the most triangles."""
-    return as_json(run_benchmark(plan.film, plan.head, plan.adapter))
+    return benchmark_json(run_benchmark(plan.film, plan.head, plan.adapter))
 
 
 def lights(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Return the device time of each stage with lamps, an environment, and the sun [ms]."""
-    settings, found = _settings(plan.usual), {}
+    settings, found = _settings(plan.base_case), {}
     for name, (lamps, panorama) in ENVIRONMENTS.items():
         around = Environment(name=panorama) if panorama else None
         scenes = [
             replace(scene, environment=around, lights=scene.lights if lamps else ())
-            for scene in _scenes(plan.usual, head, plan.effort.sequence)
+            for scene in _scenes(plan.base_case, head, plan.effort.sequence)
         ]
         found[name] = _or_reason(partial(_stages, renderer, scenes, settings, plan.effort))
     return found
@@ -180,16 +192,16 @@ def lights(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
 
 def options(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Return the device time of each stage by technique and option [ms]."""
-    scenes, found = _scenes(plan.usual, head, plan.effort.sequence), {}
+    scenes, found = _scenes(plan.base_case, head, plan.effort.sequence), {}
     for name, chosen in OPTIONS.items():
-        settings = Settings(**(_settings(plan.usual).model_dump() | chosen))
+        settings = Settings(**(_settings(plan.base_case).model_dump() | chosen))
         found[name] = _or_reason(partial(_stages, renderer, scenes, settings, plan.effort))
     return found
 
 
 def sequences(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
     """Return images per second with different cameras and lights: as arrays, PNG files and EXR files."""
-    scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
+    scenes = _scenes(replace(plan.base_case, lights=1), head, plan.images)
 
     def bytes_of() -> Iterable[NDArray[np.generic]]:
         return renderer.render_many(scenes, **plan.image)
@@ -239,11 +251,11 @@ def viewer(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
         return figures | reason
 
 
-def _settings(case: Case) -> Settings:
+def _settings(case: BenchmarkCase) -> Settings:
     return Settings(size=case.image, atlas=case.atlas, samples=case.samples)
 
 
-def _scenes(case: Case, head: Head, count: int) -> list[Scene]:
+def _scenes(case: BenchmarkCase, head: Head, count: int) -> list[Scene]:
     """Return moving scenes that name their profile, because they outlive the folder of profile files."""
     with tempfile.TemporaryDirectory() as folder:
         moving = case_scenes(case, head, Path(folder), max(2, count))

@@ -21,7 +21,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from dermis.apps.validation.benchmarks.cases import (
-    Case,
+    BenchmarkCase,
     case_scenes,
     case_settings,
     pose_at_moment,
@@ -39,8 +39,8 @@ from dermis.mesh.pose import Pose
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
-_ON_GPU = Case()  # 1920 x 1080, atlas 2048, three shadowed lights, six Gaussians
-_ON_CPU = Case((1024, 1024), atlas=1024)
+_ON_GPU = BenchmarkCase()  # 1920 x 1080, atlas 2048, three shadowed lights, six Gaussians
+_ON_CPU = BenchmarkCase((1024, 1024), atlas=1024)
 _TARGETS, _MOMENTS = 52, 60
 _PEOPLE = 4
 _SAMPLES = 40  # of the memory
@@ -91,7 +91,7 @@ def main(
 
 
 def moving(
-    renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: FrameCounts
+    renderer: Renderer, case: BenchmarkCase, settings: Settings, head: Head, folder: Path, effort: FrameCounts
 ) -> JsonObject:
     """Measure frames with changing skin, lights and camera, in the rest pose and with a new shape."""
     found = JsonObject()
@@ -134,7 +134,7 @@ def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, e
     return statistics.median(found)
 
 
-def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
+def people(renderer: Renderer, case: BenchmarkCase, head: Head) -> list[float]:
     """Return the times to the first frame of other people with the same topology [ms]."""
     settings, found = case_settings(case), []
     renderer.draw(Scene(head), settings)
@@ -155,7 +155,7 @@ def resident_mb() -> float:
     return pages * 4096 / 1e6
 
 
-def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> JsonObject:
+def memory(renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, frames: int) -> JsonObject:
     """Return the memory of process and device over the frames of a motion without repetition [MB]."""
     scene, settings = case_scenes(case, head, folder, 1)[0], case_settings(case)
     moving, taken = with_test_rig(head, case.targets), list[tuple[int, float, float]]()

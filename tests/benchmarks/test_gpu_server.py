@@ -143,6 +143,8 @@ def test_other_names_are_refused(server: Any, tmp_path: Path) -> None:
 
 def test_the_whole_plan_has_the_tables_of_the_documentation(server: Any) -> None:
     plan = server.plan_of("auto", "human")
-    assert plan.usual.image == (1920, 1080) and plan.usual.atlas == 2048 and plan.usual.lights == 3
+    assert (
+        plan.base_case.image == (1920, 1080) and plan.base_case.atlas == 2048 and plan.base_case.lights == 3
+    )
     assert {(512, 512), (1024, 1024), (3840, 2160)} <= {case.image for case in plan.cases}
     assert [case.varies for case in plan.film] == ["", "technique", "subdivide"]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dermis.apps.validation.benchmarks import cases
-from dermis.apps.validation.benchmarks.cases import Case, Preset
+from dermis.apps.validation.benchmarks.cases import BenchmarkCase, BenchmarkPreset
 from dermis.apps.validation.benchmarks.measure import FrameCounts, measure_case
 from dermis.base.errors import DermisError
 
@@ -21,9 +21,9 @@ BRIEF = FrameCounts(warmup=0, between=0, timed=1, sequence=1)
 @pytest.fixture
 def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Return a function that runs `dermis bench` with presets of two tiny frames."""
-    usual = Case((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
-    tiny = Preset(
-        usual,
+    base_case = BenchmarkCase((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
+    tiny = BenchmarkPreset(
+        base_case,
         image=((32, 32),),
         atlas=(64,),
         gaussians=(2,),
@@ -32,8 +32,8 @@ def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest
         targets=(),
         environment=(),
     )
-    for name in cases.PRESETS:
-        monkeypatch.setitem(cases.PRESETS, name, tiny)
+    for name in cases.BENCHMARK_PRESETS:
+        monkeypatch.setitem(cases.BENCHMARK_PRESETS, name, tiny)
     monkeypatch.setattr("dermis.apps.validation.benchmarks.run.CPU_FRAME_COUNTS", BRIEF)
     monkeypatch.setattr("dermis.apps.validation.benchmarks.run.FrameCounts", lambda: BRIEF)
     return lambda *words: run("bench", "--head", "head.obj", "--adapter", device.adapter.name, *words)
@@ -68,9 +68,9 @@ def test_an_unwritable_report_is_refused_first(bench: Run) -> None:
 
 
 def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyPatch, device: Any) -> None:
-    usual = cases.PRESETS["cpu"].usual
-    too_large = Preset(usual, ((32, 32),), (device.max_texture_size + 1,), (2,), (1,), (0,), ())
-    monkeypatch.setitem(cases.PRESETS, "cpu", too_large)
+    base_case = cases.BENCHMARK_PRESETS["cpu"].base_case
+    too_large = BenchmarkPreset(base_case, ((32, 32),), (device.max_texture_size + 1,), (2,), (1,), (0,), ())
+    monkeypatch.setitem(cases.BENCHMARK_PRESETS, "cpu", too_large)
     ended = bench("--preset", "cpu")
     assert ended.code == 0
     assert f"skipped: 32x32, atlas {device.max_texture_size + 1}" in ended.stdout
@@ -80,7 +80,7 @@ def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyP
 def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     before = set(tmp_path.rglob("*"))
 
-    def interrupted(renderer: Any, case: Case, *rest: Any) -> Any:
+    def interrupted(renderer: Any, case: BenchmarkCase, *rest: Any) -> Any:
         if case.technique == "gpu-gems-3":
             raise KeyboardInterrupt
         return measure_case(renderer, case, *rest)

@@ -10,10 +10,10 @@ import pytest
 
 from dermis.apps.validation.benchmarks import run as running
 from dermis.apps.validation.benchmarks.cases import (
+    BENCHMARK_PRESETS,
     FRAGMENT_TECHNIQUE,
     GPU_GEMS_3,
-    PRESETS,
-    Case,
+    BenchmarkCase,
     case_scenes,
     case_settings,
     with_gaussian_count,
@@ -27,7 +27,7 @@ from dermis.apps.validation.benchmarks.measure import (
 )
 from dermis.apps.validation.benchmarks.report import (
     COLUMNS,
-    as_json,
+    benchmark_json,
     cells,
     skipped_lines,
     stage_table,
@@ -42,7 +42,7 @@ from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
 from dermis.scene.heads import load_head
 
-TINY = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
+TINY = BenchmarkCase((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
 BRIEF = FrameCounts(warmup=1, between=1, timed=2, sequence=2)
 
 
@@ -66,16 +66,16 @@ def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFac
     return measure_case(renderer, TINY, head, folder, 1e9, BRIEF)
 
 
-@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+@pytest.mark.parametrize("preset", BENCHMARK_PRESETS.values(), ids=BENCHMARK_PRESETS)
 def test_cases_vary_in_one_thing(preset: object) -> None:
-    usual, *others = preset.cases()  # type: ignore[attr-defined]
-    assert usual.varies == ""
+    base_case, *others = preset.cases()  # type: ignore[attr-defined]
+    assert base_case.varies == ""
     assert {GPU_GEMS_3, FRAGMENT_TECHNIQUE} == {
         case.technique for case in others if case.varies == "technique"
     }
     for case in others:
         fields = asdict(replace(case, varies=""))
-        assert [name for name, value in asdict(usual).items() if fields[name] != value] == [case.varies]
+        assert [name for name, value in asdict(base_case).items() if fields[name] != value] == [case.varies]
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 6, 8])
@@ -191,7 +191,7 @@ def test_the_published_passes_are_compared(benchmark_of_one_row: Benchmark, row:
 def test_the_json_has_what_was_asked_for(benchmark_of_one_row: Benchmark) -> None:
     import json
 
-    fields = json.loads(json.dumps(as_json(benchmark_of_one_row)))
+    fields = json.loads(json.dumps(benchmark_json(benchmark_of_one_row)))
     wanted = {"image", "atlas", "adapter", "gaussians", "lights", "frame_ms", "gpu_ms", "floor_ratio"}
     assert all(wanted <= set(one) for one in fields["rows"])
     assert fields["rows"][0]["image"] == [48, 32] and fields["copy_gb_s"] == 2.0

@@ -7,14 +7,14 @@ import json
 import pytest
 
 from dermis.apps.validation.engines import openpbr as script
-from dermis.apps.validation.engines.openpbr import FIGURES
+from dermis.apps.validation.engines.openpbr import RESULTS_FILE
 from dermis.apps.validation.engines.page import PAGE
 
 CHANGED = 2e-3  # change of an edge response
 
 
 def test_the_page_has_the_figures() -> None:
-    figures = json.loads(FIGURES.read_text("utf-8"))
+    figures = json.loads(RESULTS_FILE.read_text("utf-8"))
     assert figures["libraries"]["valid"] and figures["libraries"]["errors"] == []
     page = PAGE.read_text("utf-8")
     assert all(line in page for line in script.error_table(figures["skins"]))
@@ -22,7 +22,7 @@ def test_the_page_has_the_figures() -> None:
 
 def test_figures_are_those_of_today(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "SKINS", ("skin1",))
-    known = json.loads(FIGURES.read_text("utf-8"))["skins"]["skin1"]
+    known = json.loads(RESULTS_FILE.read_text("utf-8"))["skins"]["skin1"]
     found = script.skin_errors()["skin1"]
     for target, reading in (("openpbr", "error"), ("openpbr", "as_a_profile"), ("pbrt", "error")):
         edges = found[target][reading]["edge"]

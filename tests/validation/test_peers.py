@@ -74,7 +74,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(report, "load_mitsuba", lambda: None)
     monkeypatch.setattr(report, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(report, "version", lambda name: "1.0")
-    monkeypatch.setattr(report, "QUICK", rendering.PeerPlan(SIDE, (4, 64), 16, 3))
+    monkeypatch.setattr(report, "QUICK_PLAN", rendering.PeerPlan(SIDE, (4, 64), 16, 3))
     monkeypatch.setattr(dermis, "load_head", lambda name, subdivide: BALL)
     monkeypatch.setattr(dermis, "Renderer", FakeRenderer)
     return report
@@ -150,8 +150,8 @@ def test_without_mitsuba_there_is_no_reference(
 def test_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
-    rendering.render_peers(BALL, "front", peers.QUICK, renderer, done.append)  # type: ignore[arg-type]
-    assert sum(done) == peers.QUICK.work
+    rendering.render_peers(BALL, "front", peers.QUICK_PLAN, renderer, done.append)  # type: ignore[arg-type]
+    assert sum(done) == peers.QUICK_PLAN.work
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENT_TECHNIQUE)
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 
@@ -191,7 +191,7 @@ def test_page_is_written_with_all_placeholders_filled(
     (tmp_path / "templates" / "peers.md").write_text(template, encoding="utf-8")
     monkeypatch.setattr(report, "PAGE", tmp_path / "peers.md")
     monkeypatch.setattr(report, "FIGURES", tmp_path / "results" / "peers.json")
-    monkeypatch.setattr(report, "PeerPlan", lambda: peers.QUICK)
+    monkeypatch.setattr(report, "PeerPlan", lambda: peers.QUICK_PLAN)
     peers.peers()
     page = (tmp_path / "peers.md").read_text(encoding="utf-8")
     assert page.count("| dermis | texture space, atlas 1024 |") == 2 and "{" not in page

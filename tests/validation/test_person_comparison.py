@@ -17,8 +17,8 @@ from dermis.apps.validation.comparisons.person import (
     PersonComparison,
     as_softbox,
     compare_person,
-    comparison_of,
     iris_errors,
+    person_comparison,
     render_frame,
     view_scene,
 )
@@ -128,7 +128,7 @@ def iris_pair(shift: int, gain: float) -> PersonComparison:
     path = PathTraced(
         reference_image.astype(np.float32), variance, np.ones((side, side), np.float32), 8, 1.0, ()
     )
-    return comparison_of("eye", ours, path, np.ones((side, side), bool))
+    return person_comparison("eye", ours, path, np.ones((side, side), bool))
 
 
 def test_iris_shift_and_brightness() -> None:

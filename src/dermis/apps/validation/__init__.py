@@ -1,1 +1,1 @@
-"""Measured accuracy and speed: errors against references, other renderers, benchmarks."""
+"""Measurements of accuracy and speed: errors against references, other renderers, benchmarks."""

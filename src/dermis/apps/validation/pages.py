@@ -1,4 +1,4 @@
-"""Pages of the documentation with measured tables, and a browser for exported pages."""
+"""Pages of the documentation with measured tables, their results, and a browser for exported pages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "
 
 
 def in_checkout(path: Path) -> Path:
-    """Return a path of the checkout that must exist.
+    """Return a path if it exists in the checkout of the project.
 
     Raises DermisError where the package is installed without a checkout of the project.
     """
@@ -36,7 +36,7 @@ def in_checkout(path: Path) -> Path:
 
 
 def add_tests_to_path() -> None:
-    """Make the modules of the tests importable, whose meshes some measurements use.
+    """Make the modules in the folder tests importable, as some measurements use their meshes.
 
     Raises DermisError where the tests are missing.
     """
@@ -46,9 +46,9 @@ def add_tests_to_path() -> None:
 
 
 def data_file(name: str) -> Path:
-    """Return a file of the folder that the variable DERMIS_DATA names.
+    """Return the path of a published data file in the folder DERMIS_DATA.
 
-    Raises DermisError when it is missing.
+    Raises DermisError when the file is missing.
     """
     path = Path(os.environ.get("DERMIS_DATA", "../shared")) / name
     if not path.is_file():
@@ -64,25 +64,28 @@ def write_page(page: Path, text: str) -> None:
 
 
 def template_path(page: Path) -> Path:
-    """Return the path of a page's template."""
+    """Return the path of the template from which a page is written, docs/templates/NAME.md."""
     return page.parent / "templates" / page.name
 
 
 def fill_page(page: Path, **parts: object) -> None:
-    """Write docs/NAME.md from docs/templates/NAME.md with values for its placeholders."""
+    """Write docs/NAME.md from docs/templates/NAME.md.
+
+    parts : texts and numbers by placeholder of the template
+    """
     write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
 
 
 def print_tables(tables: Mapping[str, str]) -> None:
-    """Print the tables of a page under their names in its template."""
+    """Print the tables of a page, each below its placeholder in the template."""
     print_lines(*(f"{name}\n{text}\n" for name, text in tables.items()))
 
 
 def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
-    """Write results as JSON, atomically.
+    """Write measured results to a JSON file, atomically.
 
     figures : JSON-compatible values
-    digits : significant digits of floats; None for all of them
+    digits : significant digits of floats; None for all digits
     """
     values = figures if digits is None else _rounded(figures, digits)
     with atomic_file(path) as file:
@@ -90,7 +93,7 @@ def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = N
 
 
 def read_results(path: Path) -> Any:
-    """Return the results of the last measurement."""
+    """Return the results of the last measurement from a JSON file of the checkout."""
     return json.loads(in_checkout(path).read_text(encoding="utf-8"))
 
 
@@ -108,7 +111,10 @@ if TYPE_CHECKING:
 
 @contextmanager
 def chromium_page(side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
-    """Open an empty page of `side` pixels in Chromium, without a network, for a context.
+    """Open an empty page in headless Chromium without a network, for the duration of a context.
+
+    side : side of the square page [pixel]
+    flags : command-line flags of Chromium
 
     Raises DermisError when the package playwright is not installed.
     """

@@ -1,1 +1,1 @@
-"""Errors of the package's approximations against references, for pages of the documentation."""
+"""Errors of the package's approximations against exact references, for pages of the documentation."""

@@ -1,4 +1,4 @@
-"""Errors of the blur on the atlas: points of light, curvature and seams."""
+"""Errors of diffusion by blurs on the atlas: impulse responses, curved surfaces and seams."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def blur(adapter: str = "auto") -> None:
 
 
 def point_tables(device: Device) -> dict[str, object]:
-    """Return the tables of docs/accuracy.md by their names in its template."""
+    """Return the Markdown rows on blurred points of light by placeholder of docs/templates/accuracy.md."""
     return {
         "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
@@ -67,13 +67,20 @@ def point_tables(device: Device) -> dict[str, object]:
 
 
 def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch: str = "full") -> list[Array]:
-    """Return all pyramid levels (n, n) of light (n, n) blurred on the atlas of a mesh."""
+    """Return all pyramid levels (n, n) of light blurred on the atlas of a mesh, at full resolution.
+
+    light : (n, n) irradiance
+    stretch : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    """
     levels, blur = blur_light(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
 def point_row(device: Device, texels_per_mm: float) -> str:
-    """Return errors of a point of light on a flat patch against the analytic sum of Gaussians."""
+    """Return a Markdown row with the shape and energy errors of a blurred point of light on a flat patch.
+
+    The reference is the analytic sum of Gaussians.
+    """
     profile = load_profile("gpu-gems-3")
     light = np.zeros((SIZE, SIZE), np.float32)
     middle = SIZE // 2
@@ -91,7 +98,10 @@ def point_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_row(device: Device, degrees: float) -> str:
-    """Return principal widths of a point of light over the true width, for uv axes at this angle."""
+    """Return a Markdown row with the principal widths of a blurred point of light over the exact width.
+
+    degrees : angle between the uv axes on the flat surface [degrees]
+    """
     flat = plane(SIZE / 3.0)
     shear = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     positions = flat.positions.copy()
@@ -112,14 +122,14 @@ def sheared_row(device: Device, degrees: float) -> str:
 
 
 def constant_light_error(device: Device) -> float:
-    """Return the largest deviation of constant light on the atlas of a sphere, over all levels."""
+    """Return the largest error of blurred constant light on the atlas of a sphere, over all levels [-]."""
     atlas = build_atlas(uv_sphere(100.0), SIZE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
 
 
 def surface_tables(adapter: str) -> dict[str, str]:
-    """Return the tables of curvature and seams by their names in docs/templates/techniques.md."""
+    """Return the Markdown rows on curvature and seams by placeholder of docs/templates/techniques.md."""
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
     curved = [harmonic_row(renderer, radius) for radius in RADII_MM]
@@ -127,7 +137,10 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return the damping of the first harmonic on a sphere by the widest Gaussian: atlas, heat, chords."""
+    """Return a Markdown row with the fraction of light proportional to x that a blur leaves on a sphere.
+
+    The widest Gaussian is applied on the atlas, by the heat equation, and by the Gaussian of chord length.
+    """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
 
@@ -147,7 +160,10 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
 def blur_light(
     device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
-    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of PROFILE but the narrowest."""
+    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of PROFILE but the narrowest.
+
+    stretch : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    """
     textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
     max_halvings = len(textures.mips_for("repeated")) - 1
     halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
@@ -164,19 +180,22 @@ def blur_light(
 
 
 def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
-    """Return pyramid level k (n, n), resampled bilinearly to full resolution."""
+    """Return pyramid level k (n, n), resampled bilinearly to the full resolution of the atlas."""
     halvings = blur.halvings[k]
     layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
 
 
 def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
-    """Return the widest level, (n, n, 1)."""
+    """Return the pyramid level of the widest Gaussian (n, n, 1), at the full resolution of the atlas."""
     return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
 def seam_rows(renderer: Renderer) -> list[str]:
-    """Return rows of relative jumps of scattered light across seams: mean and 95th percentile [%]."""
+    """Return Markdown rows with the discontinuity of scattered light across seams, for several meshes.
+
+    Each cell has the mean and the 95th percentile, relative to the light [%].
+    """
     from cut_meshes import cut_sphere
 
     human = dermis.load_head("human")
@@ -192,33 +211,37 @@ def seam_rows(renderer: Renderer) -> list[str]:
 
 
 def all_points(positions: Array) -> Flags:
-    """Return the mask of all points (n, 3) [mm from the head's centre]."""
+    """Return a mask that selects all positions (n, 3), relative to the head's centre [mm]."""
     return np.ones(len(positions), bool)
 
 
 def neck_points(positions: Array) -> Flags:
-    """Return the mask of points on the neck and below it."""
+    """Return the mask of positions on and below the neck."""
     return np.asarray((positions[:, 1] < -90.0) & (positions[:, 2] < 60.0))
 
 
 def back_points(positions: Array) -> Flags:
-    """Return the mask of points on the back of the head."""
+    """Return the mask of positions on the back of the head."""
     return np.asarray((positions[:, 1] > -90.0) & (positions[:, 2] < -30.0))
 
 
 def visible_points(positions: Array) -> Flags:
-    """Return the mask of points on visible seams of the human."""
+    """Return the mask of positions where seams of the package's human are visible: neck and back."""
     return np.asarray(neck_points(positions) | back_points(positions))
 
 
 def hidden_points(positions: Array) -> Flags:
-    """Return the mask of points on hidden seams of the human."""
+    """Return the mask of positions where seams of the package's human are hidden: eye sockets and mouth."""
     return ~visible_points(positions)
 
 
 def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> str:
-    """Return one line of the table, with a column for each seam method."""
-    first, second = seam_sides(head, where)
+    """Return a Markdown row with the discontinuities across seams, with a column for each seam method.
+
+    side : side of the atlas [texel]
+    where : selects seam points by position
+    """
+    first, second = seam_side_points(head, where)
     cells = []
     for method in SEAM_METHODS:
         jumps = seam_jumps(renderer, striped_scene(head), method, side, first, second)
@@ -226,8 +249,11 @@ def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointF
     return f"| {name} | {len(first.triangle)} | {' | '.join(cells)} |"
 
 
-def seam_sides(head: Head, where: PointFilter) -> tuple[Points, Points]:
-    """Return the points on both sides of seams that face the lights."""
+def seam_side_points(head: Head, where: PointFilter) -> tuple[Points, Points]:
+    """Return corresponding points on the two sides of seams, where they face the lights.
+
+    where : selects seam points by position
+    """
     from atlas_reading import Points, seam_points
 
     mesh = head.mesh
@@ -258,7 +284,12 @@ def striped_scene(head: Head) -> Scene:
 def seam_jumps(
     renderer: Renderer, scene: Scene, method: str, side: int, first: Points, second: Points
 ) -> Array:
-    """Return the relative change of red light from one side of each seam to the other."""
+    """Return the relative difference of scattered red light between the two sides of each seam.
+
+    method : seam method
+    side : side of the atlas [texel]
+    first, second : corresponding points on the two sides
+    """
     from atlas_reading import lit_at
 
     values = {"size": (16, 16), "atlas": side, "seams": method, "transmission": "none"}

@@ -1,6 +1,6 @@
-"""Highlights and skins compared with those of Cycles, with the fraction of light that the surface reflects.
+"""Highlights and skins of the frame compared with those of Cycles, for docs/accuracy.md.
 
-Both need Blender's Python, so docs/accuracy.md shows the last measurement (benchmarks/results).
+Both need Blender's Python, so the page shows the last measurement (benchmarks/results).
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from dermis.scene.camera import CAMERA_PRESETS
 from dermis.scene.lights import PointLight
 from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
-HIGHLIGHTS, LOOKS = RESULTS / "highlights.json", RESULTS / "look.json"
+HIGHLIGHT_RESULTS, LOOK_RESULTS = RESULTS / "highlights.json", RESULTS / "look.json"
 PICTURE = DOCS / "images" / "look.webp"
-MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
+LOBE_MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
 HIGHLIGHT_VIEWS = ("cheek", "portrait")
 ROUGHNESS, PATHS = 0.3, 64
-LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
+KEY_LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
 ONE_LOBE = ((1.0, ROUGHNESS),)
 TWO_LOBES = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
 LIT_QUANTILE = 0.6  # quantile of the lit pixels above which they are compared
@@ -48,7 +48,14 @@ Picture = NDArray[np.float32]
 
 
 class HighlightRow(TypedDict):
-    """Energy relative to Cycles, contrasts and correlation of a model's highlights."""
+    """Comparison of a reflection model's highlights with those of Cycles.
+
+    view : camera preset
+    model : model of surface reflection
+    energy : reflected light relative to Cycles [-]
+    grain, grain_of_cycles : contrast of fine detail in the two pictures [-]
+    correlation : correlation of the two pictures where they are bright [-]
+    """
 
     view: str
     model: str
@@ -59,18 +66,18 @@ class HighlightRow(TypedDict):
 
 
 class SkinRender(NamedTuple):
-    """Picture in linear light, and the fraction of its light that the surface reflects [-]."""
+    """Picture (h, w, 3) in linear light, and the fraction of its light that the surface reflects [-]."""
 
     picture: Picture
     reflected: float
 
 
 def highlights(adapter: str = "auto") -> None:
-    """Measure highlights against Cycles and write benchmarks/results/highlights.json."""
+    """Compare highlights with Cycles and write benchmarks/results/highlights.json."""
     in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
-    write_results(HIGHLIGHTS, {"paths": PATHS, "rows": rows})
+    write_results(HIGHLIGHT_RESULTS, {"paths": PATHS, "rows": rows})
 
 
 def looks(adapter: str = "auto") -> None:
@@ -84,13 +91,13 @@ def looks(adapter: str = "auto") -> None:
             rows.append({"head": head, "view": view, "shares": [one.reflected for one in columns]})
             for column, one in zip(COLUMNS, columns, strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.reflected:.1f} %"] = one.picture
-    write_results(LOOKS, {"paths": PATHS, "rows": rows})
+    write_results(LOOK_RESULTS, {"paths": PATHS, "rows": rows})
     PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
 
 
 def tables() -> dict[str, object]:
-    """Return the rows of docs/accuracy.md by their names in its template, from the last measurement."""
-    highlight_rows, look_rows = read_results(HIGHLIGHTS)["rows"], read_results(LOOKS)["rows"]
+    """Return the Markdown rows of the last measurement by placeholder of docs/templates/accuracy.md."""
+    highlight_rows, look_rows = read_results(HIGHLIGHT_RESULTS)["rows"], read_results(LOOK_RESULTS)["rows"]
     cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
         "highlights": "\n".join(
@@ -111,24 +118,30 @@ def scan_with_normal_map() -> Head:
     """Return the scanned head with its relief as a normal map and without other maps."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
-    return replace(head, maps=Maps(normal=slopes(head.mesh, head.maps.height)))
+    return replace(head, maps=Maps(normal=relief_slopes(head.mesh, head.maps.height)))
 
 
-def slopes(mesh: Mesh, height: Picture) -> Picture:
-    """Return (n, n, 2) slopes of a height map (n, n) on a mesh, as a normal map."""
+def relief_slopes(mesh: Mesh, height: Picture) -> Picture:
+    """Return the slopes (n, n, 2) along u and v of a height map, in the form of a normal map.
+
+    height : (n, n) height map [mm]
+    """
     down, right = np.gradient(height)
     stretch = build_atlas(mesh, len(height)).stretch.astype(np.float32)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
 
 
 def grain_contrast(picture: Picture, lit: NDArray[np.bool_]) -> float:
-    """Return the contrast of fine detail, the relative RMS difference between a picture and its blur."""
+    """Return the contrast of fine detail: the relative RMS difference of a picture from its blur.
+
+    lit : (h, w) mask of the pixels to compare
+    """
     smooth = gaussian_filter(picture, GRAIN_BLUR_PX)
     return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
 
 
 def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float, float], ...]) -> Picture:
-    """Return the green light that the facets of all lobes reflect, path-traced.
+    """Return the highlights (h, w) that Cycles path-traces for a sum of Beckmann lobes.
 
     lobes : weight and roughness of each lobe
     """
@@ -140,17 +153,20 @@ def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float
 
 
 def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[HighlightRow]:
-    """Return a row for each model of surface reflection."""
+    """Return the comparison of highlights for each model of surface reflection.
+
+    view : camera preset
+    """
     camera = load_camera(view, head)
     settings = Settings(size=(384, 384), atlas=512, samples=16, parts="specular", transmission="none")
-    scene, rows = Scene(head, [LIGHT], camera), list[HighlightRow]()
+    scene, rows = Scene(head, [KEY_LIGHT], camera), list[HighlightRow]()
     one_lobe, two_lobes = (traced_highlights(scene, settings, lobes) for lobes in (ONE_LOBE, TWO_LOBES))
-    for model in MODELS:
+    for model in LOBE_MODELS:
         reference = two_lobes if model == "two-lobe" else one_lobe
         lit = reference > np.quantile(reference[reference > 0], LIT_QUANTILE)
         values = {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
         skin = Skin.model_validate(values)
-        ours = renderer.draw(Scene(head, [LIGHT], camera, skin), settings).linear()[..., 1]
+        ours = renderer.draw(Scene(head, [KEY_LIGHT], camera, skin), settings).linear()[..., 1]
         rows.append(
             {
                 "view": view,
@@ -165,7 +181,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Return the scene as the frame renders it."""
+    """Render a scene by the frame, and its surface reflection alone for the reflected fraction."""
     options = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -173,7 +189,7 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Return the scene as Cycles renders it, with a second pass of black skin for the surface's light."""
+    """Render a scene by Cycles, and again with black skin for the fraction that the surface reflects."""
     settings = Settings(size=(SIDE, SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (image_pass,) = cycles_passes(scene, skin, [PATHS], settings)
@@ -181,37 +197,43 @@ def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
     return SkinRender(image_pass.image, float(surface_pass.image.sum() / image_pass.image.sum()))
 
 
-def downsampled(values: Picture) -> Picture:
-    """Return a map (h, w, ...) averaged over squares of texels, with at most `MAP_SIDE` rows."""
+def downsample_map(values: Picture) -> Picture:
+    """Return a map averaged over blocks of texels, to at most `MAP_SIDE` rows.
+
+    values : (h, w) or (h, w, c) map
+    """
     step = max(1, len(values) // MAP_SIDE)
     blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
 def with_normal_map(head: Head) -> Head:
-    """Return the head with its relief as one normal map."""
+    """Return the head with its relief converted to a normal map, for Cycles."""
     if head.maps.height is None:
         return head
-    relief = slopes(head.mesh, downsampled(head.maps.height))
+    relief = relief_slopes(head.mesh, downsample_map(head.maps.height))
     return replace(head, maps=replace(head.maps, normal=relief, height=None))
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return Cycles' skin of a head, with its colours and the mean offset of the frame's profile.
+    """Return the Cycles material with the head's colours and the mean exit offset of the frame's profile.
 
-    The mean offset of exit points by Burley's profile is 2.5 d, where d is the mean free path over a factor
-    of the colour.
+    The mean distance between entry and exit by Burley's profile is 2.5 d, where d is the mean free path over
+    a factor of the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour
     offset_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
     mean_free_path_mm = offset_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
     red, green, blue = (float(part) for part in 4.0 * np.pi * mean_free_path_mm)
-    return PrincipledSkin(downsampled(head.maps.colour), (red, green, blue), ROUGHNESS)
+    return PrincipledSkin(downsample_map(head.maps.colour), (red, green, blue), ROUGHNESS)
 
 
 def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRender]]:
-    """Return the renders of all columns for each view of a head."""
+    """Render a head with the skin of the 2007 talk, the default skin and Cycles; return them by view.
+
+    title : key of `HEADS`
+    """
     name = HEADS[title]
     painted, one_lobe = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
     mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAP_SIDE))

@@ -1,4 +1,4 @@
-"""Angular reflection of a half-space under a boundary of index 1.4, for docs/techniques.md."""
+"""Directional reflection of a half-space under a boundary of index 1.4, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _NODE_COUNT = 48
 
 
 def half_space(adapter: str = "auto") -> None:
-    """Print the table of reflection by direction, within a minute."""
+    """Print the table of reflection by direction; this takes less than a minute."""
     print_lines(direction_table(load_head("lee_perry_smith", subdivide=0), adapter))
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return rows for the channels of skin1, and for the default skin in the studio."""
+    """Return Markdown rows with the errors by direction, for each channel of skin1 and for default skin."""
     layer = media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
@@ -69,10 +69,12 @@ def _oblique_ratio(albedo: float, eta: float) -> float:
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return errors of Lambertian and of half-space skin over all directions of light and view in air.
+    """Return errors of Lambertian and of half-space skin, over all directions of light and view in air.
 
     The exact radiance below the surface is that of the index-matched half-space with all internal
     reflections.
+
+    albedo : single-scattering albedo [-]
     """
     critical = critical_cosine(ETA)
     trapped, escaping = (gauss_legendre(*ends, _NODE_COUNT) for ends in ((0.0, critical), (critical, 1.0)))
@@ -99,13 +101,22 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
 
 
 def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the reflectance for light from 81 degrees over that for normal incidence, by Monte Carlo."""
+    """Return the reflectance for light at 81 degrees over that at normal incidence, by Monte Carlo [-].
+
+    mean_cosine : mean cosine of the scattering angle [-]
+    """
     oblique = _reflected_fraction(OBLIQUE_COSINE, albedo, mean_cosine, eta)
     return oblique / _reflected_fraction(1.0, albedo, mean_cosine, eta)
 
 
 def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the fraction of photons that a half-space reflects, by their cosine in air."""
+    """Return the fraction of incident photons that a half-space reflects, by Monte Carlo [-].
+
+    cosine : cosine of the angle of incidence in air
+    albedo : single-scattering albedo [-]
+    mean_cosine : mean cosine of the scattering angle [-]
+    eta : index of refraction
+    """
     rng = np.random.default_rng(1)
     depth, weight, reflected = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
     down = np.full(PHOTONS, float(refracted_cosine(cosine, eta)))
@@ -124,7 +135,11 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
 
 
 def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floats:
-    """Return cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
+    """Return the cosines (n,) to the downward axis after scattering, by [HenyeyGreenstein1941].
+
+    down : (n,) cosines before scattering
+    g : mean cosine of the scattering angle [-]
+    """
     uniform = rng.random(len(down))
     if g == 0.0:
         return 2.0 * uniform - 1.0
@@ -135,7 +150,7 @@ def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floa
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return half-space over Lambertian skin in the studio: median and 99th percentile of pixels."""
+    """Return half-space over Lambertian skin in studio light: median and 99th percentile, by channel."""
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
     def picture(direction: Literal["lambertian", "half-space"]) -> Floats:

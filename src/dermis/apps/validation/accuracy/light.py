@@ -1,4 +1,4 @@
-"""Errors of lighting: environments, furnaces, area lights, ambient occlusion."""
+"""Errors of lighting: environments, white furnaces, area lights, ambient occlusion."""
 
 from __future__ import annotations
 
@@ -34,12 +34,16 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def light(adapter: str = "auto") -> None:
-    """Print the tables of environments, furnaces, area lights and occlusion."""
+    """Print the tables of environments, white furnaces, area lights and ambient occlusion."""
     print_tables(tables(adapter))
 
 
 def sample_panorama(layer: Array, towards: Array) -> Array:
-    """Return (n, 3) values of a panorama (h, w, 3) in n directions, interpolated as by the shader."""
+    """Return the radiance (n, 3) of a panorama in given directions, interpolated as by the shader.
+
+    layer : (h, w, 3) panorama
+    towards : (n, 3) directions
+    """
     height, width = layer.shape[:2]
     x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
     y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
@@ -52,52 +56,67 @@ def sample_panorama(layer: Array, towards: Array) -> Array:
     return total
 
 
-def unit(v: Array) -> Array:
-    """Return vectors of length 1."""
+def normalise(v: Array) -> Array:
+    """Return vectors (..., 3) scaled to length 1."""
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
 @cache
 def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
-    """Return directions and light of a panorama's texels without its suns, and its prefiltered form."""
+    """Return directions (n, 3) and light (n, 3) of a panorama's texels, and its prefiltered form.
+
+    Light is radiance times solid angle, without suns.
+    """
     radiance = resample(split_suns(load_panorama(name))[0], rows)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
     return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
 
 
 def irradiance_error(name: str, count: int = 200) -> float:
-    """Return the largest relative error of the irradiance over random normals."""
+    """Return the largest relative error of the irradiance of a panorama, over random normals.
+
+    count : number of normals
+    """
     towards, light, prefiltered = panorama(name)
-    normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
+    normals = normalise(np.random.default_rng(1).normal(size=(count, 3)))
     exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
     return float(np.abs(sample_panorama(prefiltered.layers[0], normals) / exact - 1).max())
 
 
 def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
-    """Return the relative RMS error of reflected radiance over random normals and views.
+    """Return the relative RMS error of a panorama's radiance reflected by a lobe, over random normals.
 
-    angle : of the view from the normal [degrees]
+    m : roughness of the lobe
+    angle : angle between view and normal [degrees]
+    count : number of normals
     """
     cosine = float(np.cos(np.radians(angle)))
     towards, light, prefiltered = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
     rng = np.random.default_rng(2)
-    normals = unit(rng.normal(size=(count, 3)))
-    along = unit(np.cross(normals, rng.normal(size=(count, 3))))
+    normals = normalise(rng.normal(size=(count, 3)))
+    along = normalise(np.cross(normals, rng.normal(size=(count, 3))))
     views = cosine * normals - np.sqrt(1 - cosine**2) * along
     pairs = zip(normals, views, strict=True)
-    exact = [lobe_sum(towards, light, normal, view, m) for normal, view in pairs]
+    exact = [reflected_radiance(towards, light, normal, view, m) for normal, view in pairs]
     mirror_direction = 2 * cosine * normals - views
     tangent = cosine * along - np.sqrt(1 - cosine**2) * normals
     bitangent, sampled = np.cross(normals, along), np.zeros((count, 3))
     for x, y, wide, weight in lobe_parameters(cosine, m):
-        direction = unit(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
+        direction = normalise(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
         sampled += weight * lobe_radiance(prefiltered.layers, direction, wide)
     error = directional_albedo(cosine, m) * sampled - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
-def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
-    """Return reflected radiance, summed over the texels where the lobe is above 1e-10 of its peak."""
+def reflected_radiance(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
+    """Return the radiance that a specular lobe reflects, as a sum over all texels of a panorama.
+
+    Texels where the lobe is below 1e-10 of its peak are skipped.
+
+    towards, light : (n, 3) directions of the texels, and their radiance times solid angle
+    normal, view : (3,) unit vectors
+    m : roughness of the lobe
+    """
     n_l, n_v, v_l = towards @ normal, float(normal @ view), towards @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
     near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
@@ -107,7 +126,11 @@ def lobe_sum(towards: Array, light: Array, normal: Array, view: Array, m: float)
 
 
 def lobe_parameters(cosine: float, m: float) -> Array:
-    """Return directions, roughness and weights of the isotropic lobes, interpolated in their table."""
+    """Return directions, roughness and weights of the isotropic lobes that approximate a specular lobe.
+
+    cosine : cosine between view and normal
+    m : roughness of the specular lobe
+    """
     x = np.sqrt(cosine) * (VIEW_COUNT - 1)
     y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGHNESS_COUNT))
     j, i = min(int(x), VIEW_COUNT - 2), min(int(y), ROUGHNESS_COUNT - 2)
@@ -116,7 +139,12 @@ def lobe_parameters(cosine: float, m: float) -> Array:
 
 
 def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
-    """Return the mean radiance under isotropic lobes."""
+    """Return the prefiltered radiance under isotropic lobes, interpolated by roughness.
+
+    layers : (n, h, w, 3) panorama at each prefiltered roughness
+    towards : (k, 3) directions of the lobes
+    m : roughness of the lobes
+    """
     level = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
     low = int(np.clip(level, 0, len(ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
@@ -125,7 +153,10 @@ def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
 
 
 def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **values: str) -> Array:
-    """Return least, mean and largest outgoing over incoming radiance of a white head in uniform light."""
+    """Return minimum, mean and maximum of outgoing over incoming radiance, for a white head in uniform light.
+
+    energy : energy conservation scheme
+    """
     white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy)
     scene = Scene(white_head, environment=Environment(name="uniform"), skin=skin)
@@ -136,7 +167,7 @@ def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **value
 
 
 def furnace_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of the furnace table."""
+    """Return the Markdown rows of the white furnace: minimum, mean and maximum by energy scheme."""
     ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith", subdivide=0).maps)
     ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
     heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none", subdivide=0)}
@@ -158,7 +189,10 @@ def furnace_rows(renderer: dermis.Renderer) -> str:
 
 
 def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
-    """Return a rectangle light as side x side point lights with shadow maps of their own."""
+    """Return a grid of point lights, each with its own shadow map, that replaces a rectangle light.
+
+    side : number of point lights along each side
+    """
     position, target = np.array(light.position), np.array(light.target)
     distance = float(np.linalg.norm(target - position))
     right, up, forward = view_axes_array(target - position, UP)
@@ -169,13 +203,16 @@ def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
         x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
         point = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
         to_target = target - point
-        irradiance = radiance * area * (unit(to_target) @ forward) / (to_target @ to_target)
+        irradiance = radiance * area * (normalise(to_target) @ forward) / (to_target @ to_target)
         points.append(PointLight(position=tuple(point), irradiance=tuple(irradiance), softness_mm=2.0))
     return points
 
 
 def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
-    """Return bias and RMS difference from 64 point lights, over the mean radiance."""
+    """Return bias and RMS difference of area light shadows from 64 point lights, over the mean radiance.
+
+    rig : light preset
+    """
     light = load_lights(rig)[0]
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith", subdivide=0)
@@ -190,7 +227,7 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
 
 
 def occlusion_error(renderer: dermis.Renderer) -> float:
-    """Return the RMS error of the visible fraction of the sky on the scan, against 1024 directions."""
+    """Return the RMS error of the visible sky fraction on the scanned head, against 1024 directions [-]."""
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
@@ -202,7 +239,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the tables by their names in the page's template."""
+    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {

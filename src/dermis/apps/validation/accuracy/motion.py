@@ -1,4 +1,4 @@
-"""Posed heads against heads loaded in the same shape, for docs/motion.md."""
+"""Posed heads compared with heads loaded in that shape, for docs/motion.md."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _MIN_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
-    """Compare posed heads with heads loaded in the same shape and write docs/motion.md.
+    """Compare posed heads with heads loaded in that shape and write docs/motion.md.
 
     Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a
     checkout.
@@ -75,14 +75,21 @@ def motion(adapter: str = "auto") -> None:
 
 
 def rebuilt_head(head: Head, points: Points) -> Head:
-    """Return a head as if it had been loaded in this shape."""
+    """Return the head that results from loading the mesh with its points at given positions.
+
+    points : (p, 3) positions [mm]
+    """
     mesh = head.mesh
     arrays = points[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
     return Head("rebuilt", build_mesh(*arrays, point=mesh.point, quads=mesh.quads), head.maps)
 
 
 def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
-    """Return the points of a person with an expression."""
+    """Return the positions of a person's points with an expression [mm].
+
+    person : (p, 3) positions in the rest pose [mm]
+    weights : morph target weights of the expression
+    """
     motion = Pose(weights, positions_mm=person).motion(head.control)
     return head.control.points_mm(motion).astype(np.float32)
 
@@ -90,7 +97,12 @@ def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Po
 def picture_error(
     renderer: Renderer, head: Head, person: Points, weights: Mapping[str, float], view: str
 ) -> float:
-    """Return the relative RMSE between pictures of the posed head and of the rebuilt one."""
+    """Return the relative RMSE between pictures of a posed head and of a head loaded in that shape.
+
+    person : (p, 3) positions in the rest pose [mm]
+    weights : morph target weights of the expression
+    view : camera preset
+    """
     rebuilt = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = VIEWS[view]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
@@ -103,7 +115,10 @@ def picture_error(
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield lines of the table of expressions: the worst person from the front and from behind."""
+    """Yield Markdown rows with picture errors by expression: the worst person, from front and back.
+
+    persons : positions in the rest pose by name of the person [mm]
+    """
     worst = dict.fromkeys(VIEWS, 0.0)
     for name, weights in EXPRESSIONS.items():
         errors = {
@@ -116,7 +131,10 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield lines of the table of seams: in the rest pose, in expressions, and of other people."""
+    """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and of other people.
+
+    persons : positions in the rest pose by name of the person [mm]
+    """
     rest_points = head.positions_mm
     yield _seam_row(renderer, "at rest", head, head, None)
     for name in ("open jaw", "smile", "puffed cheeks"):
@@ -129,13 +147,13 @@ def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> 
 
 
 def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
-    """Return a line with the jumps of light across the seams of a posed head.
+    """Return a Markdown row with the discontinuity of light across the seams of a posed head.
 
-    shape : head in the same pose, whose points define the seams
+    shape : head loaded in the shape of the pose, whose points define the seams
     """
     cells = []
     for where in (blur.neck_points, blur.back_points):
-        sides = blur.seam_sides(shape, where)
+        sides = blur.seam_side_points(shape, where)
         scene = replace(blur.striped_scene(head), pose=pose)
         vars(scene.head)["centre_mm"] = shape.centre_mm  # the stripes of light are relative to it
         errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
@@ -144,7 +162,7 @@ def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose
 
 
 def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield lines of the table of ambient occlusion."""
+    """Yield the Markdown rows on ambient occlusion in several poses."""
     neck = dict.fromkeys(("neck01", "neck02", "neck03", "head"), (0.0, 15.0, 0.0))
     poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
     poses["head turned by 60 degrees"] = Pose(bones=neck)
@@ -156,9 +174,11 @@ def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Pose, Head]]) -> Iterator[str]:
-    """Yield lines of RMS errors, over all texels and over those that change between rest and pose.
+    """Yield Markdown rows with RMS errors of the visible sky fraction in poses.
 
-    shapes : poses by name, each with the head rebuilt in it
+    Errors are over all texels, and over texels where the fraction changes between rest and pose.
+
+    shapes : poses by name, each with the head loaded in its shape
     """
     scene, fine = Scene(head, environment=Environment(name="uniform")), (_REFERENCE_SIZE, _REFERENCE_SIZE)
     rest = baked_occlusion(renderer, head, head, *fine)
@@ -168,14 +188,19 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
         errors = [one - reference for one in (*maps, baked_occlusion(renderer, head, shape))]
         surface = np.isfinite(reference) & np.isfinite(rest)
         changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_CHANGE)
-        cells = (f"{rms(error[surface]):.3f} / {rms(error[changed]):.3f}" for error in errors)
+        cells = (
+            f"{root_mean_square(error[surface]):.3f} / {root_mean_square(error[changed]):.3f}"
+            for error in errors
+        )
         yield f"| {name} | {changed.sum() / surface.sum():.1%} | {' | '.join(cells)} |"
 
 
 def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int) -> Floats:
-    """Return the (n, n) visible fraction of the sky on a head's atlas for another shape; NaN off the surface.
+    """Return the visible sky fraction (n, n) of a shape, baked in the atlas of a head; NaN off the surface.
 
-    sampling : number of directions and side of depth maps; those of frames by default
+    head : head whose atlas is used
+    shape : head loaded in the shape of a pose
+    sampling : number of directions and side of depth maps [texel]; those of frames by default
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, SIDE, "stitched")
@@ -184,13 +209,16 @@ def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int)
 
 
 def frame_occlusion(renderer: Renderer, scene: Scene, mode: str) -> Floats:
-    """Return the (n, n) visible fraction of the sky that a frame of the scene uses."""
+    """Return the visible sky fraction (n, n) on the atlas that a frame of the scene uses.
+
+    mode : occlusion mode of the settings
+    """
     settings = BAKE_SETTINGS.model_copy(update={"occlusion": mode})
     renderer.draw(scene, settings)
     texture = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
     return download(renderer.device, texture)[:SIDE].astype(float)
 
 
-def rms(error: Floats) -> float:
-    """Return the root mean square."""
+def root_mean_square(error: Floats) -> float:
+    """Return the root mean square of errors."""
     return float(np.sqrt(np.mean(error**2)))

@@ -1,4 +1,4 @@
-"""Errors of the diffusion models and of fits against Monte Carlo."""
+"""Errors of diffusion models, and of fits to their profiles, against Monte Carlo."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ THICKNESSES_MM = (0.5, 1.0, 2.0, 4.0)
 
 
 def optics() -> None:
-    """Print the tables of diffusion models, fits and light through thin parts."""
+    """Print the tables of diffusion models, of fits and of light through thin parts."""
     print_tables(tables())
 
 
 def tissue_by_name(name: str) -> Tissue:
-    """Return a tissue; homogeneous skin with the index of refraction of its measurement [Jensen2001]."""
+    """Return a tissue; homogeneous skin has the index of refraction of its measurement [Jensen2001]."""
     tissue = load_tissue(name)
     return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
 
 
 def models_table() -> str:
-    """Return total and ring errors of each model for each tissue."""
+    """Return Markdown rows with the errors of total and ring energies, by diffusion model and tissue."""
     return "\n".join(row for name in TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
@@ -79,7 +79,7 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
 
 
 def counted_table() -> str:
-    """Return errors of the tabulated Monte Carlo profiles and of layered diffusion for homogeneous skin."""
+    """Return Markdown rows with errors of tabulated photon counts and of layered diffusion, by medium."""
     rows = []
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
@@ -94,7 +94,10 @@ def counted_table() -> str:
 
 
 def fits_table() -> str:
-    """Return errors of fits of each kind to ring energies of the layered profiles."""
+    """Return Markdown rows with errors of fitted Gaussians and Burley profiles, by tissue.
+
+    The fits are to the ring energies of layered diffusion.
+    """
     rows = []
     for name in TISSUES:
         profile = tissue_by_name(name).profile()
@@ -106,7 +109,10 @@ def fits_table() -> str:
 
 
 def pointwise_table() -> str:
-    """Return shape and energy errors of six shared Gaussians, for profiles with a finite centre."""
+    """Return Markdown rows with shape and energy errors of six Gaussians with shared variances.
+
+    Only profiles that are finite at radius 0 are compared.
+    """
     rows = []
     for name, model, clamp in (
         ("skin1", "dipole", "layer"),
@@ -126,7 +132,7 @@ def pointwise_table() -> str:
 
 
 def transmission_table() -> str:
-    """Return the light through a thickness by Monte Carlo, slabs and Gaussians."""
+    """Return Markdown rows with transmitted light by thickness: Monte Carlo, slabs and Gaussians."""
     rows = []
     for name in ("skin1", "dj3"):
         tissue = tissue_by_name(name)
@@ -147,7 +153,10 @@ def transmission_table() -> str:
 
 
 def error_against_published_sum(profile: RadialProfile) -> Floats:
-    """Return the shape error of a white-normalised profile against the published Gaussians, by channel."""
+    """Return the error in shape of a profile against the published Gaussians of GPU Gems 3, by channel.
+
+    The profile is scaled to total energy 1 in each channel.
+    """
     r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
     squared_error = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, log_r, axis=0)
@@ -155,7 +164,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 
 def published_errors() -> str:
-    """Return the errors of models of the published layers against the published sum of Gaussians."""
+    """Return text with the errors of diffusion models for published layers against published Gaussians."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
@@ -169,7 +178,7 @@ def published_errors() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Return all tables by their names in the page's template."""
+    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
     return {
         "models": models_table(),
         "counted": counted_table(),

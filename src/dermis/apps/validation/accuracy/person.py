@@ -1,4 +1,4 @@
-"""Path-traced views of the package's human compared with the frame, for docs/path_traced.md.
+"""Frames of the package's human compared with path-traced pictures, for docs/path_traced.md.
 
 Paths are cached on disk while they are traced, so an interrupted run continues where it stopped.
 """
@@ -34,24 +34,24 @@ MAX_BYTES = 300_000
 
 
 def with_error(estimate: Estimate, digits: int = 2) -> str:
-    """Return a number with its standard error."""
+    """Return an estimate with its standard error as text, such as "1.02 ± 0.04"."""
     return f"{estimate.value:.{digits}f} ± {estimate.standard_error:.{digits}f}"
 
 
 def view_row(pair: PersonComparison) -> str:
-    """Return a line of the table of views."""
+    """Return a Markdown row with the errors of one view."""
     channels = ", ".join(f"{one.value:.2f}" for one in pair.energy_by_channel)
     figures = f"{with_error(pair.relrmse, 3)} | {with_error(pair.energy, 3)} | {channels}"
     return f"| {pair.name} | {VIEWS[pair.name].light} | {pair.samples} | {figures} |"
 
 
 def iris_cells(pair: PersonComparison) -> dict[str, str]:
-    """Return the errors of the iris in the view of the eye, by name."""
+    """Return the errors of the iris in the eye view, by placeholder of docs/templates/path_traced.md."""
     return {name: with_error(one) for name, one in iris_errors(pair, EYE_FRAME_MM)._asdict().items()}
 
 
 def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:
-    """Return a sheet of all views, ours to the left of the reference, as WebP of limited size."""
+    """Return a sheet of all views, with the frame to the left of the reference, as a WebP file."""
     panels = {}
     for pair in pairs:
         panels[pair.name] = pair.tone_mapped(pair.ours)
@@ -60,7 +60,7 @@ def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
-    """Return panels on a sheet, as WebP of at most `MAX_BYTES`."""
+    """Return pictures on a sheet as a WebP file of at most `MAX_BYTES`."""
     picture = np.asarray(panel_sheet(panels, columns))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(picture, quality)
@@ -77,7 +77,7 @@ def person(adapter: str = "auto", side: int = SIDE, samples: int = SAMPLES) -> N
     Parameters
     ----------
     side:
-        Of the pictures [pixel].
+        Side of the pictures [pixel].
     samples:
         Paths per pixel.
     """

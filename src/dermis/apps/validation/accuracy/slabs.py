@@ -1,4 +1,4 @@
-"""Errors of light through slabs far from their rim, by direction of entry.
+"""Errors of light through slabs by direction of incidence, far from the rim of the slabs.
 
 The reference is adding and doubling (`optics/slabs.py`), which tests compare with Monte Carlo.
 """
@@ -44,9 +44,10 @@ def slabs(adapter: str = "auto") -> None:
 
 
 def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
-    """Return (2, angles, 3) fractions of entering light that leave on the near and on the far side.
+    """Return reflectance and transmittance of a slab by adding and doubling, (2, angles, 3).
 
-    g : mean cosine of scattering; the medium's coefficients are reduced ones
+    thickness : thickness of the slab [mm]
+    g : mean cosine of the scattering angle; the medium's coefficients are reduced ones
     """
     layer, response = medium.layers[0], np.empty((2, len(DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(DEGREES)), medium.eta)
@@ -59,7 +60,10 @@ def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
 
 
 def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
-    """Return the fractions (2, angles, 3) of `exact_response` as rendered by the frame."""
+    """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by the frame.
+
+    thickness : thickness of the slab [mm]
+    """
     mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
     for k, angle in enumerate(np.radians(DEGREES)):
         beam = np.array([np.sin(angle), 0.0, np.cos(angle)])
@@ -72,7 +76,10 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return Lambertian and half-space skin of a medium, in its own colour."""
+    """Return skin with a medium's profile by name of its angular distribution: Lambertian and half-space.
+
+    folder : folder for the file of the profile
+    """
     file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
     fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, name=medium.name)
     write_profile(file, fit.profile, {})
@@ -82,7 +89,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
 
 
 def error_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of relative errors, root mean square over directions and channels."""
+    """Return Markdown rows with RMS errors of reflectance and transmittance, by slab and skin."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in MEDIA:
@@ -96,7 +103,10 @@ def error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_error_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of half-space skin against forward-scattering slabs, without and with `anisotropy`."""
+    """Return Markdown rows of half-space skin against forward-scattering slabs.
+
+    The skin ignores forward scattering, or takes it into account by the setting `anisotropy`.
+    """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in MEDIA:
@@ -112,7 +122,10 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_direction_rows() -> str:
-    """Return errors of radiance below the surface of forward-scattering skin1 over all directions."""
+    """Return Markdown rows with errors of radiance below the surface of forward-scattering skin1.
+
+    Errors are over all directions of light and view.
+    """
     rows = []
     for g in (0.0, FORWARD_G):
         cells = []
@@ -136,7 +149,7 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return the error and the ratio of red light by direction, of the far side and of the near one."""
+    """Return table cells on transmittance, then on reflectance: RMS error, and ratio of red by angle."""
     flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
     for side in (1, 0):
         ours, exact = response[side], reference[side]
@@ -147,7 +160,7 @@ def _error_cells(response: Array, reference: Array) -> str:
 
 
 def forward_rows() -> str:
-    """Return rows of red light at normal incidence through forward and isotropic slabs, by Monte Carlo."""
+    """Return Markdown rows on red light through forward-scattering and isotropic slabs, by Monte Carlo."""
     rows = []
     for eta in (1.0, 1.4):
         layer = media()["skin1"].layers[0]
@@ -164,7 +177,7 @@ def forward_rows() -> str:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the tables by their names in the page's template."""
+    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
     renderer = dermis.Renderer(adapter)
     return {
         "slab_errors": error_rows(renderer),

@@ -1,4 +1,4 @@
-"""Errors of the tables of surface reflection, and the white furnace."""
+"""Errors of the albedo tables of surface reflection, and white furnaces."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ REFERENCE_NODES = (96, 96)
 
 
 def specular() -> None:
-    """Print the tables of directional albedos and of the furnace."""
+    """Print the tables of directional albedos and of the white furnace."""
     print_tables(tables())
 
 
 def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
-    """Return the directional and the mean albedo (..., 2), interpolated in the table as by the shader."""
+    """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as by the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
     coordinates = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
     return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(coordinates))
 
 
 def albedo_rows() -> str:
-    """Return rows of the models: errors of quadrature and of the interpolated table, and its time."""
+    """Return Markdown rows by lobe: errors of quadrature and of table interpolation, and computing time."""
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():
@@ -66,7 +66,12 @@ def peak_error() -> float:
 
 
 def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
-    """Return least, mean and largest outgoing over incoming light of a white sphere in uniform light."""
+    """Return a table cell with minimum, mean and maximum of outgoing over incoming light.
+
+    The light is uniform, and the surface a white sphere.
+
+    model : energy conservation scheme
+    """
     albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEWS, m)
     entered = model.entering_fraction(mean, rho_s)
@@ -75,7 +80,7 @@ def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
 
 
 def furnace_rows() -> str:
-    """Return rows of the furnace for each energy model."""
+    """Return the Markdown rows of the white furnace, by energy conservation scheme."""
     return "\n".join(
         f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in SKINS)} |"
         for name, model in ENERGY_MODELS.items()
@@ -83,7 +88,7 @@ def furnace_rows() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Return all tables by their names in the page's template."""
+    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
     return {

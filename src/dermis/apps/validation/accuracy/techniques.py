@@ -1,4 +1,4 @@
-"""Scattering techniques on the scanned head against references, for docs/techniques.md."""
+"""Scattering techniques on the scanned head compared with references, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -68,22 +68,27 @@ def techniques(adapter: str = "auto") -> None:
 def _compare(
     head: Head, against: str, techniques: Sequence[str], light: str, adapter: str, **options: Any
 ) -> Comparison:
-    """Return a comparison, by default with the light's own region and number of samples."""
+    """Return a comparison in the light's default region, with the number of samples that suits it.
+
+    against : name of the reference
+    """
     defaults: dict[str, Any] = {"region": default_region(light), "samples": SAMPLES_BY_LIGHT[light]}
     defaults["settings"] = SETTINGS
     return compare(head, against, techniques, light=light, adapter=adapter, **(defaults | options))
 
 
 def table_line(first: str, row: ComparisonRow) -> str:
-    """Return a line of a table."""
+    """Return a Markdown row with the errors of a technique after a first cell."""
     return f"| {first} | " + " | ".join(cells(row)) + " |"
 
 
 def table(
     head: Head, against: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
-    """Return rows of all techniques under each light, and the comparisons by light.
+    """Return Markdown rows of all techniques under each light, and the comparisons by light.
 
+    against : name of the reference
+    medium : name of the medium
     model : scattering model of the medium's profile
     """
     rows, comparison = [TABLE_HEADER], {}
@@ -98,7 +103,7 @@ def table(
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a row of the laser's stripe against heat, on an atlas of 2048."""
+    """Return a Markdown row on the laser's stripe against the heat equation, with an atlas of 2048 texels."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     comparison = _compare(
         head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
@@ -107,7 +112,7 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
 
 
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
-    """Return rows of errors against path tracing, by the model of the medium's profile.
+    """Return Markdown rows of errors against path tracing, by scattering model of the profile.
 
     path_traced : comparisons with Monte Carlo profiles, by medium and light
     """
@@ -125,14 +130,19 @@ def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]]
 
 
 def _error_and_energy(comparison: Comparison, row: ComparisonRow) -> str:
-    """Return the error, and the energy ratio in red, green and blue."""
+    """Return table cells with the relative RMSE, and the energy ratio in red, green and blue."""
     reference = comparison.reference
     _, energy = errors_by_channel(comparison.images[row.technique], reference, reference.mask)
     return f"{row.relrmse:.4f} | {energy}"
 
 
 def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return errors of Lambertian skin with a half-space's directional albedo, under the front light."""
+    """Return text with the error and energy of Lambertian skin with a half-space's directional albedo.
+
+    The scene has the front light; these errors are the least that Lambertian skin can have.
+
+    path_traced : comparison with path tracing in this light
+    """
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
     visible = surface_points(renderer, scene, SETTINGS)
@@ -159,7 +169,10 @@ def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) 
 
 
 def by_direction(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return the table of texture space with Lambertian and half-space skin, on a head and on a ball."""
+    """Return Markdown rows comparing Lambertian and half-space skin with path tracing, on head and ball.
+
+    lights : paths per pixel by name of the light
+    """
     lines = [DIRECTION_HEADER]
     for light, samples in lights.items():
         lines += _direction_rows(head, light, default_region(light), samples, settings, adapter)
@@ -196,7 +209,10 @@ def _direction_rows(
 
 
 def errors_by_channel(image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
-    """Return the relative RMSE and the energy ratio, each in red, green and blue."""
+    """Return table cells with relative RMSE and energy ratio, each in red, green and blue.
+
+    mask : (h, w) pixels to compare
+    """
     parts = [(image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)]
     measures = (relative_rmse, energy_ratio)
     return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

@@ -1,4 +1,4 @@
-"""Contributions to the error of texture-space diffusion against the surface integral."""
+"""Sources of the error of texture-space diffusion against the surface integral."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
-    """Return the tables by their names in docs/templates/techniques.md."""
+    """Return the Markdown rows by placeholder of docs/templates/techniques.md."""
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in LIGHTS:
         region = default_region(light)
         with comparison_subject(head, light, region, "skin1", settings, adapter, "layered") as subject:
-            integral, uniform = surface_integral(subject, 0), uniform_light(subject)
+            integral, uniform = surface_integral(subject, 0), uniform_light_integral(subject)
             normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM))
             rows["by_atlas"] += atlas_rows(subject, integral, normalised, light)
             rows["zero_width"].append(zero_width_row(subject, light))
@@ -62,7 +62,12 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 
 
 def render(subject: ComparisonSubject, technique: str, **changes: object) -> Floats:
-    """Return linear radiance at one sample per pixel without interreflection, as in the references."""
+    """Return the linear radiance (h, w, 3) of a technique, at the sampling of the references.
+
+    There is one sample per pixel and no interreflection.
+
+    changes : further settings
+    """
     fixed_settings = {"technique": technique, "samples": 1, "interreflection": False}
     values = subject.settings.model_dump() | fixed_settings | changes
     image = subject.renderer.draw(subject.scene, Settings(**values)).linear()
@@ -72,7 +77,12 @@ def render(subject: ComparisonSubject, technique: str, **changes: object) -> Flo
 def atlas_rows(
     subject: ComparisonSubject, integral: ReferenceImage, normalised: ReferenceImage, light: str
 ) -> list[str]:
-    """Return rows of texture space by atlas size, relative to no scattering, against two references."""
+    """Return Markdown rows with errors of texture space by atlas size, against two references.
+
+    Errors are also given relative to those without scattering.
+
+    integral, normalised : surface integral, and the integral divided by that of uniform light
+    """
     unscattered, rows = render(subject, "none"), []
     for side in ATLASES:
         image, cells = render(subject, "texture-space", atlas=side), [light, str(side)]
@@ -85,7 +95,10 @@ def atlas_rows(
 
 
 def zero_width_row(subject: ComparisonSubject, light: str) -> str:
-    """Return the error of the reference's sampling: a very narrow profile against the irradiance."""
+    """Return a Markdown row with the sampling error of the surface integral.
+
+    It is the difference between the integral of a very narrow profile and the irradiance.
+    """
     narrow_profile = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
     incident = render(subject, "none") / subject.profile.albedo
@@ -93,8 +106,8 @@ def zero_width_row(subject: ComparisonSubject, light: str) -> str:
     return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
-def uniform_light(subject: ComparisonSubject) -> Floats:
-    """Return the surface integral (h, w, 3) of an irradiance of 1 everywhere; 1 outside the head."""
+def uniform_light_integral(subject: ComparisonSubject) -> Floats:
+    """Return the surface integral (h, w, 3) for an irradiance of 1 everywhere; 1 outside the head."""
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -105,13 +118,19 @@ def uniform_light(subject: ComparisonSubject) -> Floats:
 
 
 def mean_and_percentile(uniform: Floats) -> str:
-    """Return the mean and 95th percentile by channel."""
+    """Return the mean and the 95th percentile of each channel as text.
+
+    uniform : (n, 3) surface integral in uniform light
+    """
     pairs = zip(uniform.mean(axis=0), np.percentile(uniform, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
 def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str) -> list[str]:
-    """Return rows of the error by region, and of the error that a perfect atlas would still have."""
+    """Return Markdown rows with errors by region of the face, and those that a perfect map would have.
+
+    The heat equation on the surface takes the place of a perfect map.
+    """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None
     none, ours = render(subject, "none"), render(subject, "texture-space")

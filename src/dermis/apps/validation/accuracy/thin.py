@@ -29,7 +29,7 @@ Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array, Array], Mask]  # mask of points from their positions and normals
 MATTE = Skin(albedo="profile", rho_s=0.0)
 PROFILE = load_profile("gpu-gems-3")
-BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
+BLURRED_PROFILE = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 ANGLES = (5.0, 10.0, 20.0, 30.0, 45.0)
 ATLAS = 1024
@@ -44,8 +44,10 @@ def thin(adapter: str = "auto") -> None:
 def scattered_light(
     renderer: dermis.Renderer, mesh: Mesh, beam: Array, skin: Skin, atlas: int, **values: str
 ) -> tuple[Array, Array, Array]:
-    """Return (n, 3) positions, normals and scattered light of a mesh's texels in a beam without shadows.
+    """Return positions, normals and scattered light (n, 3) of a mesh's texels in parallel light.
 
+    beam : (3,) direction of the light, which casts no shadows
+    atlas : side of the atlas [texel]
     values : further settings of the frame
     """
     light = DirectionalLight(direction=tuple(beam), irradiance=(1.0, 1.0, 1.0), shadows=False)
@@ -64,34 +66,44 @@ def scattered_light(
 
 
 def integrated_light(mesh: Mesh, beam: Array, points: Array, spacing: float) -> Array:
-    """Return the light at points by the profile of Euclidean distance, integrated over the surface."""
+    """Return the scattered light (n, 3) at points by integrating the profile over the surface.
+
+    The profile is a function of Euclidean distance.
+
+    beam : (3,) direction of the light
+    spacing : largest distance of the irradiance samples [mm]
+    """
 
     def light(samples: MeshPoints) -> Array:
         normals = samples.interpolate(mesh, mesh.normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         return np.repeat(np.maximum(normals @ -beam, 0.0)[:, None], 3, axis=1)
 
-    profile = ReferenceProfile(BLURRED.weight, BLURRED.variance_mm2)
+    profile = ReferenceProfile(BLURRED_PROFILE.weight, BLURRED_PROFILE.variance_mm2)
     samples = sample_irradiance(mesh, light, spacing)
     return integrate_exitance(points, samples, profile, 0.002)
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return light through slabs far from their rim, in the frame and by the profile."""
+    """Return Markdown rows with light through slabs far from their rim, by the frame and by the profile."""
     rows = []
     for thickness in THICKNESSES_MM:
         beam = np.array([0.0, 0.0, 1.0])
         slab = wedge(60.0, thickness, thickness)
         points, normals, light = scattered_light(renderer, slab, beam, MATTE, 256, transmission="thin")
         inner = (normals[:, 2] > 0.9) & (np.abs(points[:, :2]).max(axis=1) < 12.0)
-        rendered, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED, thickness)
+        rendered, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED_PROFILE, thickness)
         cells = (" ".join(f"{value:.4f}" for value in one) for one in (rendered, exact))
         rows.append(f"| {thickness:g} mm | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
 def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> Array:
-    """Return the part of the integrated red light whose straight path crosses air."""
+    """Return the red light (n,) of the surface integral whose straight path to a point crosses air.
+
+    beam : (3,) direction of the light
+    points, normals : (n, 3) positions and surface normals
+    """
 
     def light(points: MeshPoints) -> Array:
         cosine = points.interpolate(mesh, mesh.normals) @ -beam
@@ -104,15 +116,17 @@ def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> 
     flux = area * samples.irradiance[samples.triangles][..., 0].mean(axis=1)
     lit = np.flatnonzero(flux)
     sources, outward = corners[lit].mean(axis=1), across[lit] / (2.0 * area[lit, None])
-    neighbours = cKDTree(sources).query_ball_point(points, 4.0 * np.sqrt(BLURRED.variance_mm2[-1]))
+    neighbours = cKDTree(sources).query_ball_point(points, 4.0 * np.sqrt(BLURRED_PROFILE.variance_mm2[-1]))
     total = np.zeros(len(points))
     for i, j in enumerate(neighbours):
         towards = sources[j] - points[i]
         facing = (towards * outward[j]).sum(axis=1) < towards @ normals[i]
         turned_away = outward[j] @ normals[i] < 0.5
         square = (towards**2).sum(axis=1)[facing & turned_away, None]
-        profile = np.exp(-0.5 * square / BLURRED.variance_mm2) / (2.0 * np.pi * BLURRED.variance_mm2)
-        total[i] = flux[lit][j][facing & turned_away] @ profile @ BLURRED.weight[:, 0]
+        profile = np.exp(-0.5 * square / BLURRED_PROFILE.variance_mm2) / (
+            2.0 * np.pi * BLURRED_PROFILE.variance_mm2
+        )
+        total[i] = flux[lit][j][facing & turned_away] @ profile @ BLURRED_PROFILE.weight[:, 0]
     return total
 
 
@@ -126,9 +140,13 @@ def comparison_cells(
     *,
     air: bool,
 ) -> str:
-    """Return energy ratio and relative RMSE against the integral, without and with transmission.
+    """Return table cells with energy ratio and relative RMSE against the surface integral.
 
-    air : also the energy against the integral without the light that crosses air
+    Cells without light through thin parts precede those with it.
+
+    point_filter : selects the compared points by position and normal
+    spacing : largest distance of the irradiance samples [mm]
+    air : whether to add the energy ratio to the integral without light that crosses air
     """
     cells = []
     for transmission in ("none", "thin"):
@@ -147,7 +165,7 @@ def comparison_cells(
 
 
 def wedge_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of red light on the dark face of wedges lit from behind, within 15 mm of their edge."""
+    """Return Markdown rows on red light through wedges lit from behind, within 15 mm of their edge."""
     rows = []
     for angle in ANGLES:
         mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
@@ -162,7 +180,7 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
 
 
 def ear_rows(renderer: dermis.Renderer) -> str:
-    """Return rows of red light on the dark side of ears, lit from behind and from the front."""
+    """Return Markdown rows on red light through ears, lit from behind and from the front."""
     rows = []
     for name in ("lee_perry_smith", "human"):
         head = dermis.load_head(name, subdivide=0)
@@ -181,7 +199,7 @@ def ear_rows(renderer: dermis.Renderer) -> str:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the tables by their names in the page's template."""
+    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
     renderer = dermis.Renderer(adapter)
     rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}
     return {name: make(renderer) for name, make in rows.items()}

@@ -1,1 +1,1 @@
-"""Frame times on this machine, stage by stage, compared with the limit by memory bandwidth."""
+"""Benchmark of frame times on this machine by stage, compared with the limit by memory bandwidth."""

@@ -1,4 +1,4 @@
-"""Benchmark cases: a base frame, others that each vary one parameter, and their scenes."""
+"""Benchmark cases: a base frame, frames that each vary one parameter, and their scenes."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ _RIG_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
 
 
 @dataclass(frozen=True)
-class Case:
-    """Frame to measure.
+class BenchmarkCase:
+    """Parameters of a frame to measure.
 
-    image : (width, height) [pixel]
-    atlas : side of the irradiance map [texel]
-    gaussians : number of Gaussians of the profile
+    image : (width, height) of the picture [pixel]
+    atlas : side of the atlas [texel]
+    gaussians : number of Gaussians of the diffusion profile
     lights : number of spot lights with shadows
-    environment : name of a panorama, "" for none
+    environment : name of a panorama; "" for none
     subdivide : subdivision level of the head, each with four times the triangles
-    targets : morph targets that all move in each frame, with four bones; 0 for a static head
+    targets : number of morph targets that move in each frame, with four bones; 0 for a static head
     samples : samples per pixel
-    technique : of `Settings`, or `FRAGMENT_TECHNIQUE`
-    varies : parameter that differs from the base frame, "" for the base frame
+    technique : scattering technique of `Settings`, or `FRAGMENT_TECHNIQUE`
+    varies : name of the parameter that differs from the base frame; "" for the base frame
     """
 
     image: tuple[int, int] = (1920, 1080)
@@ -58,10 +58,10 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Preset:
-    """Base frame, and the values that each of its parameters takes in turn."""
+class BenchmarkPreset:
+    """Set of benchmark cases: a base frame, and for each of its parameters the alternatives to measure."""
 
-    usual: Case
+    base_case: BenchmarkCase
     image: tuple[tuple[int, int], ...]
     atlas: tuple[int, ...]
     gaussians: tuple[int, ...]
@@ -71,36 +71,36 @@ class Preset:
     environment: tuple[str, ...] = ("uniform",)
     technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENT_TECHNIQUE)
 
-    def cases(self) -> list[Case]:
-        """Return the base frame, then the others."""
-        cases = [self.usual]
+    def cases(self) -> list[BenchmarkCase]:
+        """Return the base frame, then the frames that vary one parameter of it."""
+        cases = [self.base_case]
         sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
         for name in ("technique", *sizes):
             for value in getattr(self, name):
-                if value != getattr(self.usual, name):
-                    cases.append(replace(self.usual, varies=name, **{name: value}))
+                if value != getattr(self.base_case, name):
+                    cases.append(replace(self.base_case, varies=name, **{name: value}))
         return cases
 
 
-PRESETS: dict[str, Preset] = {
-    "film": Preset(
-        Case((3840, 2160), atlas=4096, gaussians=8, lights=5, subdivide=2, samples=16),
+BENCHMARK_PRESETS: dict[str, BenchmarkPreset] = {
+    "film": BenchmarkPreset(
+        BenchmarkCase((3840, 2160), atlas=4096, gaussians=8, lights=5, subdivide=2, samples=16),
         image=((1920, 1080), (2048, 2048), (3840, 2160)),
         atlas=(1024, 2048, 4096),
         gaussians=(1, 4, 6, 8),
         lights=(1, 3, 5, 8),
         subdivide=(0, 1, 2, 3),
     ),
-    "interactive": Preset(
-        Case(),
+    "interactive": BenchmarkPreset(
+        BenchmarkCase(),
         image=((512, 512), (1024, 1024), (1920, 1080), (3840, 2160)),
         atlas=(512, 1024, 2048, 4096),
         gaussians=(1, 2, 4, 6, 8),
         lights=(1, 2, 3, 5, 8),
         subdivide=(0, 1, 2, 3),
     ),
-    "cpu": Preset(
-        Case((1024, 1024), atlas=1024),
+    "cpu": BenchmarkPreset(
+        BenchmarkCase((1024, 1024), atlas=1024),
         image=((256, 256), (512, 512), (1024, 1024)),
         atlas=(256, 512, 1024),
         gaussians=(1, 3, 6, 8),
@@ -110,41 +110,46 @@ PRESETS: dict[str, Preset] = {
 }
 
 
-def case_settings(case: Case) -> Settings:
-    """Return the settings of a case."""
+def case_settings(case: BenchmarkCase) -> Settings:
+    """Return the frame settings of a benchmark case."""
     return Settings(size=case.image, atlas=case.atlas, samples=case.samples, technique=case.technique)
 
 
-def case_scenes(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
-    """Return `count` scenes of a case, in which camera, lights and a moving head change each time.
+def case_scenes(case: BenchmarkCase, head: Head, folder: Path, count: int) -> list[Scene]:
+    """Return consecutive scenes of a case, so that no frame can reuse results of the frame before.
 
-    folder : for the profile's file
+    Camera and lights move in each scene, and so does the head if the case has morph targets.
+
+    folder : folder for the file of the profile
+    count : number of scenes
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
-    lights = _lights(case.lights)
+    lights = _spot_lights(case.lights)
     environment = Environment(name=case.environment) if case.environment else None
     head = with_test_rig(head, case.targets) if case.targets else head
     scenes = []
     for k in range(count):
         shift = _SHIFT_MM * math.sin(1.0 + k)
-        moved = [light.model_copy(update={"position": _shifted(light.position, shift)}) for light in lights]
-        moved_camera = camera.model_copy(update={"position": _shifted(camera.position, shift)})
+        moved = [
+            light.model_copy(update={"position": _shift_along_x(light.position, shift)}) for light in lights
+        ]
+        moved_camera = camera.model_copy(update={"position": _shift_along_x(camera.position, shift)})
         pose = pose_at_moment(head, k) if case.targets else None
         scenes.append(Scene(head, tuple(moved), moved_camera, skin, environment, pose))
     return scenes
 
 
-def _shifted(position: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
+def _shift_along_x(position: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
     return position[0] + shift, *position[1:]
 
 
-def _lights(count: int) -> list[PointLight]:
-    """Return the studio's spot lights, then the same ones rotated about the head."""
+def _spot_lights(count: int) -> list[PointLight]:
+    """Return a given number of spot lights: those of the studio preset, then copies turned about the head."""
     rig = [light for light in studio() if isinstance(light, PointLight)]
-    return [_rotated(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(count)]
+    return [_rotate_light(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(count)]
 
 
-def _rotated(light: PointLight, degrees: float) -> PointLight:
+def _rotate_light(light: PointLight, degrees: float) -> PointLight:
     x, y, z = light.position
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
@@ -160,7 +165,7 @@ def _profile_file(count: int, folder: Path) -> Path:
 
 
 def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
-    """Return a profile with `count` Gaussians, the same albedo and the same widest Gaussian."""
+    """Return a profile resampled to `count` Gaussians, with its albedo and its widest Gaussian unchanged."""
     if count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
@@ -180,22 +185,31 @@ Doubles = NDArray[np.float64]
 
 
 def with_test_rig(head: Head, targets: int) -> Head:
-    """Return the head with `targets` morph targets, and a column of bones instead of its skeleton."""
+    """Return the head with synthetic morph targets and bones in place of its own rig.
+
+    targets : number of morph targets
+    """
     points = head.positions_mm.astype(np.float64)
-    rig = replace(head.control, targets=_targets(points, targets), skeleton=_skeleton(points))
+    rig = replace(head.control, targets=_synthetic_targets(points, targets), skeleton=_bone_chain(points))
     return replace(head, rig=rig)
 
 
 def pose_at_moment(head: Head, moment: int) -> Pose:
-    """Return a pose in which every target and every bone differs from the moment before."""
+    """Return a pose of the synthetic rig in which every target and bone differs from the previous moment.
+
+    moment : index of the frame
+    """
     weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
     angles = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
     bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, angles, strict=True)}
     return Pose(weights, bones)
 
 
-def _targets(points: Doubles, count: int) -> MorphTargets:
-    """Return smooth displacements, each of a sixth of the points around one of them."""
+def _synthetic_targets(points: Doubles, count: int) -> MorphTargets:
+    """Return synthetic morph targets: smooth bumps that each displace a sixth of the points.
+
+    points : (p, 3) positions of the points in the rest pose [mm]
+    """
     centres = points[np.linspace(0, len(points) - 1, count).astype(int)]
     nearest = max(1, int(_TARGET_FRACTION * len(points)))
     moved, deltas = [], []
@@ -211,8 +225,11 @@ def _targets(points: Doubles, count: int) -> MorphTargets:
     return MorphTargets(names, first.astype(np.int32), point, np.concatenate(deltas).astype(np.float32))
 
 
-def _skeleton(points: Doubles) -> Skeleton:
-    """Return a vertical chain of bones; each point is weighted between the two nearest ones."""
+def _bone_chain(points: Doubles) -> Skeleton:
+    """Return a vertical chain of bones; each point is weighted between the two nearest ones in height.
+
+    points : (p, 3) positions of the points in the rest pose [mm]
+    """
     low, high = points[:, 1].min(), points[:, 1].max()
     step = (high - low) / BONE_COUNT
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))

@@ -1,4 +1,4 @@
-"""Lower bounds of stage times: the bytes that each stage must move, at the rate of a copy."""
+"""Lower bounds ("floors") of stage times: the bytes that a stage must move, at the rate of a copy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
 from dermis.gpu import CommandList, ComputeProgram, Device, Texture, download, make_texture
 from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
-_MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
+_MAP_BINDINGS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # in the buffers of triangles and of positions
 _GUTTER_ENTRY_BYTES = 16
 _INDEX_BYTES = 4  # of a source's index
@@ -32,10 +32,10 @@ _COPIES, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
 class FrameTraffic:
     """Inputs of a frame, and counts that determine its memory traffic.
 
-    texels : atlas texels that show the surface
-    head_pixels : pixels that show the head
-    shadow_texels : texels of all shadow maps that show the head
-    vertices : vertices of the mesh
+    texels : number of atlas texels that show the surface
+    head_pixels : number of pixels that show the head
+    shadow_texels : number of texels of all shadow maps that show the head
+    vertices : number of vertices of the mesh
     """
 
     inputs: FrameInputs
@@ -46,7 +46,10 @@ class FrameTraffic:
 
 
 def frame_traffic(device: Device, inputs: FrameInputs, vertices: int) -> FrameTraffic:
-    """Return the counts of a frame that was drawn."""
+    """Return the inputs of a frame that has been drawn, with the counts that its memory traffic depends on.
+
+    vertices : number of vertices of the mesh
+    """
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     head_pixels = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
@@ -55,7 +58,7 @@ def frame_traffic(device: Device, inputs: FrameInputs, vertices: int) -> FrameTr
 
 
 def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
-    """Return bytes by stage: inputs read once and results written once, in the formats in use.
+    """Return the least memory traffic of each stage: inputs read once and results written once [byte].
 
     Only texels with a surface and pixels of the head count where others are not needed. Repeated reads within
     a stage or a blur, scratch space between two passes, and tables that fit in caches are not counted.
@@ -80,7 +83,10 @@ def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
 
 
 def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, float]:
-    """Return bytes of the stages that light the atlas and diffuse the light."""
+    """Return the memory traffic of the stages that light the atlas and diffuse the light [byte].
+
+    shadow_bytes : bytes of a texel in all shadow maps
+    """
     inputs, texels, levels = traffic.inputs, traffic.texels, traffic.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
     entered = texels * FORMAT_BYTES[levels.texel]
@@ -98,9 +104,11 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texels: int) -> float:
-    """Return bytes that blurs read of the surface: stretch, extent of the chart, and gutters.
+    """Return the bytes that blurs read about the surface: stretch, extent of charts, and gutters.
 
     The passes of GPU Gems 3 blur the stretch map along with the light instead.
+
+    texels : number of atlas texels that show the surface
     """
     levels, finest, blur = inputs.resources.diffusion.levels, inputs.layouts[0].atlas, inputs.blurs[0]
     if isinstance(levels, StretchedLevels):
@@ -117,7 +125,7 @@ def _blur_surface_bytes(inputs: FrameInputs, texels: int) -> float:
 
 
 def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
-    """Return bytes of translucency: pairs with their texels, light of the sources, transmitted light.
+    """Return the memory traffic of translucency: pairs with their texels, source light, transmitted light.
 
     Tables of slabs depend on the direction of the light at the sources, so they also read the surface there.
     """
@@ -131,13 +139,13 @@ def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return bytes of the head's maps that this number of points reads, one texel each."""
-    textures = [cast(Texture, inputs.bindings[name]) for name in _MAPS]
+    """Return the bytes of the head's maps that are read for a number of surface points, one texel each."""
+    textures = [cast(Texture, inputs.bindings[name]) for name in _MAP_BINDINGS]
     return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 
 
 def copy_rate(device: Device) -> float:
-    """Return the median rate of reads and writes in a pass that copies a texture [byte/s].
+    """Return the memory bandwidth, reads and writes, of a pass that copies a texture [byte/s].
 
     Raises DermisError when the device has no timestamps.
     """
@@ -145,13 +153,18 @@ def copy_rate(device: Device) -> float:
     side = _SIDE_ON_CPU if software else _SIDE
     program = ComputeProgram(device, Path(__file__).parent / "copy.wgsl")
     textures = [make_texture(device, (side, side), "rgba32float") for _ in range(2)]
-    times = [_copy(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))]
+    times = [
+        _copy_ms(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))
+    ]
     traffic = 2 * _COPIES * side * side * texel_bytes(textures[0])
     return traffic / (1e-3 * statistics.median(times[-_REPEATS:]))
 
 
-def _copy(device: Device, program: ComputeProgram, textures: list[Any]) -> float:
-    """Return the time of copies back and forth [ms]."""
+def _copy_ms(device: Device, program: ComputeProgram, textures: list[Any]) -> float:
+    """Return the device time of copying a texture back and forth several times [ms].
+
+    textures : two textures of equal size
+    """
     frame = CommandList(device)
     for source, target in (textures, textures[::-1]) * (_COPIES // 2):
         frame.compute("copy", program, {"source": source, "destination": target}, source.size[:2])

@@ -1,4 +1,4 @@
-"""Passes of GPU Gems 3 (2007) in the graphics pipeline, as a baseline to measure against."""
+"""Passes of GPU Gems 3 (2007) in the graphics pipeline, as a baseline for benchmarks."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ _FOLDER = Path(__file__).parent
 
 
 class FragmentPasses(GpuGems3):
-    """Technique that lights the atlas, blurs it and sums the levels in render passes.
+    """Technique of GPU Gems 3 with render passes instead of compute passes.
 
     Its results differ from those of `GpuGems3` by rounding to half precision only.
     """
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
-        """Return textures for the irradiance and the blurred levels, all in half precision."""
+        """Return textures for the irradiance and the pyramid levels, all in half precision."""
         count = max(map(len, halvings))
         stack = make_texture(device, (side, side), HALF_FORMAT, layers=count, use="raster")
         scratch, *stretch = (make_texture(device, (side, side), HALF_FORMAT, use="raster") for _ in range(3))
@@ -54,11 +54,11 @@ class FragmentPasses(GpuGems3):
         return StretchedLevels((stack,), (0,), scratch, side, HALF_FORMAT, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Texture:
-        """Return the texture of the sum."""
+        """Return the texture for the weighted sum of the pyramid levels."""
         return make_texture(device, (side, side), FLOAT_FORMAT, use="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Light the atlas, blur the light and sum the levels."""
+        """Record the passes that light the atlas, blur the light and sum the levels; return the sum."""
         resources = inputs.resources
         levels = resources.diffusion.levels
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
@@ -77,7 +77,10 @@ class FragmentPasses(GpuGems3):
         return resources.scattered
 
     def blur_program(self, device: Device, constants: Constants) -> RenderProgram:
-        """Return the program of the pass along one axis."""
+        """Return the render program of a blur along one axis.
+
+        constants : pipeline constants of the shader
+        """
         return _fragment_program(device, "gpu_gems_3_fragment.wgsl", constants, [HALF_FORMAT, HALF_FORMAT])
 
     def draw_blur(
@@ -88,7 +91,7 @@ class FragmentPasses(GpuGems3):
         into: TexturePair,
         side: int,
     ) -> None:
-        """Fill a texture of light and one of stretch."""
+        """Record the render pass of a blur along one axis, into a texture of light and one of stretch."""
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
         graph.fill("diffuse", shader, bound, into)
 

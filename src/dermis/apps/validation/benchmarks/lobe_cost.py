@@ -1,4 +1,4 @@
-"""Device time per evaluation of each lobe of surface reflection."""
+"""Device time of evaluating each lobe of surface reflection."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _SIDE_ON_CPU, _LIGHTS_ON_CPU = 256, 16
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
-    """Return device time per evaluation by model and Fresnel term, as named in MODELS and FRESNEL [ns].
+    """Return the device time per evaluation by lobe model and Fresnel term [ns].
 
-    It is the inverse throughput of the whole device, less the cost of the loop without the lobe.
+    It is the inverse throughput of the whole device, less the cost of the loop without the lobe. The keys are
+    names in MODELS and FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (_SIDE_ON_CPU, _LIGHTS_ON_CPU) if on_cpu else (_SIDE, _LIGHTS)
@@ -54,7 +55,11 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
 
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
-    """Return the time of one pass by timestamps, or elapsed time without them [ms]."""
+    """Return the time of one compute pass by timestamps, or by the clock without them [ms].
+
+    bound : resources by the names of their bindings
+    side : side of the square of invocations
+    """
     frame = CommandList(device)
     started = time.perf_counter()
     frame.compute("lobe", program, bound, (side, side))

@@ -1,4 +1,4 @@
-"""Measurement of one case: device time by stage, elapsed time, host time and memory."""
+"""Measurement of one benchmark case: device time by stage, elapsed time, host time and memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from dataclasses import asdict, dataclass
 from itertools import cycle, islice
 from pathlib import Path
 
-from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, Case, case_scenes, case_settings
+from dermis.apps.validation.benchmarks.cases import (
+    FRAGMENT_TECHNIQUE,
+    BenchmarkCase,
+    case_scenes,
+    case_settings,
+)
 from dermis.apps.validation.benchmarks.floor import frame_traffic, stage_bytes
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES
 from dermis.frame.renderer import Renderer
@@ -24,12 +29,12 @@ from dermis.scene.techniques import TECHNIQUES
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """Numbers of frames to draw.
+    """Numbers of frames to draw for the measurements of a case.
 
-    warmup : before any measurement, because an idle GPU has a reduced clock rate
-    between : between two frames whose stages are timed, to keep the clock rate up
+    warmup : frames before any measurement, because an idle GPU has a reduced clock rate
+    between : frames between two frames whose stages are timed, to keep the clock rate up
     timed : frames whose stages are timed
-    sequence : consecutive frames, for the mean time of one
+    sequence : consecutive frames from which the mean time of one is derived
     """
 
     warmup: int = 100
@@ -38,7 +43,7 @@ class FrameCounts:
     sequence: int = 100
 
     def within(self, seconds: float, frame_ms: float) -> FrameCounts:
-        """Return fewer frames where these would take longer than `seconds` at `frame_ms` each."""
+        """Return the numbers reduced so that a case takes at most `seconds`, at `frame_ms` per frame."""
         frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
         fraction = min(1.0, 1e3 * seconds / (frame_ms * frames))
         counts = asdict(self).items()
@@ -51,19 +56,19 @@ _MAX_CASE_S = 30.0  # time limit for the frames of one case
 
 @dataclass(frozen=True)
 class BenchmarkRow:
-    """Measurements of one case; medians.
+    """Measured times of one benchmark case, which are medians, and its memory.
 
-    triangles : of the head
-    frame_ms : elapsed time of a frame in a sequence, with several in flight
-    gpu_ms : device time by stage, each in a separate pass, and "total"; on GPUs the total is that of other
-        frames, whose stages share one pass as usual, and less than the sum
-    floor_ms : the stage's bytes at the rate of a copy, and "total"
-    python_ms : time to prepare, record and submit a frame while the device is idle
-    image_ms : time from the end of a frame to its bytes in NumPy
-    memory_mb : textures and buffers
+    triangles : number of triangles of the head
+    frame_ms : elapsed time per frame in a sequence, with several frames in flight
+    gpu_ms : device time by stage, with a separate pass for each, and "total"; on GPUs the total is measured
+        in other frames, whose stages share a pass as usual, and is less than the sum
+    floor_ms : lower bound of each stage's time, by its memory traffic, and "total"
+    python_ms : host time to prepare, record and submit a frame while the device is idle
+    image_ms : time from the end of a frame to its picture in NumPy
+    memory_mb : memory of textures and buffers [MB]
     """
 
-    case: Case
+    case: BenchmarkCase
     adapter: str
     triangles: int
     frame_ms: float
@@ -75,16 +80,20 @@ class BenchmarkRow:
 
     @property
     def floor_ratio(self) -> float:
-        """Return the device time of the whole frame over its floor."""
+        """Return the device time of the whole frame over its lower bound."""
         return self.gpu_ms["total"] / self.floor_ms["total"]
 
 
 def measure_case(
-    renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, counts: FrameCounts
+    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, rate: float, counts: FrameCounts
 ) -> BenchmarkRow:
-    """Draw a case many times, with a moving camera and lights; fewer times where that would take long.
+    """Draw many frames of a case with moving camera and lights, and return its measurements.
 
-    rate : rate of a copy [byte/s]
+    A slow device draws fewer frames.
+
+    folder : folder for the file of the profile
+    rate : memory bandwidth of a copy [byte/s]
+    counts : numbers of frames to draw
 
     Raises DermisError for frames that the device cannot hold.
     """
@@ -93,7 +102,7 @@ def measure_case(
 
 
 def _measure_case(
-    renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, counts: FrameCounts
+    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, rate: float, counts: FrameCounts
 ) -> BenchmarkRow:
     settings = case_settings(case)
     first, *other_scenes = case_scenes(case, head, folder, max(counts.sequence, counts.timed, 2))
@@ -119,9 +128,10 @@ def _measure_case(
 
 
 def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
-    """Return the time of consecutive frames until the last one is done [ms].
+    """Return the elapsed time of drawing consecutive frames until the last one is done [ms].
 
-    scenes : each differs from the one before, so that nothing that depends on camera and lights is reused
+    scenes : scenes that all differ, so that no result that depends on camera and lights is reused
+    count : number of frames
     """
 
     def draw() -> None:
@@ -137,7 +147,7 @@ def stage_ms(
 ) -> dict[str, float]:
     """Return the median device time of each stage, and of the whole frame as "total" [ms].
 
-    scenes : as in `sequence_ms`
+    scenes : scenes that all differ, as for `sequence_ms`
     """
     software = renderer.device.adapter.kind == "CPU"
     timings: tuple[Timing, ...] = (True,) if software else (True, "whole")
@@ -153,7 +163,7 @@ def stage_ms(
 def _host_times_ms(
     renderer: Renderer, scenes: Iterator[Scene], settings: Settings, counts: FrameCounts
 ) -> tuple[float, float]:
-    """Return medians of the host's time before a frame, and of the transfer of its image [ms]."""
+    """Return median host times: to submit a frame, and to transfer its picture to NumPy [ms]."""
     before, after = [], []
     for k in range(max(counts.sequence, counts.timed)):
         renderer.device.wait()
@@ -173,6 +183,11 @@ def _elapsed_ms(work: Callable[[], object]) -> float:
 
 
 def _floor_ms(traffic: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
-    """Return the floor of each stage that was drawn, and "total" [ms]."""
+    """Return the lower bound of each drawn stage's time, and their sum as "total" [ms].
+
+    traffic : memory traffic by stage [byte]
+    gpu_ms : measured device time by stage
+    rate : memory bandwidth of a copy [byte/s]
+    """
     floor = {stage: 1e3 * traffic[stage] / rate for stage in gpu_ms if stage in traffic}
     return floor | {"total": sum(floor.values())}

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3, Case
+from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3, BenchmarkCase
 from dermis.apps.validation.benchmarks.measure import BenchmarkRow
 from dermis.apps.validation.benchmarks.run import Benchmark
 from dermis.apps.validation.pages import JsonObject
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def as_json(benchmark: Benchmark) -> JsonObject:
-    """Return the benchmark as one JSON-ready object; times in ms."""
+def benchmark_json(benchmark: Benchmark) -> JsonObject:
+    """Return the benchmark as a JSON object; times in ms."""
     return {
         "head": benchmark.head,
         "adapter": benchmark.adapter,
@@ -41,7 +41,7 @@ def as_json(benchmark: Benchmark) -> JsonObject:
     }
 
 
-def _case_json(case: Case) -> JsonObject:
+def _case_json(case: BenchmarkCase) -> JsonObject:
     return asdict(case) | {"image": list(case.image)}
 
 
@@ -58,7 +58,7 @@ COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
 def cells(row: BenchmarkRow) -> tuple[str, ...]:
-    """Return the figures of a row as text, in the order of COLUMNS."""
+    """Return a row's parameters and measurements as table cells, in the order of COLUMNS."""
     case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
     return (
         f"{case.image[0]}x{case.image[1]}",
@@ -75,7 +75,10 @@ def cells(row: BenchmarkRow) -> tuple[str, ...]:
 
 
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
-    """Return rows of the base frame by stage, titles first: device time, floor, ratio, GPU Gems 3."""
+    """Return the table of the base frame by stage, with the titles as its first row.
+
+    The columns are device time, lower bound, their ratio, and the times of the passes of GPU Gems 3.
+    """
     if benchmark.base_row is None:
         return []
     base_row = benchmark.base_row
@@ -104,7 +107,7 @@ def skipped_lines(benchmark: Benchmark) -> list[str]:
     return [f"skipped: {_case_text(one.case)}: {one.reason}" for one in benchmark.skipped]
 
 
-def _case_text(case: Case) -> str:
+def _case_text(case: BenchmarkCase) -> str:
     width, height = case.image
     sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
     environment_text = f", environment {case.environment}" if case.environment else ""
@@ -112,8 +115,8 @@ def _case_text(case: Case) -> str:
     return f"{sizes}{environment_text}{target_text}, subdivided {case.subdivide} times, {case.technique}"
 
 
-def summary(benchmark: Benchmark) -> str:
-    """Return the machine, the head, the date and the versions, in one line."""
+def summary_line(benchmark: Benchmark) -> str:
+    """Return the adapter, the head, the date and the library versions in one line."""
     versions = ", ".join(f"{name} {number}" for name, number in benchmark.versions.items())
     return (
         f"{benchmark.adapter} ({benchmark.driver}), {benchmark.head}, {benchmark.date}; {versions}; "
@@ -124,24 +127,24 @@ def summary(benchmark: Benchmark) -> str:
 def write_report(path: Path, benchmark: Benchmark) -> None:
     """Write tables and plots to an HTML file, atomically.
 
-    Raises DermisError when it cannot be written.
+    Raises DermisError when the file cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     page = text.substitute(
-        summary=html.escape(summary(benchmark)),
+        summary=html.escape(summary_line(benchmark)),
         published=published_text(benchmark),
-        rows=_table([COLUMNS, *(cells(row) for row in benchmark.rows)]),
+        rows=_html_table([COLUMNS, *(cells(row) for row in benchmark.rows)]),
         skipped="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(benchmark)),
-        stages=_table(stage_table(benchmark)),
+        stages=_html_table(stage_table(benchmark)),
         bars=stage_bars(benchmark.base_row) if benchmark.base_row else "",
-        scaling=scaling(benchmark),
+        scaling=scaling_plots(benchmark),
     )
     with atomic_file(path) as output:
         output.write_text(page, encoding="utf-8")
 
 
-def _table(lines: Sequence[tuple[str, ...]]) -> str:
-    """Return an HTML table whose first line has the titles."""
+def _html_table(lines: Sequence[tuple[str, ...]]) -> str:
+    """Return an HTML table whose first row has the column titles."""
     rows = []
     for number, line in enumerate(lines):
         tag = "td" if number else "th"
@@ -160,12 +163,12 @@ _AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
 
 
 def three_digits(number: float) -> str:
-    """Return a number with three significant digits, without an exponent."""
+    """Return a number as text with three significant digits, without an exponent."""
     return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
 
-def scaling(benchmark: Benchmark) -> str:
-    """Return plots of device time and floor over each size that varies, as SVG text."""
+def scaling_plots(benchmark: Benchmark) -> str:
+    """Return SVG plots of device time and its lower bound over each size that the cases vary."""
     axes_names = [name for name in _AXES if any(row.case.varies == name for row in benchmark.rows)]
     if not axes_names:
         return ""
@@ -185,7 +188,7 @@ def scaling(benchmark: Benchmark) -> str:
 
 
 def stage_bars(row: BenchmarkRow) -> str:
-    """Return device time and floor of each stage as bars, as SVG text."""
+    """Return an SVG bar chart of device time and its lower bound by stage."""
     names = [stage for stage in row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
     positions = range(len(names))
@@ -214,7 +217,7 @@ def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axe
 
 
 def _set_ticks(axis: Axis, positions: list[float] | None) -> None:
-    """Label an axis with plain numbers at the given positions, or at round ones."""
+    """Label an axis with plain numbers, at the given positions or at 1, 2 and 5 times powers of ten."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
     axis.set_major_locator(FixedLocator(positions) if positions else LogLocator(subs=(1.0, 2.0, 5.0)))

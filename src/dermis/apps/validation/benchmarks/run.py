@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from dermis.apps.validation.benchmarks.cases import Case
+from dermis.apps.validation.benchmarks.cases import BenchmarkCase
 from dermis.apps.validation.benchmarks.floor import copy_rate
 from dermis.apps.validation.benchmarks.measure import (
     CPU_FRAME_COUNTS,
@@ -34,7 +34,7 @@ ProgressCallback = Callable[[int, int], None]
 class SkippedCase:
     """Case that could not be measured, and the reason."""
 
-    case: Case
+    case: BenchmarkCase
     reason: str
 
 
@@ -42,8 +42,9 @@ class SkippedCase:
 class Benchmark:
     """Measurements of all cases on one machine.
 
-    copy_bytes_s : measured rate of a copy on the device [byte/s]
-    seconds : duration of the whole run [s]
+    copy_bytes_s : measured memory bandwidth of a copy on the device [byte/s]
+    seconds : duration of the whole benchmark [s]
+    rows : measurements of each case
     skipped : cases that could not be measured
     """
 
@@ -59,33 +60,34 @@ class Benchmark:
 
     @property
     def base_row(self) -> BenchmarkRow | None:
-        """Return the row of the base case, which all others vary; None when it was skipped."""
+        """Return the measurements of the base frame, which other cases vary; None if it was skipped."""
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> BenchmarkRow | None:
-        """Return the row of the base case with another technique; None when it was not measured."""
+        """Return the measurements of the base frame with another technique; None if it was skipped."""
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Return the device time of another technique over that of ours, in the same frame."""
+        """Return the device time of the base frame with another technique, over that of the base frame."""
         other = self.row_of(technique)
         return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
 
 
 def run_benchmark(
-    cases: list[Case],
+    cases: list[BenchmarkCase],
     head: str = "human",
     adapter: str = "auto",
     progress: ProgressCallback | None = None,
     options: Mapping[str, Any] = MappingProxyType({}),
 ) -> Benchmark:
-    """Measure the cases one after another.
+    """Measure benchmark cases one after another.
 
-    options : of `load_head`, without the subdivision level
-    progress : called with the number of finished cases and the number of all cases
+    head : name or file of the head
+    options : options of `load_head`, except the subdivision level
+    progress : function called with the number of finished cases and the number of all cases
 
-    Raises DermisError when none of them could be measured.
+    Raises DermisError when none of the cases could be measured.
     """
     started = datetime.now(UTC)
     renderer = Renderer(adapter)
@@ -109,9 +111,17 @@ def run_benchmark(
 
 
 def _measure_cases(
-    cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: ProgressCallback
+    cases: list[BenchmarkCase],
+    load: Callable[..., Head],
+    renderer: Renderer,
+    rate: float,
+    progress: ProgressCallback,
 ) -> tuple[list[BenchmarkRow], list[SkippedCase]]:
-    """Return the rows of measured cases, and the skipped cases."""
+    """Return the measurements of cases that the device can draw, and the other cases with the reasons.
+
+    load : function that returns the head for a subdivision level
+    rate : memory bandwidth of a copy [byte/s]
+    """
     counts = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
     subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
     rows: list[BenchmarkRow] = []

@@ -1,1 +1,1 @@
-"""Comparison of scattering techniques, and of rendered people, with reference images."""
+"""Comparison of scattering techniques, and of frames of people, with reference images."""

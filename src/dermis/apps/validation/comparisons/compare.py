@@ -1,4 +1,4 @@
-"""Comparison of techniques with one reference image: errors and pictures."""
+"""Comparison of scattering techniques with one reference image: pictures and errors."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _WHITE_PERCENTILE = 99.0
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """Errors of a technique, with standard errors where the reference has noise.
+    """Errors of a technique against a reference, with standard errors where the reference has noise.
 
     relrmse, relrmse_se : root mean square error over the root mean square of the reference [-]
-    flip : mean perceived difference [0..1]; None without the package flip-evaluator
-    energy_ratio, energy_ratio_se : sum of the image over that of the reference [-]
-    ms : device time of a frame
+    flip : mean perceived difference from 0 to 1 by FLIP; None without the package flip-evaluator
+    energy_ratio, energy_ratio_se : total light of the technique over that of the reference [-]
+    ms : device time of a frame [ms]
     """
 
     technique: str
@@ -67,12 +67,12 @@ class Comparison:
 
     @property
     def exposure(self) -> float:
-        """Return the factor that makes bright parts of the reference nearly white."""
+        """Return the exposure factor that makes bright pixels of the reference nearly white."""
         bright = np.percentile(self.reference.image[self.reference.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> Floats:
-        """Return sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
+        """Return a linear image as sRGB values (h, w, 3) from 0 to 1, at the comparison's exposure."""
         return np.asarray(encode_srgb(np.clip(self.exposure * image, 0.0, 1.0)))
 
 
@@ -90,16 +90,17 @@ def compare(
     samples: int = 64,
     adapter: str = "auto",
 ) -> Comparison:
-    """Compare techniques, in the profile's own colour without surface reflection, with a reference.
+    """Compare techniques with a reference, in the profile's own colour and without surface reflection.
 
-    against : name in REFERENCES
+    against : name of the reference in `references.REFERENCES`
     light, region : names in `scenes.LIGHTS` and `scenes.REGIONS`
-    medium : name of a medium, used as index-matched
+    medium : name of a medium, whose surface is index-matched here
     direction : angular distribution of the techniques' skin; None for that of the reference
     model : scattering model of the medium's profile; see `medium_gaussians` for the default
-    samples : paths per pixel
+    samples : paths per pixel of a path-traced reference
 
-    Raises DermisError for unknown names, pictures without the head, and what the reference does not support.
+    Raises DermisError for unknown names, pictures without the head, and scenes that the reference does not
+    support.
     """
     check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
@@ -131,7 +132,10 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Provide the subject of a comparison for a context; parameters as in `compare`."""
+    """Yield the subject of a comparison, whose profile is a temporary file during the context.
+
+    The parameters are those of `compare`.
+    """
     index_matched = media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):
         yield ComparisonSubject(Renderer(adapter), scene, profile, index_matched, settings)
@@ -151,7 +155,10 @@ def check_names(against: str, light: str, region: str, medium: str) -> None:
 
 
 def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:
-    """Return the linear radiance of a technique, and the device time of its frame at 4 samples [ms]."""
+    """Render a technique; return its linear radiance, and the device time of a frame at 4 samples [ms].
+
+    reference : reference image, which determines samples, translucency and interreflection
+    """
     disabled: dict[str, object] = {} if reference.has_translucency else {"transmission": "none"}
     disabled |= {} if reference.has_interreflection else {"interreflection": False}
     values = subject.settings.model_dump() | {"technique": technique} | disabled
@@ -182,9 +189,9 @@ _FLIP_SOURCE = "Andersson2020"
 
 
 def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
-    """Return keys of the bibliography, without duplicates.
+    """Return the bibliography keys of a reference and of techniques, without duplicates.
 
-    against : name in `references.REFERENCES`
+    against : name of the reference in `references.REFERENCES`
     """
     keys = [*_REFERENCE_SOURCES[against], _FLIP_SOURCE]
     for technique in techniques:

@@ -1,4 +1,4 @@
-"""Views of the package's human, rendered by the frame and by path tracing, with their errors."""
+"""Views of the package's human rendered by the frame and by path tracing, with the frame's errors."""
 
 from __future__ import annotations
 
@@ -37,11 +37,14 @@ _WHITE_PERCENTILE = 98.0
 class PersonComparison:
     """View of a person by the frame and by path tracing, with the errors of the frame.
 
-    ours, reference : (h, w, 3) linear radiance
+    name : key of `VIEWS`
+    ours, reference : (h, w, 3) linear radiance of the frame and of the path-traced picture
     variance : (h, w, 3) variance of the reference's noise
     mask : (h, w) pixels that are compared
-    relrmse, energy : relative RMSE and energy ratio over the mask
-    energy_by_channel : energy ratio of red, green and blue
+    relrmse, energy : relative RMSE, and ratio of the frame's light to the reference's, over the mask
+    energy_by_channel : ratio of the frame's light to the reference's in red, green and blue
+    samples : paths per pixel
+    seconds : duration of path tracing [s]
     """
 
     name: str
@@ -57,12 +60,12 @@ class PersonComparison:
 
     @property
     def exposure(self) -> float:
-        """Return the factor that makes bright parts of the reference nearly white."""
+        """Return the exposure factor that makes bright pixels of the reference nearly white."""
         bright = np.percentile(self.reference[self.mask], _WHITE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> NDArray[np.uint8]:
-        """Return (h, w, 3) sRGB bytes at the exposure of the comparison."""
+        """Return a linear image as sRGB bytes (h, w, 3), at the comparison's exposure."""
         encoded = encode_srgb(np.clip(self.exposure * image, 0.0, 1.0))
         return np.asarray(np.rint(255 * encoded), np.uint8)
 
@@ -81,9 +84,9 @@ def compare_person(
 ) -> PersonComparison:
     """Render a view of a person by the frame and by path tracing.
 
-    textures : as the frame paints them, see `person_textures`
+    textures : maps of the skin as the frame paints them, from `person_textures`
     name : key of `VIEWS`
-    side : of the pictures [pixel]
+    side : side of the pictures [pixel]
     samples : paths per pixel; some views use more
     atlas : side of the frame's atlas [texel]
     use_cache, progress : as in `path_trace`
@@ -94,14 +97,14 @@ def compare_person(
         refuse("view", f"one of {', '.join(VIEWS)}", f"got {name!r}", "Choose one of them")
     settings = Settings(size=(side, side), atlas=atlas, samples=4)
     scene, sample_count = view_scene(head, VIEWS[name]), round(samples * VIEWS[name].sample_factor)
-    reference = trace_view(renderer, scene, textures, settings.size, sample_count, use_cache, progress)
+    reference = path_trace_view(renderer, scene, textures, settings.size, sample_count, use_cache, progress)
     mask = reference.mask > _FULL_COVERAGE
     check_visible(mask)
-    return comparison_of(name, render_frame(renderer, scene, settings), reference, mask)
+    return person_comparison(name, render_frame(renderer, scene, settings), reference, mask)
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
-    """Return (h, w, 3) linear radiance of the frame, drawn at twice the size and averaged.
+    """Return the linear radiance (h, w, 3) of the frame, drawn at twice the size and averaged.
 
     More samples per pixel would be equivalent, but on software adapters many samples with many large lights
     exceed the time limit of a pass.
@@ -112,7 +115,7 @@ def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats
     return np.asarray(image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)))
 
 
-def trace_view(
+def path_trace_view(
     renderer: Renderer,
     scene: Scene,
     textures: SkinTextures,
@@ -122,9 +125,12 @@ def trace_view(
     progress: Callable[[int, int], None] | None = None,
     variant: Variant = "scalar_rgb",
 ) -> PathTraced:
-    """Return the path-traced image of a person, with the profile's mean lateral offset of exit points.
+    """Path-trace a person, in a medium with the mean exit offset of the frame's profile.
 
-    variant : as in `path_trace`
+    textures : maps of the skin as the frame paints them, from `person_textures`
+    size : width and height of the picture [pixel]
+    samples : paths per pixel
+    variant : variant of Mitsuba, as in `path_trace`
     """
     profile, colour = renderer.skin_profile(scene.skin), scene.head.maps.mean_colour
     assert colour is not None  # painted maps always have one
@@ -134,8 +140,12 @@ def trace_view(
     return path_trace_person(scene, textures, distance, colour, size, samples, **options)
 
 
-def comparison_of(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
-    """Return both pictures with the errors of ours."""
+def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
+    """Return the comparison of a frame with a path-traced picture.
+
+    ours : (h, w, 3) linear radiance of the frame
+    mask : (h, w) pixels to compare
+    """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
         name,
@@ -159,12 +169,12 @@ _LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
 
 @dataclass(frozen=True)
 class View:
-    """View of a head.
+    """View of a person in which frame and path tracing are compared.
 
-    camera : function of the head
+    camera : function that returns the camera for a head
     light : name of a light preset or of a panorama
-    pose : name of an expression
-    sample_factor : factor of the number of paths
+    pose : name of an expression; None for the rest pose
+    sample_factor : factor of the number of paths per pixel
     """
 
     camera: Callable[[Head], Camera]
@@ -199,7 +209,7 @@ def behind_ear_camera(head: Head) -> Camera:
 
 
 def _eye_position_mm(head: Head) -> tuple[float, float, float]:
-    """Return the apex of the left eye, relative to the head's centre."""
+    """Return the front of the left cornea, relative to the head's centre [mm]."""
     if head.eyes is None:
         return head.frontmost(30.0, 0.0)
     x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
@@ -207,7 +217,7 @@ def _eye_position_mm(head: Head) -> tuple[float, float, float]:
 
 
 def _mouth_height_mm(head: Head) -> float:
-    """Return the height of the mouth relative to the head's centre: the mean height of the teeth."""
+    """Return the mean height of the teeth relative to the head's centre [mm]."""
     names = [material.part for material in head.mesh.materials]
     teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
     vertices = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
@@ -233,7 +243,10 @@ PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 
 
 def view_scene(head: Head, view: View) -> Scene:
-    """Return the scene of a view, with area lights, since no path through a cornea hits a point light."""
+    """Return the scene of a view, with softboxes in place of point lights.
+
+    A path that leaves through a cornea cannot hit a point light.
+    """
     pose = None if view.pose is None else Pose(expression(view.pose))
     camera = view.camera(head)
     if view.light in PANORAMAS:
@@ -243,7 +256,7 @@ def view_scene(head: Head, view: View) -> Scene:
 
 
 def as_softbox(light: Light) -> Light:
-    """Return a point light as a softbox in its position; any other light unchanged."""
+    """Return a softbox at the position of a point light; return any other light unchanged."""
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
     shared = light.model_dump(include={"position", "target", "irradiance"})
@@ -256,11 +269,11 @@ _HIGHLIGHT_FACTOR = 1.6  # brightness of highlights over the median of the ring
 
 
 class IrisErrors(NamedTuple):
-    """Errors of an iris in the frame against the reference.
+    """Errors of an iris in the frame against the path-traced reference.
 
-    right, down : shift of the reference's pupil against ours [pixel]
-    brightness : mean of ours over that of the reference on the ring of the iris, without highlights [-]
-    left_half, right_half : the same ratio on each half of the ring
+    right, down : shift of the reference's pupil from the frame's [pixel]
+    brightness : mean of the frame over that of the reference on the ring of the iris, without highlights [-]
+    left_half, right_half : the brightness ratio on each half of the ring [-]
     """
 
     right: Estimate
@@ -271,9 +284,9 @@ class IrisErrors(NamedTuple):
 
 
 def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
-    """Return the errors of a picture with an eye in its middle, seen from the front.
+    """Return the errors of an iris, in pictures that show an eye from the front in their middle.
 
-    frame_mm : height of the field of view
+    frame_mm : visible height [mm]
     """
     ours, reference = pair.ours.mean(axis=2), pair.reference.mean(axis=2)
     noise = pair.variance.mean(axis=2)  # an upper bound, since channels may share paths
@@ -289,7 +302,10 @@ def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
 
 
 def _without_highlights(image: Floats, ring: Mask) -> Mask:
-    """Return the mask (h, w) of pixels without highlights, found in a blurred picture because of noise."""
+    """Return the mask (h, w) of pixels outside highlights, which are found in a blurred picture.
+
+    ring : (h, w) mask of the iris, whose median brightness determines the threshold
+    """
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
@@ -297,7 +313,13 @@ def _without_highlights(image: Floats, ring: Mask) -> Mask:
 
 
 def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
-    """Return the shift of the reference to the right of and below ours, fitted with its brightness."""
+    """Return by how much the reference is shifted to the right of and below the frame [pixel].
+
+    Shift and brightness are fitted together by least squares.
+
+    noise : (h, w) variance of the reference
+    region : (h, w) mask of the pixels to compare
+    """
     down, right = (np.asarray(slope) for slope in np.gradient(ours))
     columns = np.stack([ours[region], -right[region], -down[region], np.ones(int(region.sum()))], axis=-1)
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T

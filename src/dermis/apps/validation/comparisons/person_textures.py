@@ -1,4 +1,4 @@
-"""Textures of a person as the frame paints them, for a path tracer."""
+"""Maps of a person's skin as the frame paints them, for a path tracer."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 def person_textures(renderer: Renderer, scene: Scene, side: int = 2048) -> SkinTextures:
     """Return the colours, roughness and relief that frames of the scene show in the rest pose.
 
-    side : of the skin's maps, a power of two from 256 to 4096 [texels]
+    side : side of the skin's maps, a power of two from 256 to 4096 [texel]
 
     Raises DermisError for heads without painted skin.
     """
@@ -58,9 +58,9 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, side: int)
 
 
 def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Floats:
-    """Return (n, n) heights of detail finer than the maps, tiled as in skin.wgsl [mm].
+    """Return the heights (n, n) of pores and furrows finer than the maps, tiled as in skin.wgsl [mm].
 
-    pores, furrows : (n, n) weights of the two kinds of detail
+    pores, furrows : (n, n) weights of the two patterns
     density : (n, n) binary logarithm of mm per unit of uv
     """
     side = len(pores)
@@ -82,7 +82,11 @@ def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Float
 
 
 def _sample_tile(tile: Floats, u: Any, v: Any) -> Floats:
-    """Return a periodic tile at (n, n) coordinates, in units of tiles, with bilinear interpolation."""
+    """Return a periodic pattern at coordinates u, v (n, n), interpolated bilinearly.
+
+    tile : one period of the pattern
+    u, v : coordinates in units of the period
+    """
     from scipy.ndimage import map_coordinates
 
     rows, columns = tile.shape
@@ -91,7 +95,10 @@ def _sample_tile(tile: Floats, u: Any, v: Any) -> Floats:
 
 
 def _part_texture(renderer: Renderer, scene: Scene, part: int, iris_radius_mm: float) -> Floats:
-    """Return the texture (n, n, 3) of a part of the eyes or teeth."""
+    """Return the painted texture (n, n, 3) of one part of the eyes or teeth.
+
+    part : index of the part in person_textures.wgsl
+    """
     inputs, device = renderer.prepare(scene, _SETTINGS), renderer.device
     shader = program(device, Path(__file__).parent / "person_textures.wgsl")
     texture = make_texture(device, (_TEXTURE_SIDE, _TEXTURE_SIDE), "rgba32float")

@@ -1,4 +1,4 @@
-"""Reference images for scattering techniques, each with its own assumptions."""
+"""Reference images for scattering techniques, each computed under its own assumptions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PIXEL_SAMPLES = 16
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """Scene to compare, with its skin's profile and medium, and the settings of its image."""
+    """Scene to compare, with the profile and medium of its skin, and the settings of its image."""
 
     renderer: Renderer
     scene: Scene
@@ -45,16 +45,16 @@ class ComparisonSubject:
 
 @dataclass(frozen=True)
 class ReferenceImage:
-    """Reference image, its noise and its assumptions.
+    """Reference image, the variance of its noise, and the assumptions under which it was computed.
 
-    image, variance : (h, w, 3) radiance and the variance of its noise
+    image, variance : (h, w, 3) linear radiance, and the variance of its noise
     mask : (h, w) pixels to compare
-    samples : per pixel, that a technique's image needs for a fair comparison
-    seconds : time that it took
-    notes : for the report
+    samples : samples per pixel that a technique's image needs for a fair comparison
+    seconds : duration of the computation [s]
+    notes : sentences for the report
     has_translucency : whether it includes light through thin parts
     has_interreflection : whether it includes light from skin to skin through the air
-    direction : angular distribution of its skin, as in `Skin`
+    direction : angular distribution of the light that leaves its skin, as in `Skin`
     """
 
     image: Floats
@@ -69,21 +69,25 @@ class ReferenceImage:
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Integrate the subject's profile of Euclidean distance over the surface, without an atlas.
+    """Return the reference that integrates the profile over the surface, by Euclidean distance.
 
-    samples : ignored
+    samples : ignored, as there is no noise
     """
     started = time.perf_counter()
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
     light, profile = irradiance_samples(subject), subject.profile
-    exitance = _integrated(hit_positions(subject, visible), light, profile.weight, profile.variance_mm2)
+    exitance = _integrate_gaussians(
+        hit_positions(subject, visible), light, profile.weight, profile.variance_mm2
+    )
     return _image_of_points(visible, exitance, started, f"{len(light.positions):,} irradiance samples")
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Diffuse the subject's Gaussians along the surface as heat, around the camera's target.
+    """Return the reference that diffuses the profile by the heat equation on the surface.
 
-    samples : ignored
+    Only the surroundings of the camera's target are computed.
+
+    samples : ignored, as there is no noise
     """
     target = subject.scene.camera.target
     return surface_heat_around(subject, target, _HEAT_RADIUS_MM, irradiance_samples(subject))
@@ -96,11 +100,14 @@ def surface_heat_around(
     light: IrradianceSamples,
     min_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Diffuse the subject's Gaussians along the surface as heat, around a visible point.
+    """Return the reference that diffuses the profile by the heat equation around a visible point.
 
-    target_mm : relative to the head's centre; the nearest visible point is the centre of the patch
+    Each Gaussian of the profile is the light after some time of diffusion along the surface.
+
+    target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
+    radius_mm : radius of the patch in which pixels are compared [mm]
     light : irradiance on the whole head, see `irradiance_samples`
-    min_mm2 : variance below which Gaussians are integrated by Euclidean distance instead
+    min_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
     from dermis.apps.truths.surface_patch import mesh_patch
@@ -119,7 +126,7 @@ def surface_heat_around(
     inside = (fine >= 0) & patch.contains(points)
     diffused = np.einsum("knc,kc->nc", levels, weight[~narrow])
     exitance = patch.interpolate(diffused, fine[inside], weights[inside])
-    exitance += _integrated(points[inside], light, weight[narrow], variances[narrow])
+    exitance += _integrate_gaussians(points[inside], light, weight[narrow], variances[narrow])
     mask = visible.mask.copy()
     mask[visible.mask] = inside
     compared = SurfacePoints(mask, visible.triangle[inside], visible.barycentric[inside])
@@ -129,7 +136,7 @@ def surface_heat_around(
 
 
 def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
-    """Return samples of the irradiance on all of the skin, as fine as the references need."""
+    """Return samples of the irradiance on the whole head, as dense as the references need."""
     from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 
     def light(points: MeshPoints) -> Floats:
@@ -139,7 +146,7 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Path-trace the medium itself, without errors of a profile or of diffuse surfaces.
+    """Return the reference that path-traces the medium, without the assumptions of a profile.
 
     samples : paths per pixel
     """
@@ -150,7 +157,7 @@ def path_traced_reference(subject: ComparisonSubject, samples: int) -> Reference
 
 
 def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Render by Cycles with random walks through the medium, as another renderer to compare with.
+    """Return the image by Cycles with random walks through the medium, to compare with another renderer.
 
     samples : paths per pixel
     """
@@ -178,8 +185,15 @@ def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycen
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
-def _integrated(points: Floats, light: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
-    """Return (n, 3) radiant exitance at points by Gaussians of the Euclidean distance."""
+def _integrate_gaussians(
+    points: Floats, light: IrradianceSamples, weight: Floats, variance_mm2: Floats
+) -> Floats:
+    """Return the radiant exitance (n, 3) at points by integrating Gaussians of the Euclidean distance.
+
+    points : (n, 3) positions [mm]
+    light : irradiance on the surface
+    weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
+    """
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
@@ -189,7 +203,10 @@ def _integrated(points: Floats, light: IrradianceSamples, weight: Floats, varian
 
 
 def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
-    """Return (n, 3) positions where rays through the pixels' centres meet the head [mm]."""
+    """Return the positions (n, 3) where rays through pixel centres meet the head [mm].
+
+    visible : triangles and barycentric weights of these positions
+    """
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[visible.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
@@ -203,7 +220,10 @@ def _image_of_points(visible: SurfacePoints, exitance: Floats, started: float, n
 
 
 def check_visible(mask: NDArray[np.bool_]) -> None:
-    """Raise DermisError when there is no pixel to compare."""
+    """Raise DermisError when no pixel can be compared.
+
+    mask : (h, w) pixels that show nothing but the head
+    """
     if not mask.any():
         expected = "a pixel that shows nothing but the head"
         refuse("the picture", expected, "there is none", "Choose a larger size or another region")

@@ -1,4 +1,4 @@
-"""Report of a comparison as a self-contained HTML file."""
+"""HTML report of a comparison, in a single self-contained file."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame"
 
 
 def write_report(path: Path, comparison: Comparison) -> None:
-    """Write pictures, differences and errors to an HTML file, atomically.
+    """Write pictures, differences and errors of a comparison to an HTML file, atomically.
 
-    Raises DermisError when it cannot be written.
+    Raises DermisError when the file cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     reference = _figure("reference", comparison.tone_mapped(comparison.reference.image))
@@ -43,7 +43,7 @@ def write_report(path: Path, comparison: Comparison) -> None:
 
 
 def cells(row: ComparisonRow) -> tuple[str, ...]:
-    """Return the figures of a row as text, with standard errors where there are any."""
+    """Return the errors of a technique as table cells, with standard errors if the reference has noise."""
     flip = "-" if row.flip is None else f"{row.flip:.3f}"
     return (
         row.technique,

@@ -1,4 +1,4 @@
-"""Scenes of the comparisons: lit from the front, through the ear, and by a laser's stripe."""
+"""Scenes in which techniques are compared: front light, light through an ear, and a laser's stripe."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
-_WHITE = (3.14, 3.14, 3.14)
-_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, relative to the head's centre [mm]
+_WHITE_IRRADIANCE = (3.14, 3.14, 3.14)
+_NOSE_POINT_MM = (14.0, -28.0, 90.0)  # between tip, wing and lip, relative to the head's centre [mm]
 _EAR_RANGE_MM = 60.0  # above and below the centre, where the head is widest at the ears
 
 
 def _front_lights(head: Head) -> tuple[Light, ...]:
     """Return a key light from the upper left, whose shadow edges cross the face."""
-    return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE),)
+    return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE_IRRADIANCE),)
 
 
 def _back_lights(head: Head) -> tuple[Light, ...]:
@@ -73,7 +73,9 @@ def _cheek_camera(head: Head) -> Camera:
 
 
 def _nose_camera(head: Head) -> Camera:
-    return Camera(position=(_NOSE[0], _NOSE[1], 900.0), target=_NOSE, frame_mm=90.0)
+    return Camera(
+        position=(_NOSE_POINT_MM[0], _NOSE_POINT_MM[1], 900.0), target=_NOSE_POINT_MM, frame_mm=90.0
+    )
 
 
 REGIONS: dict[str, Callable[[Head], Camera]] = {
@@ -89,7 +91,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
     """Return a scene of a head without maps or surface reflection, in the profile's own colour.
 
     light, region : names in LIGHTS and REGIONS
-    profile : name or file
+    profile : name or file of the diffusion profile
     """
     plain_head = Head(head.name, head.mesh, Maps(), head.attribution)
     skin = Skin(profile=profile, albedo="profile", specular="none", energy="none", direction="lambertian")
@@ -100,7 +102,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Provide `comparison_scene` with a medium's profile, which is a file during the context."""
+    """Yield `comparison_scene` with a medium's profile, which is a temporary file during the context."""
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
@@ -109,7 +111,7 @@ def medium_scene(
 
 
 def default_region(light: str) -> str:
-    """Return the region in which the effect of a light is largest."""
+    """Return the region of the face in which a light of the comparisons has the largest effect."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
 
 
@@ -119,11 +121,11 @@ _PHOTONS = 2_000_000  # per channel
 
 
 def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
-    """Return six Gaussians for a medium.
+    """Return the sum of six Gaussians that fits a medium's diffusion profile.
 
-    model : by default the tables of Monte Carlo profiles if they have the medium, else layered diffusion
+    model : scattering model; by default photon counts if they include the medium, else layered diffusion
 
-    Raises DermisError for a medium that has no tables.
+    Raises DermisError for photon counts of a medium that they do not include.
     """
     if model == "montecarlo":
         return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS), medium.name)

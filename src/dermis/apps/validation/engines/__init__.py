@@ -1,1 +1,1 @@
-"""Measured errors of exported skins and heads in other programs."""
+"""Errors of exported skins and heads, measured in other programs."""

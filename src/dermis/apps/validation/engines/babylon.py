@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 PAGE = Path(__file__).with_name("babylon.html")
-FIGURES = RESULTS / "engines_babylon.json"
-LIBRARY = "DERMIS_BABYLON"
+RESULTS_FILE = RESULTS / "engines_babylon.json"
+LIBRARY_VARIABLE = "DERMIS_BABYLON"
 CANVAS_SIDE, LIT_RADIANCE = 640, 0.9
 PIXELS_PER_WIDTH = 14.0  # pixels in the largest d
 DIRECTION_COUNT = 5
@@ -33,20 +33,27 @@ Floats = NDArray[np.floating]
 
 
 def babylon_library() -> Path:
-    """Return the folder of the library.
+    """Return the npm folder that contains Babylon.js.
 
-    Raises DermisError when DERMIS_BABYLON names none.
+    Raises DermisError when DERMIS_BABYLON does not name such a folder.
     """
-    folder = Path(os.environ.get(LIBRARY, ""))
+    folder = Path(os.environ.get(LIBRARY_VARIABLE, ""))
     if not (folder / "babylonjs" / "babylon.js").is_file():
-        actual = f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY) else "it is not set"
-        refuse(LIBRARY, "a folder that npm has installed babylonjs into", actual, "npm install babylonjs")
+        actual = (
+            f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY_VARIABLE) else "it is not set"
+        )
+        refuse(
+            LIBRARY_VARIABLE,
+            "a folder that npm has installed babylonjs into",
+            actual,
+            "npm install babylonjs",
+        )
     return folder
 
 
 @contextmanager
 def babylon_page(library: Path) -> Iterator[Page]:
-    """Open the page with the library loaded, for a context."""
+    """Open the measurement page with Babylon.js in Chromium for the duration of a context."""
     with chromium_page(CANVAS_SIDE) as page:
         page.goto(PAGE.as_uri())
         page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
@@ -54,7 +61,14 @@ def babylon_page(library: Path) -> Iterator[Page]:
 
 
 def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the (side, side, 3) radiance of the canvas relative to its fully lit part, bottom row first."""
+    """Return the radiance (side, side, 3) that Babylon.js draws, over that far inside the light.
+
+    Row 0 is at the bottom.
+
+    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    pixel : size of a pixel [mm]
+    azimuth : direction across the edge of the light [rad]
+    """
     edge = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": azimuth}
     data = base64.b64decode(page.evaluate("(edge) => drawEdge(edge)", edge))
     levels = np.frombuffer(data, np.uint8).reshape(CANVAS_SIDE, CANVAS_SIDE, 4)[..., :3]
@@ -62,9 +76,11 @@ def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, a
 
 
 def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the radiance of the canvas predicted from the shader's samples, rounded to pixels.
+    """Return the radiance (side, side, 3) predicted from the shader's samples, rounded to pixels.
 
-    metres : metersPerUnit of a scene in mm
+    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    pixel : size of a pixel [mm]
+    azimuth : direction across the edge of the light [rad]
     """
     r, angle, weight = spiral_samples(colour)
     distance = WIDTH_ERROR * 1e-3 * r / metres / pixel
@@ -78,7 +94,13 @@ def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: flo
 
 
 def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, half_width_mm: float) -> Floats:
-    """Return mean radiance (n, 3) at distances x from the edge, within a strip across it."""
+    """Return the mean radiance (n, 3) at distances from the edge of the light, within a strip across it.
+
+    picture : (side, side, 3) radiance
+    pixel : size of a pixel [mm]
+    azimuth : direction across the edge [rad]
+    x_mm : (n,) evenly spaced distances from the edge, positive in the light
+    """
     middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel
     x, y = middle[None, :], middle[:, None]
     across = x * np.cos(azimuth) + y * np.sin(azimuth)
@@ -91,10 +113,10 @@ def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, ha
 
 
 def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> JsonObject:
-    """Return edge responses averaged over azimuths: measured, from the samples, and of true lobes.
+    """Return edge responses averaged over azimuths: measured, predicted, and those of Burley profiles.
 
-    metres : metersPerUnit of a scene in mm
-    d_mm : (3,) widths of the true lobes
+    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    d_mm : (3,) widths of the Burley profiles [mm]
     """
     widest = float(d_mm.max())
     pixel = widest / PIXELS_PER_WIDTH
@@ -128,7 +150,11 @@ def _max_by_channel(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
 
 
 def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
-    """Return widths of the lobes with the nearest edge responses, by channel [mm]."""
+    """Return the widths of the Burley profiles whose edge responses are closest, by channel [mm].
+
+    x_mm : (n,) distances from the edge
+    edge : (n, 3) measured edge responses
+    """
     widths = np.geomspace(x_mm[-1] / 600.0, x_mm[-1], 241)
     curves = [burley_curve(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
     error = ((np.stack(curves)[:, :, None] - edge) ** 2).sum(axis=1)
@@ -136,7 +162,7 @@ def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
 
 
 def exported_skin(page: Page, name: str) -> JsonObject:
-    """Return edge responses of a skin with its exported parameters, also against its profile."""
+    """Return the edge responses of a skin with its exported parameters, with the error to its profile."""
     subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))
@@ -149,7 +175,7 @@ def exported_skin(page: Page, name: str) -> JsonObject:
     return responses | {"measured_less_profile": error}
 
 
-COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}
+DIFFUSION_COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}
 
 
 def babylon() -> None:
@@ -161,9 +187,9 @@ def babylon() -> None:
     with babylon_page(babylon_library()) as page:
         plain = {
             name: edge_responses(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
-            for name, colour in COLOURS.items()
+            for name, colour in DIFFUSION_COLOURS.items()
         }
         skins = {name: exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}
         engine = "babylonjs " + page.evaluate("BABYLON.Engine.Version")
     settings = {"engine": engine, "turns": DIRECTION_COUNT, "samples": 40, "noise": 0.002}
-    write_results(FIGURES, settings | {"plain": plain, "skins": skins})
+    write_results(RESULTS_FILE, settings | {"plain": plain, "skins": skins})

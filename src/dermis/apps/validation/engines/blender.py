@@ -1,4 +1,4 @@
-"""Exported skin and heads in Blender, rendered by Cycles."""
+"""Measurements of exported skin and heads in Blender, rendered by Cycles."""
 
 from __future__ import annotations
 
@@ -16,16 +16,22 @@ from dermis.apps.export.fitting import curve_error, fit_burley_width
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
-from dermis.apps.validation.engines.heads import TEXELS, Floats, compare_pictures, render_cycles, render_ours
+from dermis.apps.validation.engines.heads import (
+    TEXELS,
+    Floats,
+    compare_pictures,
+    render_cycles,
+    render_dermis,
+)
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
 from dermis.images.colour import encode_srgb
 from dermis.optics.cumulative_profile import CumulativeProfile
 
-FIGURES = RESULTS / "engines_blender.json"
+RESULTS_FILE = RESULTS / "engines_blender.json"
 PICTURE = DOCS / "images" / "engines_blender.webp"
 SCRIPT = Path(__file__).with_name("blender_script.py")
-Part = Literal["edges", "heads", "picture"]
+Measurement = Literal["edges", "heads", "picture"]
 SKINS = "skin1", "skin2", "dj3"
 METHODS = "random-walk-skin", "random-walk", "burley"
 BINS, BIN_COLUMNS, ROWS = 12, 8, 8  # bins from -6 d to 6 d, pixels across a bin, and rows of pixels
@@ -35,10 +41,10 @@ SEEDS = 2  # pictures per channel, whose difference gives the noise
 HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
-TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
+PLANE_TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
 
 
-def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
+def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     """Measure exported skin in Cycles and write benchmarks/results/engines_blender.json, in half an hour.
 
     Parameters
@@ -48,24 +54,24 @@ def blender(python_45: Path, python_52: Path, *parts: Part) -> None:
     python_52:
         A Python with the module bpy of Blender 5.2.
     parts:
-        Parts to measure; results of the others stay as they are [all].
+        Measurements to make; results of the others stay as they are [all].
     """
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
-    parts = parts or get_args(Part)
-    results: JsonObject = read_results(FIGURES) if FIGURES.exists() else {}
+    parts = parts or get_args(Measurement)
+    results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
     results["columns_in_d"] = column_positions().reshape(BINS, BIN_COLUMNS).mean(axis=1).tolist()
     if "edges" in parts:
         results["edges"] = list(measure_edges(pythons))
-        write_results(FIGURES, results)
+        write_results(RESULTS_FILE, results)
     if "heads" in parts:
         results["heads"] = list(measure_heads(pythons))
-        write_results(FIGURES, results)
+        write_results(RESULTS_FILE, results)
     if "picture" in parts:
         write_picture(pythons)
 
 
 def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the edge response of each skin with each method in each version."""
+    """Yield the measured edge response of each skin, by Blender version and subsurface method."""
     for version, python in pythons.items():
         for method in METHODS:
             for name in SKINS:
@@ -74,12 +80,16 @@ def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def column_positions() -> Floats:
-    """Return distances of all columns of pixels from the edge, in units of d."""
+    """Return the distance of each pixel column from the edge of the light, in units of the Burley width d."""
     return 12.0 * (np.arange(BINS * BIN_COLUMNS) + 0.5) / (BINS * BIN_COLUMNS) - 6.0
 
 
 def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
-    """Return measured, predicted and true edge responses of one skin."""
+    """Return the edge response of a skin as measured, as predicted, and by its reference profile.
+
+    python : Python with Blender's module bpy
+    name : name of the skin
+    """
     subject, target = load_subject(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
     predicted_curve = target.predicted_curve(rows, subject, version)
@@ -92,7 +102,7 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         folder = Path(folder_name)
         target.write(subject, rows, folder, version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, SCRIPT, [str(folder)], 3600.0, TASK)
+        run_blender(python, SCRIPT, [str(folder)], 3600.0, PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
     means = columns.reshape(SEEDS, 3, BINS, BIN_COLUMNS).mean(axis=-1)
@@ -118,18 +128,21 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the (3, BINS) edge response of a curve, averaged over the columns of each bin."""
+    """Return the edge response (3, BINS) of a cumulative profile, averaged over the pixels in each bin.
+
+    d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
+    """
     columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
     return np.asarray(np.array(columns).reshape(3, BINS, BIN_COLUMNS).mean(axis=-1))
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield outlines and colours of the head without hair, by version and method."""
+    """Yield the differences of Cycles from the frame in outline and colour, for a head without hair."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
-    ours = render_ours(bald, HEAD_SIDE)
+    ours = render_dermis(bald, HEAD_SIDE)
     for version, python in pythons.items():
         for method in METHODS_BY_VERSION[version]:
             pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS)
@@ -140,9 +153,9 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture that compares our head with those of Cycles, with hair."""
+    """Write a picture that shows a head with hair by the frame and by each version of Cycles."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
-    columns = [render_ours(subject, PICTURE_SIDE)]
+    columns = [render_dermis(subject, PICTURE_SIDE)]
     for version, python in pythons.items():
         method = METHODS_BY_VERSION[version][0]
         columns += render_cycles(subject, method, version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)

@@ -23,7 +23,7 @@ SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # half side of the plane, and height of the 
 
 
 def main(folder: Path) -> None:
-    """Render the passes in a folder and write their results there."""
+    """Render the passes listed in passes.json and write the radiance of each column to done.json."""
     spec = importlib.util.spec_from_file_location("skin", folder / "skin.py")
     skin = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
     spec.loader.exec_module(skin)  # type: ignore[union-attr]
@@ -33,8 +33,8 @@ def main(folder: Path) -> None:
     material = skin.make_skin()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
-    rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
-    card = rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
+    add_rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
+    card = add_rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
     card.visible_camera = False
     sun = bpy.data.lights.new("sun", "SUN")
     sun.energy, sun.angle = 1.0, 0.0
@@ -57,14 +57,20 @@ def main(folder: Path) -> None:
 
 
 def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
-    """Give all three channels the colour and the radius of one, so that all paths contribute to it."""
+    """Give all channels the colour and radius of one, so that all paths contribute to that channel.
+
+    description : subsurface parameters of the exported skin
+    """
     shader.inputs["Base Color"].default_value = (*[description["colour"][channel]] * 3, 1.0)
     radius = description["inputs"]["Subsurface Radius"][channel]
     shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
-def rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
-    """Add a horizontal rectangle between two x coordinates at a height."""
+def add_rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
+    """Add a horizontal rectangle between two x coordinates at a height, all in metres.
+
+    skin : module of the exported script
+    """
     mesh = bpy.data.meshes.new("rectangle")
     corners = [(left, -SIDE_M), (right, -SIDE_M), (right, SIDE_M), (left, SIDE_M)]
     mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
@@ -83,7 +89,11 @@ def black_material() -> Any:
 
 
 def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: Any, **parameters: int) -> Any:
-    """Return the mean radiance of each column of a picture of this width, across the edge of the light."""
+    """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
+
+    skin : module of the exported script
+    width_m : width of the picture [m]
+    """
     camera.ortho_scale = width_m
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = size

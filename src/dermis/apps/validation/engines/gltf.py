@@ -1,4 +1,4 @@
-"""Predicted errors of skins in glTF's draft of volume scattering, by interpretation of its parameters."""
+"""Predicted errors of skins in glTF's draft of volume scattering, by how its parameters are chosen."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARG
 from dermis.apps.export.targets.gltf.volume import fit_volume, volume_curve
 from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 
-FIGURES = RESULTS / "engines_gltf.json"
+RESULTS_FILE = RESULTS / "engines_gltf.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
 VERSION = TARGET.versions[-1]
 
 
 def skin_results(name: str) -> JsonObject:
-    """Return fitted parameters of a skin and their errors.
+    """Return the fitted glTF parameters of a skin, and the predicted errors of several choices.
 
-    Also the errors of parameters set without a fit, and of the albedo in place of the multiple-scattering
+    The choices are the fit, parameters set without a fit, and the albedo in place of the multiple-scattering
     colour.
     """
     subject = load_subject(name)
@@ -39,6 +39,6 @@ def skin_results(name: str) -> JsonObject:
 
 
 def gltf() -> None:
-    """Compute the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
+    """Predict the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
     figures = {"version": VERSION, "draft": DRAFT, "skins": {name: skin_results(name) for name in SKINS}}
-    write_results(FIGURES, figures, 4)
+    write_results(RESULTS_FILE, figures, 4)

@@ -1,6 +1,7 @@
 """One exported head with its camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
 
-Hair is omitted, because each program draws it differently. Lights are parallel, as on Babylon's page.
+Hair is omitted, because each program draws it differently. Lights are parallel, as on the page for
+Babylon.js.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
-from dermis.apps.validation.engines.babylon import LIBRARY, babylon_library
+from dermis.apps.validation.engines.babylon import LIBRARY_VARIABLE, babylon_library
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, chromium_page, in_checkout, write_results
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
@@ -31,7 +32,7 @@ from dermis.images.io import read_image
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.settings import Settings
 
-FIGURES, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
+RESULTS_FILE, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
 TEXELS, SIDE = 1024, 256
 CYCLES_SAMPLES, MITSUBA_SAMPLES, SEEDS = 64, 256, 2
 LIGHTS = (
@@ -45,7 +46,7 @@ Floats = NDArray[np.float64]
 
 
 def heads() -> None:
-    """Render one head in all installed programs and compare each with ours.
+    """Render one head in all installed programs and compare each picture with the frame.
 
     Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. DERMIS_BLENDER_PYTHONS
     names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
@@ -56,7 +57,7 @@ def heads() -> None:
     assert subject.head is not None and subject.scene is not None
     hairless = replace(subject.head, hair=None, strands=None)
     subject = replace(subject, scene=replace(subject.scene, head=hairless, lights=LIGHTS))
-    ours = render_ours(subject, SIDE)
+    ours = render_dermis(subject, SIDE)
     columns, rows = [ours], []
     for name, draw in available_renderers(subject, ours).items():
         pictures = np.stack(draw())
@@ -64,20 +65,23 @@ def heads() -> None:
         print_lines(str(result))
         columns.append(pictures.mean(axis=0))
         rows.append(result)
-        write_results(FIGURES, {"heads": rows}, 4)
+        write_results(RESULTS_FILE, {"heads": rows}, 4)
     levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in columns], axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
 
 
 def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
-    """Return the installed programs, each with a function that renders linear pictures (h, w, 4)."""
+    """Return a function for each installed program, by name, that renders linear pictures (h, w, 4).
+
+    ours : (h, w, 4) picture of the frame, whose alpha replaces that of programs without alpha
+    """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
     for version, python in zip(("4.5", "5.2"), named, strict=False):
         result[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
             subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, SEEDS
         )
-    if os.environ.get(LIBRARY):
+    if os.environ.get(LIBRARY_VARIABLE):
         library = babylon_library()
         result["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, ours)] * 2
     result["Mitsuba 3"] = lambda: render_mitsuba(subject, ours)
@@ -85,7 +89,10 @@ def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[]
 
 
 def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
-    """Return the exported page's canvas in Chromium as linear light, with the alpha of ours."""
+    """Return the canvas of the exported page in Chromium as linear light (h, w, 4).
+
+    ours : (h, w, 4) picture of the frame, whose alpha is used
+    """
     with TemporaryDirectory() as folder_name, chromium_page(SIDE) as page:
         file = Path(folder_name) / "head.html"
         export_skin(subject, "babylon", file, library=library)
@@ -98,7 +105,10 @@ def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 
 
 def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
-    """Return the exported scene rendered with several seeds, with the alpha of ours."""
+    """Return linear pictures (h, w, 4) of the exported scene by Mitsuba, one per random seed.
+
+    ours : (h, w, 4) picture of the frame, whose alpha is used
+    """
     mi = load_mitsuba()
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
         folder = Path(folder_name) / "head"
@@ -109,12 +119,12 @@ def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
 
 
 def over_grey(picture: Floats) -> Floats:
-    """Return a picture (h, w, 4) over a grey background."""
+    """Return a picture (h, w, 4) composited over a grey background, (h, w, 3)."""
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
-def render_ours(subject: Subject, side: int) -> Floats:
-    """Return the linear picture (h, w, 4) of the frame."""
+def render_dermis(subject: Subject, side: int) -> Floats:
+    """Return the linear picture (h, w, 4) of the subject by the frame."""
     assert subject.scene is not None
     settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
@@ -123,7 +133,11 @@ def render_ours(subject: Subject, side: int) -> Floats:
 def render_cycles(
     subject: Subject, method: str, version: str, python: Path, side: int, samples: int, seeds: int
 ) -> list[Floats]:
-    """Return linear pictures (h, w, 4) by Cycles, one per seed."""
+    """Return linear pictures (h, w, 4) of the exported scene by Cycles, one per random seed.
+
+    method : variant of the target "blender"
+    python : Python with Blender's module bpy
+    """
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name) / "head"
         export_skin(subject, "blender", folder, version=version, variant=method)
@@ -141,9 +155,10 @@ def render_cycles(
 
 
 def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
-    """Return the differences in outline and colour and the relative RMSE of another program's pictures.
+    """Return differences in outline and colour, and relative RMSE, of another program from the frame.
 
-    theirs : (seeds, h, w, 4) pictures with different random seeds
+    ours : (h, w, 4) picture of the frame
+    theirs : (seeds, h, w, 4) pictures of the other program with different random seeds
     """
     mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
     a, b = ours[..., 3] > 0.5, mean[..., 3] > 0.5

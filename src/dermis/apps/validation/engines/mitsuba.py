@@ -1,4 +1,4 @@
-"""Edges of light on exported skin in Mitsuba: a half-lit plane against the profile and the prediction.
+"""Edges of light on exported skin in Mitsuba: a half-lit plane compared with profile and prediction.
 
 A lamp covers half of a plane of the exported medium and almost touches it. By reciprocity, the radiance along
 the normal at a distance from the lamp's edge is the edge response of the profile.
@@ -29,7 +29,7 @@ from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 from dermis.optics.cumulative_profile import CumulativeProfile
 
 Floats = NDArray[np.float64]
-FIGURES = RESULTS / "engines_mitsuba.json"
+RESULTS_FILE = RESULTS / "engines_mitsuba.json"
 SKINS: dict[str, tuple[Boundary, ...]] = {
     "skin1": ("matched", "smooth"),
     "skin2": ("matched", "smooth", "rough"),
@@ -45,11 +45,12 @@ _BLACK_ALBEDO = 1e-9
 def half_lit_plane(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, black: bool = False
 ) -> MitsubaObject:
-    """Return a scene with the plane z = 0, lit where x > 0, and an orthographic view around the edge.
+    """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
     The camera is below the surface where the surface does not change the direction along the normal.
 
-    d_mm : width of the profile; the view spans 3 d on each side of the edge
+    d_mm : Burley width of the profile; the view spans 3 d on each side of the edge [mm]
+    black : whether the medium absorbs all light, so that only the surface reflects
     """
     transform = mi.ScalarTransform4f
     size, height = _PLANE_HALF_SIDE_D * d_mm, _LAMP_HEIGHT_D * d_mm
@@ -86,7 +87,11 @@ def half_lit_plane(
 def measured_edge(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
-    """Return the edge response at the pixels, its standard errors, and the radiance far inside the light."""
+    """Return the edge response at the pixels, its standard errors, and the radiance far inside the light.
+
+    d_mm : Burley width of the profile [mm]
+    samples : paths per pixel
+    """
     plane = half_lit_plane(mi, medium, boundary, d_mm)
     passes = [mi.render(plane, spp=samples // _PASSES, seed=k) for k in range(_PASSES)]
     images = np.array([np.array(image)[0].mean(axis=1) for image in passes])
@@ -102,14 +107,21 @@ def measured_edge(
 
 
 def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
-    """Return the edge response of a curve as the mean over each pixel."""
+    """Return the edge response of a cumulative profile, averaged over each pixel of the view.
+
+    channel : index of the channel
+    d_mm : Burley width of the profile, which sets the size of the view [mm]
+    """
     edges = np.linspace(-_REACH_D, _REACH_D, _PIXELS + 1) * d_mm
     centres = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_SUBSAMPLES) + 0.5) / _SUBSAMPLES
     return np.asarray(curve.edge_response(centres)[..., channel].mean(axis=1))
 
 
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
-    """Return edge responses of a skin under a boundary, and their errors in red, green and blue."""
+    """Return measured edge responses of a skin under a surface model, and their errors, by channel.
+
+    samples : paths per pixel
+    """
     target = TARGET.with_variant(boundary)
     version = target.resolve_version(None)
     rows = target.parameters(subject, version)
@@ -131,15 +143,15 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
     return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **results}
 
 
-def mitsuba(*, samples: int = 32000, output: Path = FIGURES, variant: str = "scalar_rgb") -> None:
-    """Measure edges of light on all skins under all boundaries and write the results.
+def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str = "scalar_rgb") -> None:
+    """Measure edges of light on all skins under all surface models and write the results.
 
     Parameters
     ----------
     samples:
         Paths per pixel.
     output:
-        JSON file.
+        JSON file of the results.
     variant:
         Variant of Mitsuba.
     """

@@ -20,13 +20,17 @@ from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, writ
 from dermis.base.console import print_lines
 from dermis.base.extras import import_extra
 
-FIGURES = RESULTS / "engines_openpbr.json"
+RESULTS_FILE = RESULTS / "engines_openpbr.json"
 SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
 _MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core does not include
 
 
 def skin_errors() -> JsonObject:
-    """Return radii by skin, and errors of fitted parameters, of unfitted ones, and of a profile's."""
+    """Return exported radii and predicted errors of each skin in OpenPBR, MaterialX and pbrt.
+
+    The errors are those of fitted parameters, of parameters without a fit, and of radii interpreted as the
+    width of a Burley profile.
+    """
     results: JsonObject = {}
     for name in SKINS:
         subject = load_subject(name)
@@ -52,7 +56,7 @@ def skin_errors() -> JsonObject:
 
 
 def validate_files() -> JsonObject:
-    """Return versions of the libraries, and errors that they find in documents and stages."""
+    """Validate exported MaterialX and USD files; return errors, and the versions of the libraries."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
     from pxr import Usd, UsdValidation
@@ -78,12 +82,12 @@ def validate_files() -> JsonObject:
 
 
 def float_list(values: ArrayLike) -> list[float]:
-    """Return values as a flat list of floats."""
+    """Return an array as a flat list of Python floats, for JSON."""
     return [float(one) for one in np.ravel(values)]
 
 
 def error_table(results: JsonObject) -> list[str]:
-    """Return a table of the largest edge error of each skin and each reading of its parameters."""
+    """Return a Markdown table of the largest edge errors by skin and interpretation of the parameters."""
     lines = [
         "| skin | radius [mm] | OpenPBR's random walk | diffuse mean free path typed in"
         " | radius interpreted as a profile | pbrt | diffuse mean free path typed in |",
@@ -99,9 +103,9 @@ def error_table(results: JsonObject) -> list[str]:
 
 
 def openpbr() -> None:
-    """Compute and print the errors of skins, and write benchmarks/results/engines_openpbr.json.
+    """Predict the errors of skins, print them and write benchmarks/results/engines_openpbr.json.
 
     Needs the packages usd-core and MaterialX. No renderer of these formats is run.
     """
-    write_results(FIGURES, {"libraries": validate_files(), "skins": skin_errors()}, 4)
-    print_lines(*error_table(read_results(FIGURES)["skins"]))
+    write_results(RESULTS_FILE, {"libraries": validate_files(), "skins": skin_errors()}, 4)
+    print_lines(*error_table(read_results(RESULTS_FILE)["skins"]))

@@ -1,1 +1,1 @@
-"""Comparison with other renderers, Cycles and Mitsuba, on one CPU."""
+"""Comparison of dermis with other renderers, Cycles and Mitsuba, on one CPU."""

@@ -1,4 +1,4 @@
-"""Noise and errors of the renderers, and the time in which Cycles reaches our error."""
+"""Noise and errors of dermis, Cycles and Mitsuba, and the time in which Cycles reaches dermis's error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.validation.pages import JsonObject
-from dermis.apps.validation.peers.rendering import GPU_GEMS_3_VARIANTS, VARIANTS, PeerRenders
+from dermis.apps.validation.peers.rendering import DERMIS_VARIANTS, GPU_GEMS_3_VARIANTS, PeerRenders
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,12 +24,12 @@ CLEAN_NOISE = 0.05
 
 @dataclass(frozen=True)
 class RendererRow:
-    """Times and errors of a renderer at one setting.
+    """Times and errors of a renderer with one setting.
 
-    setting : technique, or paths
-    seconds, core_seconds : elapsed time and CPU time of one image; None where none was rendered
-    noise : relative RMSE of its own noise [-]
-    relrmse, energy_ratio : against the reference, with standard errors; None for the reference itself
+    setting : technique of dermis, or paths per pixel of a path tracer
+    seconds, core_seconds : elapsed time and CPU time of one image [s]; None for a mean that was not rendered
+    noise : relative RMSE of the image's own noise [-]
+    relrmse, energy_ratio : errors against the reference, with standard errors; None for the reference itself
     """
 
     renderer: str
@@ -45,17 +45,17 @@ class RendererRow:
 
 @dataclass(frozen=True)
 class MeanImage:
-    """Mean of all passes of a method, and the variance of its noise, each (h, w, 3)."""
+    """Mean of all passes of a Cycles method, and the variance of its noise, each (h, w, 3)."""
 
     image: Floats
     variance: Floats
 
 
 def scene_results(renders: PeerRenders) -> JsonObject:
-    """Return the results of one scene, ready for JSON."""
+    """Return the times and errors of all renderers in one scene as a JSON object."""
     mask = common_mask(renders)
     means = {method: mean_of_passes(turns) for method, turns in renders.cycles.items()}
-    ours = [_dermis_row(renders, name, mask) for name in VARIANTS]
+    ours = [_dermis_row(renders, name, mask) for name in DERMIS_VARIANTS]
     of_2007 = [_dermis_row(renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
     rows = [*ours, *of_2007, _mitsuba_row(renders, mask)]
     for method, mean in means.items():
@@ -66,7 +66,7 @@ def scene_results(renders: PeerRenders) -> JsonObject:
         "pixels": int(mask.sum()),
         "rows": [asdict(row) for row in rows],
         "left_out": renders.left_out,
-        "ours_energy_put_right": {name: _corrected_error(renders, name, mask) for name in VARIANTS},
+        "ours_energy_put_right": {name: _corrected_error(renders, name, mask) for name in DERMIS_VARIANTS},
         "published": {row.setting: _time_ratios(row, ours[0]) for row in of_2007},
     }
     if "random-walk" in means:
@@ -81,7 +81,7 @@ def scene_results(renders: PeerRenders) -> JsonObject:
 
 
 def common_mask(renders: PeerRenders) -> Mask:
-    """Return the mask (h, w) of pixels that show only skin in every renderer."""
+    """Return the mask (h, w) of pixels that show only skin in the pictures of all renderers."""
     mask = renders.reference.mask > 0.999
     for turns in renders.cycles.values():
         for one in turns[0]:
@@ -90,9 +90,11 @@ def common_mask(renders: PeerRenders) -> Mask:
 
 
 def mean_of_passes(turns: Sequence[Sequence[CyclesPass]]) -> MeanImage:
-    """Return the mean of all passes, and its variance from the differences of equal passes.
+    """Return the mean of all passes of a method, and the variance of its noise.
 
-    turns : the passes of all levels, for each seed
+    The variance follows from the differences between passes with equal numbers of paths and different seeds.
+
+    turns : passes for each seed, one for each number of paths
     """
     levels = [level[0].samples for level in zip(*turns, strict=True)]
     image, variance = np.zeros(turns[0][0].image.shape), np.zeros(turns[0][0].image.shape)
@@ -104,19 +106,27 @@ def mean_of_passes(turns: Sequence[Sequence[CyclesPass]]) -> MeanImage:
 
 
 def pass_noise(one: NDArray[np.floating], other: NDArray[np.floating], mean: MeanImage, mask: Mask) -> float:
-    """Return the relative RMSE of the noise of one of two passes that differ only in their seed [-]."""
+    """Return the relative RMSE of the noise of a pass, from another pass with a different seed [-].
+
+    mean : mean of all passes
+    """
     difference = np.subtract(one, other, dtype=np.float64)[mask]
     return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean, mask)))
 
 
 def samples_for_noise(noise: float, samples: Sequence[int], noises: Sequence[float]) -> float:
-    """Return the paths per pixel for some noise, proportional to 1 / sqrt(N) from the nearest level."""
+    """Return the number of paths per pixel at which the noise reaches a given value.
+
+    It is extrapolated as 1 / sqrt(N) from the measured number with the most similar noise.
+
+    samples, noises : measured numbers of paths N, and their noise
+    """
     nearest = int(np.abs(np.log(np.divide(noises, noise))).argmin())
     return float(samples[nearest] * (noises[nearest] / noise) ** 2)
 
 
 def _signal_energy(mean: MeanImage, mask: Mask) -> float:
-    """Return the sum of squares of a picture without its noise."""
+    """Return the sum of squares of a picture over a mask, less that of its noise."""
     return float((mean.image**2 - mean.variance)[mask].sum())
 
 
@@ -133,7 +143,7 @@ def _dermis_row(renders: PeerRenders, name: str, mask: Mask) -> RendererRow:
 
 
 def _time_ratios(row: RendererRow, ours: RendererRow) -> dict[str, float]:
-    """Return the ratios of elapsed and CPU time of another frame to ours."""
+    """Return elapsed and CPU time of another frame of dermis over those of the first one."""
     assert row.seconds and row.core_seconds and ours.seconds and ours.core_seconds
     return {"ratio": row.seconds / ours.seconds, "core_ratio": row.core_seconds / ours.core_seconds}
 
@@ -148,7 +158,7 @@ def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
 
 
 def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask) -> list[RendererRow]:
-    """Return a row for each level, the mean of its two passes, and one for the mean of all without noise."""
+    """Return rows of Cycles: one for each number of paths, and one for the mean without its noise."""
     reference, rows = renders.reference, []
     for level in zip(*renders.cycles[method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
@@ -165,7 +175,10 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
 
 
 def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow, mask: Mask) -> JsonObject:
-    """Return the costs of the random walk for our total error, and for a nearly clean image."""
+    """Return the paths and time that a random walk needs for dermis's error, and for little noise.
+
+    ours : row of dermis, whose error against the reference is the goal
+    """
     reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value
     samples = [level[0].samples for level in levels]
@@ -177,11 +190,14 @@ def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow,
         to_mean = np.sqrt(_signal_energy(_reference_mean(reference), mask) / _signal_energy(mean, mask))
         noise = float(to_mean * np.sqrt(ours.relrmse**2 - bias**2))
         sample_counts["same_error"] = samples_for_noise(noise, samples, noises)
-    return {goal: _cost(count, levels[-1], ours) for goal, count in sample_counts.items()}
+    return {goal: _cycles_cost(count, levels[-1], ours) for goal, count in sample_counts.items()}
 
 
-def _cost(count: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
-    """Return the time of this many paths at the speed of one level, and its ratio to our frame."""
+def _cycles_cost(count: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
+    """Return the time of Cycles for a number of paths per pixel, and its ratio to a frame of dermis.
+
+    level : measured passes, from whose time per path the cost is extrapolated
+    """
     seconds = count * statistics.mean(one.seconds / one.samples for one in level)
     core_seconds = count * statistics.mean(one.core_seconds / one.samples for one in level)
     assert ours.seconds is not None and ours.core_seconds is not None
@@ -190,7 +206,10 @@ def _cost(count: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[
 
 
 def _corrected_error(renders: PeerRenders, name: str, mask: Mask) -> float:
-    """Return our error after scaling each channel to the reference's energy [-]."""
+    """Return the relative RMSE of dermis after scaling each channel to the reference's energy [-].
+
+    name : name of the variant
+    """
     reference, image = renders.reference, renders.ours[name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)
     return relative_rmse(image * scale, reference.image, mask, reference.variance).value

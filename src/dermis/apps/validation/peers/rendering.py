@@ -28,14 +28,19 @@ METHODS: tuple[Method, ...] = ("random-walk", "burley")
 
 @dataclass(frozen=True)
 class RenderVariant:
-    """Variant of our renderer: technique, atlas and angular distribution of skin."""
+    """Settings of dermis that are compared: technique, atlas and angular distribution of skin.
+
+    technique : scattering technique
+    atlas : side of the atlas [texel]
+    direction : angular distribution of the light that leaves the skin
+    """
 
     technique: str
     atlas: int = 1024
     direction: str = "half-space"
 
 
-VARIANTS = {
+DERMIS_VARIANTS = {
     "texture space, atlas 1024": RenderVariant("texture-space"),
     "texture space, atlas 512": RenderVariant("texture-space", 512),
     "Lambertian skin, atlas 1024": RenderVariant("texture-space", 1024, "lambertian"),
@@ -57,10 +62,10 @@ _STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
 class PeerPlan:
     """Sizes and numbers of the renderings.
 
-    side : of the image [pixel]
+    side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : frames of ours in each turn, after one that is not counted
+    frames : timed frames of dermis in each turn, after one that is not timed
     """
 
     side: int = 512
@@ -70,7 +75,7 @@ class PeerPlan:
 
     @property
     def work(self) -> int:
-        """Return the steps of the progress bar for one scene."""
+        """Return the number of steps of the progress bar for one scene."""
         cycles = len(FIRST_SEEDS) * sum(self.samples) * (_STEPS["random-walk"] + _STEPS["burley"])
         ours = (len(FIRST_SEEDS) * len(METHODS) + 2) * _STEPS["ours"]
         return ours + cycles + self.paths * _STEPS["path-traced"]
@@ -78,7 +83,7 @@ class PeerPlan:
 
 @dataclass
 class FrameTimes:
-    """Image of one of our variants, and the times of its frames [s]."""
+    """Image of one variant of dermis, and elapsed and CPU times of its frames [s]."""
 
     image: NDArray[np.float32]
     seconds: list[float] = field(default_factory=list)
@@ -89,10 +94,12 @@ class FrameTimes:
 class PeerRenders:
     """Pictures and times of all renderers for one scene.
 
-    ours : by the names of VARIANTS and GPU_GEMS_3_VARIANTS
-    cycles : by method; the passes of `PeerPlan.samples` for each seed
-    left_out : reasons for missing methods
-    reference_core_seconds : CPU time of Mitsuba, including the scene
+    light, region : names of the scene's light and of the visible region
+    ours : frames of dermis by names in VARIANTS and GPU_GEMS_3_VARIANTS
+    cycles : passes of Cycles by method, for each seed and each of `PeerPlan.samples`
+    left_out : reasons why methods of Cycles are missing
+    reference : path-traced image by Mitsuba
+    reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
     """
 
     light: str
@@ -111,9 +118,11 @@ def render_peers(
     renderer: Renderer,
     on_progress: Callable[[int], None] = lambda work: None,
 ) -> PeerRenders:
-    """Render everything under one light, with our frames before, between and after the others.
+    """Render a head under one light by all renderers.
 
-    on_progress : called with the number of steps since its last call
+    Frames of dermis are timed before, between and after the other renderers.
+
+    on_progress : function called with the number of steps since its last call
     """
     medium = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
@@ -149,13 +158,19 @@ def render_peers(
 def _cycles_passes(
     scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: Method, seed: int
 ) -> list[CyclesPass]:
-    """Return passes of Cycles after one that is not counted, which builds the scene."""
+    """Render the passes of Cycles after an untimed one, in which Cycles builds the scene.
+
+    seed : random seed of the first pass
+    """
     return cycles_passes(scene, medium, (1, *plan.samples), settings, method=method, seed=seed)[1:]
 
 
 def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
-    """Add frames with warm caches that recompute everything."""
-    for name, variant in (VARIANTS | GPU_GEMS_3_VARIANTS).items():
+    """Time further frames of each variant of dermis, which recompute all stages with warm caches.
+
+    ours : frames by variant, to which times are added
+    """
+    for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
         settings = Settings.model_validate(values | {"size": (plan.side, plan.side)})
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))

@@ -1,4 +1,4 @@
-"""Report on other renderers: command, JSON results and Markdown."""
+"""Report on the comparison with other renderers: command, JSON results and Markdown."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dermis.base.errors import DermisError, refuse
 
 FIGURES, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
 DEFAULT_LIGHTS = ("front", "back")
-QUICK = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
+QUICK_PLAN = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
 TARGET_RATIO = 50.0
 _COLUMNS = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
 
@@ -50,7 +50,7 @@ def peers(
     quick:
         A small image with few paths, to check that everything works. Writes only the file of -o.
     side:
-        Of the images [pixel; 512, or 160 with --quick].
+        Side of the images [pixel; 512, or 160 with --quick].
     output:
         JSON file of the results [benchmarks/results/peers.json, and docs/peers.md beside it].
     adapter:
@@ -60,7 +60,7 @@ def peers(
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         check_output(target, (".json",), "Choose such a name")
-    plan = QUICK if quick else PeerPlan()
+    plan = QUICK_PLAN if quick else PeerPlan()
     plan = plan if side is None else replace(plan, side=side)
     report = compare_peers(head, lights.split(","), plan, adapter)
     machine, scenes = machine_text(report), scenes_text(report)
@@ -72,9 +72,10 @@ def peers(
 
 
 def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
-    """Return the whole report, ready for JSON; without Cycles its rows are missing.
+    """Render and compare all scenes, and return the report as a JSON object.
 
-    Raises DermisError for unknown lights, and without Mitsuba, which renders the reference.
+    Rows of Cycles are missing if Cycles cannot run. Raises DermisError for unknown lights, and without
+    Mitsuba, which renders the reference.
     """
     for light in lights:
         if light not in SCENES:
@@ -101,15 +102,15 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
         "cpu": cpu_model(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "adapter": renderer.device.adapter.name,
-        "versions": versions(scenes),
+        "versions": software_versions(scenes),
         "denoising": False,
         "plan": asdict(plan),
         "scenes": [scene_results(one) for one in scenes],
     }
 
 
-def versions(scenes: list[PeerRenders]) -> dict[str, str]:
-    """Return the versions of Python and of everything that renders."""
+def software_versions(scenes: list[PeerRenders]) -> dict[str, str]:
+    """Return the versions of Python, NumPy and all renderers, by name."""
     numbers = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [turns[0][0] for one in scenes for turns in one.cycles.values() if turns]
     if passes:
@@ -118,7 +119,7 @@ def versions(scenes: list[PeerRenders]) -> dict[str, str]:
 
 
 def cpu_model() -> str:
-    """Return the name of the processor where the system provides it, else its architecture."""
+    """Return the name of the processor if the system provides it, or its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -128,20 +129,20 @@ def cpu_model() -> str:
 
 
 def scenes_text(report: JsonObject) -> str:
-    """Return a Markdown section for each light."""
+    """Return a Markdown section for the scene with each light."""
     sections = (f"## {one['light'].capitalize()}\n\n{scene_text(one)}" for one in report["scenes"])
     return "\n\n".join(sections)
 
 
 def scene_text(scene: JsonObject) -> str:
-    """Return the table of one scene and sentences about it."""
+    """Return a Markdown table of the renderers in one scene, and sentences about it."""
     head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
     table = [head, *(_table_line(row) for row in scene["rows"])]
     return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
 
 
 def machine_text(report: JsonObject) -> str:
-    """Return the date, the machine and the versions of a measurement, in one line."""
+    """Return the date, the machine and the software versions of a measurement in one line."""
     versions = ", ".join(f"{name} {version}" for name, version in report["versions"].items())
     side = report["plan"]["side"]
     machine = f"{report['cpu']}, {report['cores']} cores; ours on {report['adapter']}"
@@ -152,10 +153,10 @@ def _table_line(row: JsonObject) -> str:
     seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
     noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
     cells = row["renderer"], row["setting"], seconds, noise
-    return f"| {' | '.join((*cells, _value(row, 'relrmse'), _value(row, 'energy_ratio')))} |"
+    return f"| {' | '.join((*cells, _estimate_cell(row, 'relrmse'), _estimate_cell(row, 'energy_ratio')))} |"
 
 
-def _value(row: JsonObject, name: str) -> str:
+def _estimate_cell(row: JsonObject, name: str) -> str:
     return "-" if row[name] is None else f"{row[name]:.4f} ± {row[name + '_se']:.4f}"
 
 
@@ -183,7 +184,7 @@ def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> s
 
 
 def _time_text(times: dict[str, float]) -> str:
-    """Return time and paths, and the ratios of elapsed and CPU time to our frame."""
+    """Return text with the time and paths of Cycles, and with their ratios to a frame of dermis."""
     elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
     cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"
     return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"
@@ -194,7 +195,10 @@ def _ratio_text(ratio: float) -> str:
 
 
 def _burley_sentence(scene: JsonObject) -> str:
-    """Return the error of Burley's profile against the random walk, and ours against path tracing."""
+    """Return a sentence that compares the error of Burley's profile with that of dermis.
+
+    The former is against Cycles' random walk, the latter against path tracing.
+    """
     burley_error, error = scene["burley_against_random_walk"]
     verdicts = []
     for row in scene["rows"]:
