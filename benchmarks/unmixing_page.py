@@ -57,9 +57,9 @@ def _known(results: JsonObject) -> str:
         "without noise: melanin, blood, CIEDE2000",
         "1 % noise: melanin",
         "blood",
-        "its bound",
+        "bound of blood",
         "RMS over the bound",
-        "RMS over what the map states",
+        "RMS over the stated deviation",
     )
     rows = []
     for mm, bands in results["known"].items():
@@ -73,8 +73,8 @@ def _known(results: JsonObject) -> str:
 
 
 def _mistaken(results: JsonObject) -> str:
-    heads = "the skin is", "oxygen", "melanin found over true", "blood found over true", "CIEDE2000 left"
-    words = {"none": "held", "oxygen": "found too"}
+    heads = "true skin", "oxygen", "melanin, found / true", "blood, found / true", "remaining CIEDE2000"
+    words = {"none": "fixed", "oxygen": "estimated"}
     rows = [
         (name, words[third], f"{one['melanin']:.2f}", f"{one['blood']:.2f}", f"{one['delta_e']:.2f}")
         for name, both in results["mistaken"].items()
@@ -84,7 +84,7 @@ def _mistaken(results: JsonObject) -> str:
 
 
 def _counted(results: JsonObject) -> str:
-    heads = "melanin", "found", "blood", "found", "CIEDE2000 left", "of the true skin's colour by diffusion"
+    heads = "melanin", "found", "blood", "found", "remaining CIEDE2000", "CIEDE2000 of diffusion"
     rows = [
         (
             one["melanin"],
@@ -102,15 +102,15 @@ def _counted(results: JsonObject) -> str:
 def _shading(results: JsonObject) -> str:
     rows = [
         (words, _percent(results[key]["melanin"]), _percent(results[key]["blood"]))
-        for key, words in (("kept", "left in the colours"), ("divided", "found and divided by"))
+        for key, words in (("kept", "not corrected"), ("divided", "estimated and divided out"))
     ]
     varies, left = _percent(results["light"]), _percent(results["left"])
-    light = f"The light varies by {varies}; {left} of it is left afterwards.\n"
-    return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
+    light = f"The light varies by {varies}; {left} remain after the correction.\n"
+    return _table(("light", "median error of melanin", "of blood"), rows) + "\n" + light
 
 
 def _supplied(results: Sequence[JsonObject]) -> str:
-    heads = "melanin", "skins", "CIEDE2000 of the colour", "left when found", "melanin off by", "blood"
+    heads = "melanin", "skins", "CIEDE2000 of the colour", "remaining after the fit", "melanin error", "of blood"
     rows = [
         (
             "{:g} to {:g}".format(*one["melanin"]),
@@ -126,7 +126,7 @@ def _supplied(results: Sequence[JsonObject]) -> str:
 
 
 def _borders(results: JsonObject) -> str:
-    heads = "media", "weights of", "mean error", "worst", "light in all", "white skin's light"
+    heads = "media", "weights of", "mean error", "worst error", "error of the total", "energy, white skin"
     rows = [
         (name, rule, *(_percent(one[key]) for key in ("rms", "worst", "energy", "white")))
         for name, pair in results["pairs"].items()
@@ -151,17 +151,18 @@ def _speed(*machines: JsonObject) -> str:
 
 
 def _fitting(results: JsonObject) -> str:
-    heads = "pictures", "number", "median error", "90 %", "worst", "bias (median)"
+    heads = "pictures", "parameter", "median error", "90 %", "worst", "bias (median)"
     rows = [
         row
-        for key, words in (("own", "our own frames"), ("traced", "path-traced"))
+        for key, words in (("own", "rendered by dermis"), ("traced", "path-traced"))
         for row in _errors(results[key], f"{len(results[key])} {words}")
     ]
     seconds = statistics.median(one["seconds"] for one in results["traced"])
     busy = statistics.median(one["processor_seconds"] for one in results["traced"])
-    size = f"{results['side']} x {results['side']} pixels, {results['samples']} paths a pixel"
-    took = f"{results['adapter']}: {seconds:.3g} s for a fit in the median, {busy:.3g} s of processor time"
-    return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(results['traced'])}"
+    size = f"{results['side']} x {results['side']} pixels, {results['samples']} paths per pixel"
+    took = f"{results['adapter']}: a fit takes {seconds:.3g} s (median), {busy:.3g} s of processor time"
+    text = f"{size}, fitted at a width of 128 pixels. {took}.\n\n{_stated(results['traced'])}"
+    return f"{_table(heads, rows)}\n{text}"
 
 
 def _errors(cases: Sequence[JsonObject], words: str) -> list[tuple[str, ...]]:
@@ -188,8 +189,8 @@ def _stated(cases: Sequence[JsonObject]) -> str:
         over = [math.log(a / b) / one[name]["relative_sd"] for one in cases for a, b in [_pair(one[name])]]
         within = sum(abs(x) < 2.0 for x in over) / len(over)
         rms = math.sqrt(statistics.fmean(x * x for x in over))
-        words.append(f"{name} {rms:.1f} times (RMS; within twice of it in {_percent(within)} of the faces)")
-    return f"Errors of path-traced faces over the stated standard deviations: {', '.join(words)}.\n"
+        words.append(f"{name} {rms:.1f} (RMS; within two deviations for {_percent(within)} of the faces)")
+    return f"Errors of path-traced faces relative to the stated standard deviations: {', '.join(words)}.\n"
 
 
 def _thousandths(value: float) -> str:
