@@ -1,4 +1,4 @@
-// Stores known numbers to a half-float texture, from which the rounding of stores is found.
+// Stores known values to a half-float texture, to find out how a device rounds them.
 
 @group(0) @binding(0) var<uniform> size: vec4u;
 @group(0) @binding(1) var rounded: texture_storage_2d<rgba16float, write>;
