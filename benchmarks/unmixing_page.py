@@ -110,7 +110,8 @@ def _shading(results: JsonObject) -> str:
 
 
 def _supplied(results: Sequence[JsonObject]) -> str:
-    heads = "melanin", "skins", "CIEDE2000 of the colour", "remaining after the fit", "melanin error", "of blood"
+    colour = "CIEDE2000 of the colour", "remaining after the fit"
+    heads = "melanin", "skins", *colour, "melanin error", "of blood"
     rows = [
         (
             "{:g} to {:g}".format(*one["melanin"]),
