@@ -41,8 +41,8 @@ _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for t
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) -> tuple[Head, float]:
     """Return a head with roughness and specular maps by region of the face.
 
-    The specular map contains rho_s itself. As the renderer scales specular maps to a mean of `Skin.rho_s`, set
-    `rho_s` to the returned mean. Existing roughness and specular maps of the head contribute their fine
+    The specular map contains rho_s itself. As the renderer scales specular maps to a mean of `Skin.rho_s`,
+    set `rho_s` to the returned mean. Existing roughness and specular maps of the head contribute their fine
     detail, as a factor relative to their local mean.
 
     Parameters
