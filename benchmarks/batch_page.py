@@ -48,8 +48,8 @@ def _machine(figures: JsonObject) -> str:
     parts = [
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
         f"{width} x {height}, atlas {machine['atlas']}; outputs of each picture: "
-        f"{', '.join(machine['outputs'])}, landmarks and parameters.\n{figures['date'][:10]}, dermis {versions['dermis']}, "
-        f"wgpu {versions['wgpu']}; "
+        f"{', '.join(machine['outputs'])}, landmarks and parameters.\n"
+        f"{figures['date'][:10]}, dermis {versions['dermis']}, wgpu {versions['wgpu']}; "
         f"load average before the run: {figures['load']}.{_remarks(figures)}\n",
         "### Measured\n",
         _rates(figures),
