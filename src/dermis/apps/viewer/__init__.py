@@ -1,1 +1,1 @@
-"""Interactive viewer in a desktop window, a web page or a notebook."""
+"""Interactive viewer of heads in a desktop window, a web page or a notebook."""

@@ -1,4 +1,4 @@
-"""Pointer, touch and keyboard input over the picture."""
+"""Pointer, touch and keyboard input over the picture, converted to changes of the viewer state."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs 
 class Controls:
     """Conversion of input events to steps of the undo history.
 
-    displayed_state : function that returns the visible state, if it is not that of the history
-    light : index of the light moved by Shift-drag; an index after the last light means the environment
+    displayed_state : function that returns the state on screen, which differs from the history during
+        playback
+    light : index of the light that Shift-drag moves; an index after the last light means the environment
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class Controls:
             self._on_key(str(event["key"]), event.get("modifiers", ()))
 
     def set_camera_preset(self, name: str) -> None:
-        """Set the camera to a preset."""
+        """Set the camera to a preset such as "portrait" or "profile"."""
         state = self.history.state
         self.history.end_gesture()
         self.history.change(state.with_camera(camera_preset(name, state.scene.head)))
@@ -93,7 +94,10 @@ class Controls:
         self.history.change(new_state, f"drag {self._gesture}")
 
     def _two_fingers(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
-        """Pan and zoom with two fingers; lifting one of them does not move the picture."""
+        """Pan and zoom with two fingers; lifting one of them does not move the picture.
+
+        pinch : midpoint (x, y) and distance of the fingers, None for fewer than two
+        """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
             side = self._side(size)
@@ -103,7 +107,11 @@ class Controls:
         self._pinch = pinch
 
     def _zoom(self, factor: float, pointer: Point, size: Point, gesture: str) -> None:
-        """Dolly the camera, or scale the atlas around the pointer."""
+        """Move the camera nearer or farther, or scale the atlas around the pointer.
+
+        factor : factor of the visible height; below 1 zooms in
+        gesture : name of the gesture, which is undone in one step
+        """
         state = self.history.state
         if state.view == ATLAS:
             x, y = ((a - 0.5 * b) / self._side(size) for a, b in zip(pointer, size, strict=True))
@@ -113,7 +121,7 @@ class Controls:
         self.history.change(new_state, gesture)
 
     def _side(self, size: Point) -> float:
-        """Return the length that drags are relative to: image height, or shorter side for the atlas."""
+        """Return the length by which drags are divided: image height, or shorter side for the atlas view."""
         return max(1.0, min(size) if self.history.state.view == ATLAS else size[1])
 
     def _focus(self, event: Event, size: Point) -> None:
@@ -139,7 +147,7 @@ class Controls:
 class SplitView:
     """Before/after comparison: a frozen state left of a divider, the live state right of it.
 
-    frozen_state : state on the left, seen by the live camera; None without a divider
+    frozen_state : state on the left, rendered with the live camera; None without a divider
     divider_position : fraction of the picture width left of the divider
     is_dragged : whether the divider is being dragged
     """
@@ -150,11 +158,11 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a state on the left side."""
+        """Show a divider, with the given state left of it."""
         self.frozen_state = state
 
     def release(self) -> None:
-        """Show only the live state."""
+        """Remove the divider, so that only the live state is shown."""
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, width: float) -> bool:
@@ -170,7 +178,7 @@ class SplitView:
 
 
 def picture_event(event: Event, left: float) -> Event:
-    """Return an event in the coordinates of a picture whose left edge is at `left` in the window."""
+    """Convert an event from window to picture coordinates, by subtracting the left edge of the picture."""
     shifted = dict(event)
     if "x" in shifted:
         shifted["x"] -= left
@@ -181,14 +189,17 @@ def picture_event(event: Event, left: float) -> Event:
 
 
 def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
-    """Return the state with the camera or the atlas view moved by the pointer."""
+    """Return the state with its camera, or its part of the atlas, moved along with the pointer.
+
+    right, down : motion of the pointer over the length `Controls._side`
+    """
     if state.view == ATLAS:
         return state.with_atlas_view(state.atlas_view.panned(right, down))
     return state.with_camera(pan(state.scene.camera, -right, down))
 
 
 def _pinch(event: Event) -> tuple[float, float, float] | None:
-    """Return midpoint (x, y) and distance of two fingers; None for fewer than two."""
+    """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two."""
     touches = list((event.get("touches") or {}).values())
     if len(touches) < 2:
         return None

@@ -1,4 +1,4 @@
-"""Camera and light navigation: orbit, pan, dolly, focus, picking and easing."""
+"""Navigation of camera and lights: orbit, pan, dolly, focus, picking and smooth motion."""
 
 from __future__ import annotations
 
@@ -22,14 +22,17 @@ _EASING_TIME_S = 0.05  # time constant of the exponential decay
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
-    """Return the unit vectors to the right, up and forward of the image."""
+    """Return the unit vectors of a camera: right and up in the image plane, and forward."""
     forward = _unit(np.subtract(camera.target, camera.position))
     right = _unit(np.cross(forward, camera.up))
     return right, np.cross(right, forward), forward
 
 
 def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
-    """Orbit the camera around its target to the right and up [rad], without passing over the top."""
+    """Orbit the camera around its target, without passing over the top or bottom.
+
+    yaw, pitch : angles to the right and up [rad]
+    """
     up = _unit(np.array(camera.up, dtype=np.float64))
     offset = np.subtract(camera.position, camera.target)
     distance = float(np.linalg.norm(offset))
@@ -42,14 +45,20 @@ def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
 
 
 def pan(camera: Camera, right: float, up: float) -> Camera:
-    """Shift the camera along the image plane, in fractions of the image height."""
+    """Shift the camera and its target parallel to the image plane.
+
+    right, up : shifts, in fractions of the height of the visible frame
+    """
     x, y, _ = camera_axes(camera)
     shift = camera.frame_mm * (right * x + up * y)
     return _with_position(camera, camera.position + shift, camera.target + shift)
 
 
 def dolly(camera: Camera, factor: float) -> Camera:
-    """Move the camera nearer (factor below 1) or farther; within 90 mm of the target zoom the lens."""
+    """Move the camera nearer (factor below 1) or farther; closer than 90 mm, zoom the lens instead.
+
+    factor : factor of the visible height at the target [-]
+    """
     frame_mm = max(_FRAME_RANGE_MM[0], min(_FRAME_RANGE_MM[1], factor * camera.frame_mm))
     offset = np.subtract(camera.position, camera.target)
     old_distance = float(np.linalg.norm(offset))
@@ -60,26 +69,35 @@ def dolly(camera: Camera, factor: float) -> Camera:
 
 
 def focus(camera: Camera, point: ArrayLike) -> Camera:
-    """Move the camera so that a point becomes its target, keeping direction and distance."""
+    """Shift the camera so that a point becomes its target; direction and distance are unchanged."""
     shift = np.subtract(point, camera.target)
     return _with_position(camera, np.array(camera.position) + shift, point)
 
 
 class CameraEasing:
-    """Smooth motion of the displayed camera to the target camera, independent of the frame rate."""
+    """Smooth motion of the displayed camera towards the camera of the state, at any frame rate."""
 
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
 
     def advance(self, target: Camera, seconds: float) -> Camera:
-        """Return the camera to display after some time [s]."""
+        """Move the displayed camera towards a target for some time, and return it.
+
+        target : camera to approach
+        seconds : time since the last call [s]
+        """
         if self.camera != target:
             self.camera = interpolate_cameras(self.camera, target, -math.expm1(-seconds / _EASING_TIME_S))
         return self.camera
 
 
 def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
-    """Interpolate two cameras: rotate directions, scale distances and frames; snap to `b` when close."""
+    """Interpolate from camera `a` to camera `b`; return `b` itself when the difference is invisible.
+
+    Directions are rotated, distances and frame sizes are scaled.
+
+    t : position between the cameras, from 0 to 1
+    """
     if t >= 1.0:
         return b
     target = _interpolate(a.target, b.target, t)
@@ -103,7 +121,9 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
-    """Return the surface point under a pixel, relative to the head's centre [mm]; None beside the head.
+    """Return the surface point under a position of the image [mm]; None beside the head.
+
+    The point is relative to the centre of the head.
 
     scene : scene with the posed head
     camera : camera to use instead of that of the scene
@@ -131,9 +151,9 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
 
 
 def drag_light(state: ViewerState, index: int, right: float, up: float) -> ViewerState:
-    """Orbit a light around the head as seen in the image, or rotate the environment.
+    """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
-    index : index of the light; any other number means the environment
+    index : index of the light; any other index means the environment
     right, up : angles [rad]
     """
     if index < len(state.scene.lights):
@@ -148,7 +168,12 @@ def drag_light(state: ViewerState, index: int, right: float, up: float) -> Viewe
 
 
 def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
-    """Rotate a light around its target; a directional light changes its direction."""
+    """Rotate a light around its target in the axes of the camera.
+
+    The rotation changes the direction of a directional light, and the position of any other light.
+
+    right, up : angles [rad]
+    """
     x, y, _ = camera_axes(camera)
     rotation = _rotation(y, right) @ _rotation(x, -up)
     if isinstance(light, DirectionalLight):
@@ -179,7 +204,10 @@ def _interpolate(a: ArrayLike, b: ArrayLike, t: float) -> Floats:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """Return the (3, 3) rotation matrix around a unit axis [rad]."""
+    """Return the (3, 3) matrix of a rotation around a unit axis.
+
+    angle : angle [rad]
+    """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))

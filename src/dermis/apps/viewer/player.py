@@ -1,4 +1,4 @@
-"""Playback of a motion: the pose of each moment while it plays, a step of the undo history where it stops."""
+"""Playback of a motion over the viewer state; where it stops, its pose becomes a step of the undo history."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file and the clip loaded from it for a head.
+    """Motion file, and the clip that was loaded from it for the last head.
 
     path : file that `load_motion` accepts
     fps : frame rate of files without times [1/s]
@@ -25,9 +25,9 @@ class MotionFile:
         self._last: tuple[Head, Clip] | None = None
 
     def load_clip(self, head: Head) -> Clip:
-        """Return the clip for a head; that of the last head is cached.
+        """Return the clip of the file for a head, cached for the last head.
 
-        Raises DermisError if the file cannot be read, or if the head has none of its names.
+        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
         """
         if self._last is None or self._last[0] is not head:
             self._last = head, load_motion(self.path, head, fps=self._fps)
@@ -35,17 +35,17 @@ class MotionFile:
 
 
 class MotionPlayer:
-    """Player of a motion, with its time and the displayed state.
+    """Player of a motion, with its current time and the displayed state.
 
-    While it plays, the pose of the moment is applied over the state of the history, which other changes still
-    extend. When it stops, its pose becomes a step of the history.
+    While the motion plays, its current pose replaces that of the state, which other controls can still
+    change. When it stops, that pose becomes a step of the undo history.
 
     motion : motion to play, None for none
     clock : function that returns the time [s]
 
     is_playing : whether the motion plays
     loops : whether the motion restarts at its end
-    note : names that the head lacks, or why the motion cannot be played
+    note : names in the motion that the head lacks, or the reason why it cannot be played
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class MotionPlayer:
 
     @property
     def has_motion(self) -> bool:
-        """Return whether a motion is loaded, for this head or another."""
+        """Return whether a motion is loaded, even if it does not suit the current head."""
         return self._motion is not None
 
     @property
@@ -90,7 +90,7 @@ class MotionPlayer:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the current state, with the pose of the moment while the motion plays."""
+        """Return the current state, with the current pose of the motion while it plays."""
         state = self._history.state
         clip = self.clip if self.is_playing else None
         if clip is None:
@@ -105,9 +105,9 @@ class MotionPlayer:
         return self._cached[2]
 
     def open(self, motion: MotionFile) -> None:
-        """Play another motion.
+        """Replace the motion and play it from its beginning.
 
-        Raises DermisError if the file cannot be read, or if the head has none of its names.
+        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
         """
         motion.load_clip(self._history.state.scene.head)
         self.pause()
@@ -115,7 +115,10 @@ class MotionPlayer:
         self.play(0.0)
 
     def play(self, seconds: float | None = None) -> None:
-        """Play from a time or from the current one [s]; from the beginning if that is the end."""
+        """Play the motion; at its end, start again from the beginning.
+
+        seconds : time to start from, None for the current time [s]
+        """
         if self.clip is None:
             return
         start = self.seconds if seconds is None else seconds
@@ -123,11 +126,11 @@ class MotionPlayer:
         self.is_playing, self._starting, self._start_time = True, True, None
 
     def stop(self) -> None:
-        """Stop and restore the state before playing."""
+        """Stop, and return to the pose from before playing."""
         self.is_playing, self._cached = False, None
 
     def pause(self) -> None:
-        """Stop and keep the current pose as one step of the history."""
+        """Stop, and add the current pose to the undo history as one step."""
         if self.is_playing:
             displayed = self.displayed_state
             self.stop()
@@ -135,14 +138,17 @@ class MotionPlayer:
             self._history.change(displayed)
 
     def toggle(self) -> None:
-        """Play or pause."""
+        """Pause the motion if it plays, else play it."""
         if self.is_playing:
             self.pause()
         else:
             self.play()
 
     def advance(self) -> None:
-        """Advance to the time of the clock, which starts after the first frame because that may take long."""
+        """Advance the motion to the current time of the clock.
+
+        Time starts after the first frame, which may take long.
+        """
         now, clip = self._clock(), self.clip if self.is_playing else None
         if clip is None or self._starting:
             self.is_playing, self._starting = clip is not None, False
@@ -157,7 +163,12 @@ class MotionPlayer:
             self.pause()
 
     def state_at(self, seconds: float) -> ViewerState:
-        """Stop and return the state at a time [s]; raise DermisError if its frame cannot be read."""
+        """Stop playing, and return the state with the pose of the motion at a given time.
+
+        seconds : time in the motion [s]
+
+        Raises DermisError if the frame at that time cannot be read.
+        """
         self.stop()
         clip, state = self.clip, self._history.state
         return state if clip is None else state.with_motion(clip, seconds)

@@ -1,4 +1,4 @@
-"""Pose edits of the viewer: morph target weights, bone angles and the rest pose."""
+"""Edits of the pose: morph target weights, bone angles, and the return to rest."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ REST_POSE = Pose()
 
 
 def target_weight(scene: Scene, target: str) -> float:
-    """Return the weight of a morph target in the pose, or else its rest weight."""
+    """Return the weight of a morph target in the pose of a scene; its rest weight without one."""
     return float(_pose(scene).weights.get(target, _rest_weight(scene.head, target)))
 
 
 def with_target_weight(scene: Scene, target: str, weight: float) -> Pose | None:
-    """Return the pose of the scene with another weight of a morph target."""
+    """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
     weights = dict(_pose(scene).weights)
     weights.pop(target, None)
     if weight != _rest_weight(scene.head, target):
@@ -32,7 +32,10 @@ def with_target_weight(scene: Scene, target: str, weight: float) -> Pose | None:
 
 
 def bone_angles(scene: Scene, bone: str) -> Angles:
-    """Return the rotation of a bone about the head's x, y and z axes [degrees], also for matrices."""
+    """Return the rotation of a bone about the head's x, y and z axes [degrees].
+
+    A rotation that the pose stores as a matrix is converted.
+    """
     rotation, skeleton = _pose(scene).bones.get(bone), scene.head.control.skeleton
     if rotation is None or skeleton is None:
         return 0.0, 0.0, 0.0
@@ -45,7 +48,10 @@ def bone_angles(scene: Scene, bone: str) -> Angles:
 
 
 def with_bone_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
-    """Return the pose of the scene with other angles of a bone [degrees]."""
+    """Return the pose of a scene with new angles of one bone; None for the rest pose.
+
+    degrees : rotation about the head's x, y and z axes [degrees]
+    """
     bones = dict(_pose(scene).bones)
     bones.pop(bone, None)
     if any(degrees):
@@ -54,12 +60,15 @@ def with_bone_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
 
 
 def rest_pose(scene: Scene) -> Pose | None:
-    """Return the pose of the scene without weights and rotations; vertex positions of the person stay."""
+    """Return the pose of a scene without morph weights and bone rotations.
+
+    Vertex positions of a person are kept; None is the rest pose of the head itself.
+    """
     return _none_if_rest(replace(_pose(scene), weights={}, bones={}))
 
 
 def poses_equal(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float] | None) -> bool:
-    """Return whether two poses are equal; vertex positions are compared by identity."""
+    """Return whether two poses are equal; arrays of vertex positions must be the same object."""
     if a is b:
         return True
     first, second = Pose.coerce(a) or REST_POSE, Pose.coerce(b) or REST_POSE
@@ -84,7 +93,7 @@ def posed_positions(scene: Scene) -> NDArray[np.floating]:
 
 
 def filter_names(names: Sequence[str], text: str) -> list[str]:
-    """Return the names that contain a text, ignoring case."""
+    """Return the names that contain a search text, ignoring case."""
     query = text.strip().casefold()
     return [name for name in names if query in name.casefold()]
 
@@ -94,7 +103,7 @@ def _pose(scene: Scene) -> Pose:
 
 
 def _none_if_rest(pose: Pose) -> Pose | None:
-    """Return the pose, or None if it moves nothing."""
+    """Return a pose, or None if it equals the rest pose of the head."""
     return pose if pose.weights or pose.bones or pose.positions_mm is not None else None
 
 

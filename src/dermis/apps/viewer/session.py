@@ -1,4 +1,4 @@
-"""Viewing session: everything of the viewer except its window, shared by input and panel."""
+"""Viewing session: state, controls, player and renderer of the viewer, which window and panel share."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ LoadedHead = Head | ViewerState
 class HeadLoader:
     """Loader of heads in a background thread, while the picture stays interactive.
 
-    recent : paths of opened files, the last one first
-    request_frame : function called from another thread when a head is ready for the next frame
+    recent : paths of opened files, the most recent first
+    request_frame : function that requests a frame, called from another thread when a head is loaded
     """
 
     def __init__(self) -> None:
@@ -47,21 +47,22 @@ class HeadLoader:
 
     @property
     def note(self) -> str:
-        """Return the message about the head that is being opened, empty for none."""
+        """Return a message that names the head being loaded, empty if none is."""
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
     def display_name(self, name: str) -> str:
-        """Return the name of a head as displayed: that of a file without its folder."""
+        """Return the name of a head for display; files are shown without their folder."""
         return Path(self.uploaded_name(name)).name
 
     def uploaded_name(self, name: str) -> str:
-        """Return the original name of an uploaded file; the name itself for other heads."""
+        """Return the original name of an uploaded file from its path; other names are returned unchanged."""
         return self._names.get(name, name)
 
     def open(self, name: str, uploaded_as: str = "") -> None:
-        """Start to open a head or a scene, instead of any that is still being opened.
+        """Start to load a head or a scene; a load that has not started yet is cancelled.
 
-        uploaded_as : name given by the page that sent the file
+        name : name of a built-in head or sample, or path of a mesh or scene file
+        uploaded_as : original name of an uploaded file
         """
         if self._future:
             self._future.cancel()
@@ -72,9 +73,11 @@ class HeadLoader:
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with the opened head, once; None if none is ready.
+        """Return the state with the head that has been loaded, once; None if no load has ended.
 
-        Raises DermisError if the head cannot be opened.
+        state : current state, in which the head is replaced
+
+        Raises DermisError if the head cannot be loaded.
         """
         if self._future is None or not self._future.done():
             return None
@@ -93,7 +96,12 @@ def _load(name: str) -> LoadedHead:
 
 
 def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
-    """Return the state with another head; the pose is kept if morph targets and bones are equal."""
+    """Return the state with another head.
+
+    The pose is kept if the heads have the same morph targets and bones.
+
+    name : name or path that the head was loaded from
+    """
     old_head = state.scene.head
     same_names = old_head.targets == head.targets and old_head.bones == head.bones
     pose = state.scene.pose if same_names else None
@@ -113,19 +121,22 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """Undo history, the controls and the player that change it, and the renderer that draws its state.
+    """Viewing session: undo history, the controls and player that change it, and the renderer of its state.
 
     motion : motion to play, None for none
     clock : function that returns the time [s]
 
     split : before/after comparison
     status, message : text over the picture: state of the adapter, and result of the last action
-    scene_file, picture_file : file names for the buttons of the panel
-    picture_size, view_size : sizes of screenshots, (0, 0) for that of the view, and of the view [pixel]
-    heads, head_file : loader of other heads, and the file name typed for it
-    request_file : function that asks a page for a file; None if files have paths
-    offer_download : function that sends name and bytes of a file to a page; None if files are written
-    motion_file, search : name of the motion file, and text that filters the expressions
+    scene_file, picture_file : file names typed in the panel for the scene and for screenshots
+    picture_size : size of screenshots, (0, 0) for the size of the view [pixel]
+    view_size : size of the view [pixel]
+    heads : loader of heads in the background
+    head_file : file name of a head typed in the panel
+    request_file : function that asks a web page for a file; None where the panel has a field for its path
+    offer_download : function that sends name and bytes of a file to a page; None where files are written
+    motion_file : file name of a motion typed in the panel
+    search : text by which morph targets and bones are filtered
     positions : positions of the panel's controls in the window, by label
     """
 
@@ -158,16 +169,22 @@ class Session:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the current state with the playing motion: what is displayed, saved and frozen."""
+        """Return the state on screen, which is saved and frozen: the current one with the playing motion."""
         return self.player.displayed_state
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Set a new state; changes with the same gesture are undone together."""
+        """Set a new state as a step of the undo history.
+
+        gesture : name of the gesture; consecutive changes by one gesture are undone together
+        """
         self.history.change(state, gesture)
         self.message = ""
 
     def report_error(self, failure: str, error: Exception) -> None:
-        """Report an unexpected error once: over the picture, and with its traceback in the log."""
+        """Report an unexpected error, once: over the picture, and with its traceback in the log.
+
+        failure : what cannot be done, such as "The head cannot be opened"
+        """
         message = f"{failure} ({type(error).__name__}: {_shorten(str(error))})"
         if message not in self._faults:
             self._faults.add(message)
@@ -175,7 +192,7 @@ class Session:
             _log.error(message, exc_info=error)
 
     def save(self, path: Path) -> None:
-        """Write the scene file, or offer it as a download.
+        """Write the displayed state to a scene file, or offer the file as a download.
 
         Raises DermisError if that is not possible.
         """
@@ -187,7 +204,7 @@ class Session:
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
-        """Open a scene file.
+        """Replace the state by that of a scene file.
 
         Raises DermisError if the file is not a scene.
         """
@@ -197,7 +214,7 @@ class Session:
         self.message = f"loaded {path}"
 
     def take_head(self) -> None:
-        """Show the head that has been opened in the background, or the reason why it cannot be opened."""
+        """Show the head that was loaded in the background, or a message why it cannot be loaded."""
         try:
             state = self.heads.take_loaded(self.state)
         except DermisError as error:
@@ -211,15 +228,17 @@ class Session:
             self.change(state)
 
     def open_motion(self, path: str) -> None:
-        """Play the motion of a file.
+        """Open a motion file and play it.
 
-        Raises DermisError if the file cannot be read, or if the head has none of its names.
+        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
         """
         self.player.open(MotionFile(path))
         self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the picture at any size, or offer it as a download: .png (tone-mapped) or .exr (linear).
+        """Write the displayed view as .png (tone-mapped) or .exr (linear), or offer it as a download.
+
+        size : width and height [pixel]
 
         Raises DermisError if that is not possible.
         """
@@ -247,7 +266,7 @@ def _shorten(text: str) -> str:
 
 
 def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerState] = ()) -> ViewerState:
-    """Return the state with the maps of a table of face regions, or without such maps.
+    """Return the state with roughness and specular maps from a table of face regions, or without these.
 
     name : name of the table, "auto" or "none"
     known_states : states whose heads are reused if they already have these maps

@@ -1,4 +1,4 @@
-"""Immutable state of the viewer and its undo history."""
+"""Immutable state of the viewer, its scene file, and the undo history."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
 
 @dataclass(frozen=True)
 class AtlasView:
-    """Part of the atlas that fills the picture.
+    """Part of the atlas that fills the picture in the view "atlas".
 
-    layer : one of `views.LAYERS`
+    layer : map to show, one of `views.LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
     span : extent of the picture's shorter side, in sides of the atlas [-]
     """
@@ -46,13 +46,17 @@ class AtlasView:
     span: float = 1.05
 
     def panned(self, right: float, down: float) -> AtlasView:
-        """Return the view after a drag, in fractions of the picture's shorter side."""
+        """Return the view moved along with a drag.
+
+        right, down : motion of the pointer, in fractions of the picture's shorter side
+        """
         u, v = self.centre
         return self._at(u - self.span * right, v - self.span * down)
 
     def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
-        """Return the view zoomed in (factor below 1) or out around the cursor.
+        """Return the view zoomed around the cursor.
 
+        factor : factor of the visible extent; below 1 zooms in
         x, y : cursor relative to the centre of the picture, right and down, in fractions of its shorter side
         """
         span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
@@ -73,14 +77,14 @@ PARTS = {"diffuse": "diffuse", "specular": "specular"}
 
 @dataclass(frozen=True, eq=False)
 class ViewerState:
-    """Scene, render settings, and the view that is displayed.
+    """State of the viewer: the scene, the render settings, and the view that is displayed.
 
     settings : render settings; `size` is ignored because the window determines it
-    head : [head] table that the head was loaded from
+    head : [head] table of a scene file from which the head was loaded
     view : one of `views.VIEWS`: the picture or an intermediate result
-    rig : preset of the lights, empty for custom lights
+    rig : name of the light preset, empty for custom lights
     atlas_view : part of the atlas that the view "atlas" shows
-    seconds : time of the pose in the motion [s]
+    seconds : time in the motion at which the pose was taken [s]
     """
 
     scene: Scene
@@ -93,23 +97,23 @@ class ViewerState:
 
     @property
     def table(self) -> Table:
-        """Return the [head] table with the actual subdivision level; empty for a head created in memory."""
+        """Return the [head] table with the head's subdivision level; empty for a head from memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
-        """Return a copy with other values of skin fields.
+        """Return a copy with new values of some fields of the skin.
 
         Raises DermisError for invalid values.
         """
         return self._with_scene(skin=validated_copy(self.scene.skin, **fields))
 
     def with_pigments(self, **fields: object) -> ViewerState:
-        """Return a copy with other values of pigments."""
+        """Return a copy with new values of some pigments of the skin."""
         pigments = self.scene.skin.pigments or Pigments()
         return self.with_skin(pigments=validated_copy(pigments, **fields).model_dump())
 
     def with_settings(self, **fields: object) -> ViewerState:
-        """Return a copy with other values of settings."""
+        """Return a copy with new values of some render settings."""
         return replace(self, settings=validated_copy(self.settings, **fields))
 
     def with_camera(self, camera: Camera) -> ViewerState:
@@ -117,7 +121,10 @@ class ViewerState:
         return self._with_scene(camera=camera)
 
     def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
-        """Return a copy with other lights."""
+        """Return a copy with other lights.
+
+        rig : name of the preset of these lights, empty for custom lights
+        """
         return replace(self._with_scene(lights=tuple(lights)), rig=rig)
 
     def with_rig(self, name: str) -> ViewerState:
@@ -125,17 +132,17 @@ class ViewerState:
         return self.with_lights(load_lights(name), name)
 
     def with_light(self, index: int, **fields: object) -> ViewerState:
-        """Return a copy with other values of one light."""
+        """Return a copy with new values of some fields of one light."""
         lights = list(self.scene.lights)
         lights[index] = validated_copy(lights[index], **fields)
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Return a copy with another environment."""
+        """Return a copy with another environment; None for none."""
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:
-        """Return a copy that shows another view."""
+        """Return a copy that shows another of `views.VIEWS`."""
         return replace(self, view=name)
 
     def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:
@@ -147,7 +154,9 @@ class ViewerState:
         return self._with_scene(pose=pose)
 
     def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
-        """Return a copy with the pose of a motion at a time [s]; names without animation keep their pose.
+        """Return a copy with the pose of a motion; morph targets and bones that it does not move are kept.
+
+        seconds : time in the motion [s]
 
         Raises DermisError if a frame cannot be read.
         """
@@ -155,10 +164,10 @@ class ViewerState:
         return replace(self.with_pose(pose), seconds=seconds)
 
     def with_head(self, head: Head, table: Table, rho_s: float) -> ViewerState:
-        """Return a copy with another head or other maps.
+        """Return a copy with another head, or with other maps of the head.
 
-        table : [head] table that the head was loaded from
-        rho_s : mean strength of the surface reflection [-]
+        table : [head] table of a scene file from which the head was loaded
+        rho_s : mean specular strength [-]
         """
         skin = validated_copy(self.scene.skin, rho_s=rho_s)
         return replace(self._with_scene(head=head, skin=skin), head=table)
@@ -168,7 +177,7 @@ class ViewerState:
 
 
 def states_equal(a: ViewerState, b: ViewerState) -> bool:
-    """Return whether two states are equal; heads are compared by identity."""
+    """Return whether two states are equal; their heads must be the same object."""
 
     def values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
@@ -181,12 +190,12 @@ def states_equal(a: ViewerState, b: ViewerState) -> bool:
 
 
 def validated_copy(values: P, **fields: object) -> P:
-    """Return a copy of a model with other values, validated."""
+    """Return a copy of a pydantic model with new values of some fields, validated."""
     return type(values)(**(values.model_dump() | fields))
 
 
 def save_state(path: Path, state: ViewerState) -> None:
-    """Write the scene file of a state for `dermis render` and `dermis view`.
+    """Write a state as a scene file that `dermis render` and `dermis view` can open.
 
     Views of intermediate results are not saved. Raises DermisError for a head created in memory and if the
     path cannot be written.
@@ -206,7 +215,9 @@ def _load_named_state(name: str) -> ViewerState:
 
 
 def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
-    """Return the initial state of a viewer for a head, person, scene, state or name.
+    """Return the initial state of a viewer for a head, person or scene, or for the name of one.
+
+    A state is returned unchanged.
 
     Raises DermisError for anything else.
     """
@@ -226,7 +237,9 @@ def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[s
 
 
 def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
-    """Return the state of a scene file; the head of the current state is reused if it is the same.
+    """Return the state of a scene file.
+
+    current : state whose head is reused if the file has an equal [head] table
 
     Raises DermisError if the file is not a scene.
     """
@@ -239,7 +252,11 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
 
 
 def initial_state(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
-    """Return the first state of a scene; `Settings.parts` selects the view."""
+    """Return the initial state of a scene; `Settings.parts` becomes the view "diffuse" or "specular".
+
+    head : [head] table of a scene file from which the head was loaded
+    rig : name of the light preset, empty for custom lights
+    """
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, validated_copy(settings, parts="all"), head, view, rig)
 
@@ -248,7 +265,7 @@ _MAX_STEPS = 200
 
 
 class UndoHistory:
-    """Undo history of states.
+    """Undo history of viewer states.
 
     A gesture such as a drag changes the state many times and is undone in one step.
     """
@@ -265,7 +282,7 @@ class UndoHistory:
 
     @property
     def states(self) -> list[ViewerState]:
-        """Return all states, including undone ones."""
+        """Return all stored states, including those that were undone."""
         return [*self._past, *self._undone]
 
     @property
@@ -279,7 +296,10 @@ class UndoHistory:
         return bool(self._undone)
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Add a state; during one gesture it replaces the last state."""
+        """Add a state; within one gesture it replaces the last state.
+
+        gesture : name of the gesture, empty for a step of its own
+        """
         if states_equal(state, self.state):
             return
         if gesture and gesture == self._gesture:
@@ -295,13 +315,13 @@ class UndoHistory:
         self._gesture = ""
 
     def undo(self) -> None:
-        """Go back one step."""
+        """Return to the previous state."""
         self.end_gesture()
         if self.can_undo:
             self._undone.append(self._past.pop())
 
     def redo(self) -> None:
-        """Repeat the last undone step."""
+        """Restore the state that was undone last."""
         self.end_gesture()
         if self._undone:
             self._past.append(self._undone.pop())

@@ -31,10 +31,10 @@ _STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single 
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality limits of a frame in motion; still frames use the settings without limits.
+    """Upper limits of the render settings in motion; still frames are rendered without limits.
 
     scale : factor of the image size [-]
-    samples, atlas, shadow_size : maximum values
+    samples, atlas, shadow_size : maximum values of these settings
     """
 
     scale: float
@@ -56,7 +56,7 @@ _FIRST_LEVEL_ON_CPU = 2
 
 
 class QualityController:
-    """Controller of the quality of frames in motion, based on the times of the last frames.
+    """Controller that adapts the quality of frames in motion to the times of the last frames.
 
     software : whether the adapter renders on the CPU
     """
@@ -69,11 +69,14 @@ class QualityController:
 
     @property
     def quality(self) -> Quality:
-        """Return the quality of the next frame in motion."""
+        """Return the quality limits of the next frame in motion."""
         return QUALITY_LEVELS[self._level]
 
     def record_frame_time(self, frame_ms: float) -> None:
-        """Record the time of the last frame in motion, without preparation [ms]."""
+        """Record the time of a frame in motion, and change the quality after several slow or fast frames.
+
+        frame_ms : time of the frame without setup [ms]
+        """
         is_slow = frame_ms > _SLOW_RATIO * self._budget_ms
         is_fast = frame_ms < _FAST_RATIO * self._budget_ms
         step = is_slow - is_fast
@@ -85,7 +88,10 @@ class QualityController:
             self._streak = 0
 
     def limited_settings(self, settings: Settings, size: tuple[int, int], moving: bool) -> Settings:
-        """Return the settings of a frame for a window of the given size, limited while in motion."""
+        """Return the settings of a frame for a window of the given size, with quality limits in motion.
+
+        moving : whether the picture is changing
+        """
         quality = self.quality if moving else QUALITY_LEVELS[0]
         width, height = (max(1, round(quality.scale * side)) for side in size)
         return validated_copy(
@@ -107,7 +113,7 @@ _FROZEN_SIDE = "before"  # view with its own light, so that a moving camera reli
 
 @dataclass(frozen=True)
 class FrozenImage:
-    """Image of a frozen state, as seen by a camera."""
+    """Image of a frozen state, with the camera and settings of its rendering."""
 
     state: ViewerState
     camera: Camera
@@ -138,7 +144,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Create the resources and shaders for the first images of a state, in motion and still.
+        """Render small images of a state, in motion and still, so that its resources and shaders exist.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -162,7 +168,9 @@ class ViewRenderer:
         size: tuple[int, int],
         moving: bool,
     ) -> Images:
-        """Return the image of a state as from `render_image`, and that of a frozen state or None.
+        """Return the images of the live state and of the frozen state, None without a frozen one.
+
+        moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if a state cannot be rendered or the device fails.
         """
@@ -175,7 +183,10 @@ class ViewRenderer:
     def render_image(
         self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Texture:
-        """Return a texture of sRGB bytes, of the window's size or smaller in motion; cached if unchanged.
+        """Return a texture of sRGB bytes for a state; cached if nothing has changed.
+
+        size : size of the view; in motion the texture may be smaller [pixel]
+        moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
@@ -211,19 +222,21 @@ class ViewRenderer:
         return image_copy
 
     def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
-        """Return the settings of a frame; the atlas view always has full quality."""
+        """Return the settings of a frame with quality limits in motion, except for the atlas view."""
         return self.quality_controller.limited_settings(state.settings, size, moving and state.view != ATLAS)
 
     @property
     def is_current(self) -> bool:
-        """Return whether the last image is a still image of full quality."""
+        """Return whether the last image has the full quality of a still image."""
         if not self._image_inputs:
             return False
         state, _, settings = self._image_inputs
         return self._settings(state, self._size, moving=False) == settings
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
-        """Write the displayed image at any size: .png (tone-mapped) or .exr (linear).
+        """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
+
+        size : width and height [pixel]
 
         Raises DermisError if that is not possible.
         """
@@ -241,11 +254,11 @@ class ViewRenderer:
 
     @property
     def exposure(self) -> float:
-        """Return the exposure of the last frame, metered or set."""
+        """Return the exposure factor of the last frame, metered or fixed [-]."""
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
-        """Return the (h, w, 3) bytes of an image."""
+        """Download an image and return its (h, w, 3) sRGB bytes."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, side: str = "") -> Texture:
@@ -263,14 +276,17 @@ class ViewRenderer:
         return self._views.draw(state.scene, settings, state.view, side)
 
     def _has_atlas_light(self, state: ViewerState, side: str) -> bool:
-        """Return whether the atlas already holds the light of a state, so that no frame must be rendered."""
+        """Return whether the atlas already holds the light of a state, so that no frame is rendered.
+
+        side : name of the state's side of the divider, empty for the live side
+        """
         if self._atlas_state is None or self._atlas_state[1] != side:
             return False
         return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 
 
 def copy_texture(device: Device, image: Texture, target: Texture | None = None) -> Texture:
-    """Return a copy of a byte texture.
+    """Return a copy of a texture of bytes.
 
     target : texture to reuse if its size matches
     """
@@ -286,9 +302,11 @@ T = TypeVar("T")
 
 
 class HeadPreparation:
-    """Preparation of new heads in a thread, one at a time, during which nothing else is drawn.
+    """Preparation of new heads for rendering, in a thread that handles one head at a time.
 
-    request_frame : function called from another thread when the next frame can be drawn
+    Nothing else is drawn while it runs.
+
+    request_frame : function that requests a frame, called from another thread when a preparation ends
     """
 
     def __init__(self, request_frame: Callable[[], None]) -> None:
@@ -300,15 +318,15 @@ class HeadPreparation:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a head is being prepared or waits for the next frame."""
+        """Return whether a head is being prepared, or has been prepared and is not yet drawn."""
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard all preparations, for another renderer."""
+        """Forget all preparations, because the renderer has been replaced."""
         self._ready = self._future = self._next = self._held_image = None
 
     def picture(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Return the last image while the head of a state is prepared; None when the state can be drawn.
+        """Return the last image while the head of a state is being prepared; None when it can be drawn.
 
         Raises the exception that stopped the preparation, once.
         """

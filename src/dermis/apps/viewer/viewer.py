@@ -1,4 +1,4 @@
-"""Viewer on a canvas, the same in a desktop window, a browser and a notebook."""
+"""Viewer of a head on a canvas, which may be in a desktop window, a browser or a notebook."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ Box = tuple[int, int, int, int]
 
 
 class Patch(NamedTuple):
-    """Image scaled to a viewport of the target and clipped to a scissor rectangle.
+    """Image that is scaled to a viewport of the target and clipped to a scissor rectangle.
 
     image : texture of sRGB bytes
+    viewport, scissor : left, top, width and height in the target [pixel]
     """
 
     image: Texture
@@ -38,7 +39,7 @@ class Patch(NamedTuple):
 
 
 class BlitProgram(Program):
-    """Program that draws byte images into targets of one format."""
+    """Program that draws images of sRGB bytes into targets of one texture format."""
 
     stages = "VERTEX", "FRAGMENT"
 
@@ -58,7 +59,7 @@ class BlitProgram(Program):
         )
 
     def draw(self, patches: Sequence[Patch], view: TextureView) -> None:
-        """Draw the patches on black.
+        """Draw images over a black background.
 
         view : view of the target texture
         """
@@ -86,14 +87,14 @@ _KEYS = "key_down", "key_up", "char"
 
 
 class Viewer:
-    """Interactive view of a head.
+    """Interactive view of a head on a canvas.
 
     state : initial state
     canvas : canvas of any backend of rendercanvas
     adapter : "auto", "cpu" or part of an adapter's name
     clock : function that returns the time [s]
     motion : motion to play
-    view_renderer : renderer on the adapter that has already prepared the state
+    view_renderer : renderer that has already prepared the state, None to create one
 
     `failure` is the error that closed the canvas because the device failed twice or could not be reopened.
 
@@ -148,7 +149,7 @@ class Viewer:
 
     @property
     def is_still(self) -> bool:
-        """Return whether the last picture is final until something changes."""
+        """Return whether the picture on screen is final, so that no frame is needed until a change."""
         state, view_renderer = self.session.displayed_state, self.session.view_renderer
         is_settled = self._last_state is state and self._easing.camera == state.scene.camera
         is_final = view_renderer.is_current or self._rejected_state is state
@@ -172,17 +173,20 @@ class Viewer:
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
-        """Return the width of the part of the window that the panel covers [pixel]."""
+        """Return the width by which the panel narrows the picture [pixel]."""
         width = self.panel.width(self.canvas.get_logical_size())
         return round(float(self.canvas.get_pixel_ratio()) * width)
 
     def _picture_size(self) -> tuple[int, int]:
-        """Return the size of the part of the window beside the panel [pixel]."""
+        """Return the width and height of the picture, the window beside the panel [pixel]."""
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
-        """Return the patches of the live image, and of the frozen image left of the divider."""
+        """Return where to draw the live image, and the frozen image left of the divider.
+
+        size : width and height of the picture [pixel]
+        """
         left, (width, height) = self._panel_width(), size
         viewport = left, 0, width, height
         if frozen is None:
@@ -195,7 +199,7 @@ class Viewer:
         return [patch for patch in patches if patch.scissor[2]]
 
     def _images(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Images:
-        """Return the live and the frozen image; for a state that cannot be rendered the last image."""
+        """Return the live and the frozen image; the last image for a state that cannot be rendered."""
         import wgpu
 
         session = self.session
@@ -256,7 +260,7 @@ class Viewer:
         self.canvas.request_draw()
 
     def _on_picture(self, event: Event) -> None:
-        """Handle an event over the picture, whose left edge during a drag is that of the press."""
+        """Handle an event over the picture; during a drag, its left edge is kept as at the press."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
         if event["event_type"] == "pointer_down":
@@ -267,7 +271,7 @@ class Viewer:
             self.session.controls.handle(shifted, size)
 
     def _open(self) -> None:
-        """Configure the canvas for the device of the renderer."""
+        """Configure the canvas and the panel for the device of the renderer."""
         device = self.session.view_renderer.renderer.device
         format_ = str(self._context.get_preferred_format(device.adapter.handle)).removesuffix("-srgb")
         self._context.configure(device=device.handle, format=format_)

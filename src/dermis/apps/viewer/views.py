@@ -1,4 +1,4 @@
-"""Views of intermediate results, on the head or as a flat atlas."""
+"""Views of intermediate results such as irradiance, shadow and normals, on the head or as a flat atlas."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _ATLAS_ADVICE = "Choose a narrower blur, or the technique texture-space"
 
 
 class IntermediateViews:
-    """Renderer of intermediate results."""
+    """Renderer of intermediate results such as irradiance, shadow and normals."""
 
     def __init__(self, renderer: Renderer) -> None:
         self._renderer, device = renderer, renderer.device
@@ -56,7 +56,10 @@ class IntermediateViews:
         self._density: weakref.WeakKeyDictionary[Texture, float] = weakref.WeakKeyDictionary()
 
     def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
-        """Return a byte image of an intermediate result of the last frame on one side of the divider.
+        """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
+
+        view : name of the view
+        side : name of the side of the divider, empty for the live side
 
         Raises DermisError if the technique does not compute it.
         """
@@ -77,7 +80,9 @@ class IntermediateViews:
         return self._render(shader, bindings, settings.size)
 
     def draw_atlas(self, scene: Scene, settings: Settings, atlas_view: AtlasView, side: str = "") -> Texture:
-        """Return a byte image of a part of the atlas of the last frame on one side of the divider.
+        """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
+
+        side : name of the side of the divider, empty for the live side
 
         Raises DermisError if the technique does not compute it.
         """
@@ -89,7 +94,7 @@ class IntermediateViews:
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
     def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:
-        """Return the image that a shader stores to `bytes`."""
+        """Run a shader that stores an image to the texture `bytes`, and return that texture."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != size:
             self._image = make_texture(device, size, "rgba8uint")
@@ -100,7 +105,10 @@ class IntermediateViews:
         return self._image
 
     def _atlas_layer(self, inputs: FrameInputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
-        """Return the atlas map of a view and the scale factor of its values."""
+        """Return the texture over the atlas that a view shows, and a scale for its display.
+
+        For light, the scale is the factor to display values; for stretch, the mean number of texels per mm.
+        """
         if view in LEVEL_VIEWS:
             level, blur = LEVEL_VIEWS[view], next(iter(inputs.blurs), None)
             count = len(blur.profile_levels) if blur else 0
@@ -115,7 +123,7 @@ class IntermediateViews:
         return self._thickness(inputs) if view == "thickness" else self._empty_texture, 1.0
 
     def _exposure(self, inputs: FrameInputs) -> float:
-        """Return the exposure of the last frame."""
+        """Return the exposure factor of the last frame, metered or fixed [-]."""
         meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
@@ -132,7 +140,7 @@ class IntermediateViews:
         return draw_thickness(self._renderer.device, translucency, self._thickness_maps[translucency.pairs])
 
     def _mean_density(self, stretch: Texture) -> float:
-        """Return the geometric mean of the texels per mm."""
+        """Return the geometric mean of the texel densities in a stretch map [texels/mm]."""
         if stretch not in self._density:
             metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
@@ -141,9 +149,11 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
-    """Compute the least tissue thickness behind each atlas cell with pairs, at most their radius [mm].
+    """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
 
-    target : texture of the cells; cells without pairs are unchanged
+    It is the distance to the nearest source cell of a translucent pair, at most the radius of the search.
+
+    target : texture of the cells to fill; cells without pairs are unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

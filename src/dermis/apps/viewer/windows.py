@@ -26,8 +26,9 @@ _MAX_FPS = 60
 
 
 def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
-    """Open a desktop window and return when it is closed.
+    """Show the viewer in a desktop window, and return when the window is closed.
 
+    size : width and height of the window [logical pixel]
     motion : motion to play
 
     Raises DermisError without a display, a device or the extra `viewer`.
@@ -49,7 +50,7 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
 
 @contextmanager
 def _without_signal_handlers() -> Iterator[None]:
-    """Disable the signal handlers of rendercanvas, which would close the window in the middle of a frame."""
+    """Disable the signal handlers of rendercanvas, which could close the window in the middle of a frame."""
     loops: Any = importlib.import_module("rendercanvas.core.loop")
     original, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
     try:
@@ -68,11 +69,13 @@ def serve(
     *,
     require_token: bool = False,
 ) -> None:
-    """Serve web pages until interrupted; they show the stage of preparation until the first picture.
+    """Serve the viewer as web pages until interrupted.
+
+    Pages show the progress of the preparation until the first picture.
 
     load : function that loads the initial state and motion, called in a thread
     size : size of the canvas until a page reports its own
-    port : 0 for any free port
+    port : port number, 0 for any free port
     announce : function called first, with the URL and whether other machines can reach it
     require_token : whether the URL has a token even if only this machine can reach it
 
@@ -146,7 +149,7 @@ def view(
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """Return the notebook widget class of rendercanvas with two corrections."""
+    """Return the notebook widget class of rendercanvas with two of its faults corrected."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
@@ -164,7 +167,11 @@ def _notebook_canvas(backend: Any) -> Any:
 
 
 def _load_backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
-    """Import and return a module of rendercanvas, after checking that the packages it needs are installed."""
+    """Import and return a module of rendercanvas; raise DermisError if packages are missing.
+
+    needed : names of the packages that the module needs
+    extra : extra of dermis that installs these packages
+    """
     for package in (*needed, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)

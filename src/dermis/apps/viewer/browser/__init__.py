@@ -1,1 +1,1 @@
-"""Viewer as a web page: HTTP canvas of rendercanvas behind a server that checks requests."""
+"""Viewer as a web page: the HTTP canvas of rendercanvas, behind a server that validates all requests."""

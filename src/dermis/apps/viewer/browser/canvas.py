@@ -25,7 +25,7 @@ _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rende
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """Canvas shown in web pages; a slow page skips frames and receives the newest when it is ready."""
+    """Canvas that web pages display; a slow page skips frames and receives the newest when it is ready."""
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
@@ -39,11 +39,15 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         super().__init__(**kwargs)
 
     def send_stage(self, text: str, number: int, total: int) -> None:
-        """Send the current stage of preparation and its number to the pages, before the first picture."""
+        """Send the progress of the preparation to all pages, which display it until the first picture.
+
+        text : name of the stage, such as "compiling shaders"
+        number, total : number of the stage, starting at 1, and of all stages
+        """
         self._broadcast({"type": "stage", "text": text, "number": number, "total": total})
 
     def send_failure(self, text: str) -> None:
-        """Send the reason why no picture can be shown to the pages."""
+        """Send an error message to all pages, which display it instead of a picture."""
         self._broadcast({"type": "failure", "text": text})
 
     def _broadcast(self, message: dict[str, object]) -> None:
@@ -51,7 +55,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         asgi.send_all(message)
 
     def request_file(self) -> None:
-        """Ask the page that has control to choose a file to upload."""
+        """Ask the page that has control to let the user choose a file to upload."""
         asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILES)}, [], self._active_client)
 
     def _rc_close(self) -> None:
@@ -83,7 +87,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             self._send_last_frame_to_ready_clients()  # it was encoded while this page was not ready
 
     def _maybe_draw(self) -> None:
-        """Draw a frame, unless too many frames are waiting to be sent or confirmed."""
+        """Draw a frame, unless too many frames are being encoded or not yet confirmed by the page."""
         info = self._frame_info_per_client.get(self._active_client)
         if info and info["sent"] - info["confirmed"] + self._encoding >= self._max_buffered_frames:
             self._pending_maybe_draw = False  # retried after the next frame is encoded or confirmed
@@ -92,7 +96,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             super()._maybe_draw()
 
     def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
-        """Encode a frame in a thread: as JPEG while the picture changes, then as PNG."""
+        """Encode a frame in a thread: as JPEG, or as PNG when the picture has stopped changing."""
         self._cancel_lossless_draw()
         self._drawn += 1
         if is_lossless_redraw:
@@ -105,12 +109,17 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         future.add_done_callback(partial(self._send, self._drawn, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Cancel the lossless frame, even if it is already being encoded."""
+        """Cancel the lossless frame that follows a still picture, even if it is already being encoded."""
         self._lossless = 0
         super()._cancel_lossless_draw()
 
     def _send(self, number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
-        """Send an encoded frame to the pages, unless a newer one has been sent."""
+        """Send an encoded frame to all pages, unless a newer frame has been sent.
+
+        number : number of the frame, in the order of drawing
+        lossless : whether the frame is encoded as PNG
+        future : result of `encode_image`
+        """
         self._encoding -= not lossless
         if self._is_closed:
             return

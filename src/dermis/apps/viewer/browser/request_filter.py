@@ -1,4 +1,4 @@
-"""Validation of requests and messages: who may connect, and what a page may send."""
+"""Validation of requests and messages: which clients may connect, and what a page may send."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ _MESSAGES: TypeAdapter[Any] = TypeAdapter(
 
 
 def checked_message(text: object) -> str | None:
-    """Return a message of a page with its known fields only, or None if it is invalid.
+    """Return a message of a page reduced to its known fields, or None if it is invalid.
 
     text : untrusted message of any type
     """
@@ -180,7 +180,7 @@ class RequestFilter:
             await self._app(scope, receive, send)
 
     def _refusal_reason(self, scope: Message) -> str:
-        """Return why a request is rejected, or an empty string if it is accepted."""
+        """Return the reason for which a request is rejected, or an empty string if it is accepted."""
         host = next(iter(_headers(scope, b"host")), "")
         if not self._token and not is_local(_host_name(host)):
             return _WRONG_HOST  # DNS rebinding: the name of another site resolves to this machine

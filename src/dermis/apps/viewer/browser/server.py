@@ -1,4 +1,4 @@
-"""Web server of the viewer; a thread prepares the first picture while pages already connect."""
+"""Web server of the viewer; pages can connect while a thread prepares the first picture."""
 
 from __future__ import annotations
 
@@ -92,7 +92,9 @@ _FAILURE_DISPLAY_S = 0.7  # time for pages to receive the reason of a failure
 async def prepare_viewer(
     http_server: uvicorn.Server, canvas: PageCanvas, load: LoadState, adapter: str
 ) -> Viewer:
-    """Return the viewer when its first frame is prepared; on failure show the reason and stop the server.
+    """Prepare the first frame in a thread and return the viewer; pages display the progress.
+
+    If that fails, pages show the reason and the server stops.
 
     http_server : running server of the pages
     load : function that loads the initial state and motion, called in a thread
@@ -164,10 +166,10 @@ class Address(NamedTuple):
 
 
 def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.socket, Address]:
-    """Return a listening socket and its address, which has a token unless the host is local.
+    """Return a listening socket and its address; the address has a token unless the host is local.
 
-    port : 0 for any free port
-    require_token : whether a local host has a token too
+    port : port number, 0 for any free port
+    require_token : whether the address has a token even if the host is local
 
     Raises DermisError if the address cannot be used.
     """
@@ -213,7 +215,9 @@ def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uv
 def run_server(
     http_server: uvicorn.Server, listener: socket.socket, start: Callable[[], Coroutine[None, None, T]]
 ) -> T | None:
-    """Run the server and a coroutine beside it until the server exits; return the coroutine's result.
+    """Run the server until it exits, together with a coroutine; return the coroutine's result.
+
+    start : function that returns the coroutine
 
     The result is None if the coroutine has not ended. Raises the exceptions of the coroutine.
     """

@@ -1,4 +1,4 @@
-"""Uploads of files from a page, one at a time and of limited size and number, to a temporary folder."""
+"""Uploads of files from a page to a temporary folder, one at a time and limited in size and number."""
 
 from __future__ import annotations
 
@@ -63,7 +63,10 @@ class Uploads:
         await send({"type": "http.response.body", "body": answer.encode()})
 
     def _accept(self, name: str, headers: dict[bytes, bytes]) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of the file, one of `HEAD_FILES`, and its handler, if the upload is permitted."""
+        """Return the suffix of an uploaded file, one of `HEAD_FILES`, and the function that opens it.
+
+        Raises DermisError for an upload that is not permitted.
+        """
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another page sent it", "Close that page")
@@ -89,7 +92,11 @@ class Uploads:
             refuse(name, limit, "this file would exceed it", "Restart the viewer")
 
     async def _store(self, name: str, kind: str, receive: Receive) -> Path:
-        """Return the path of the received file; a rejected file is deleted."""
+        """Receive a file and return its path; a rejected file is deleted.
+
+        name : name given by the page, for messages
+        kind : suffix of the file
+        """
         self._count += 1
         folder = self._folder / str(self._count)  # its own, because a scene may refer to files beside it
         path = folder / f"upload{kind}"

@@ -1,4 +1,4 @@
-"""Controls of the panel for the fields of pydantic models, with their ranges, help and labels."""
+"""Controls of the panel for fields of pydantic models, with the range, help and label of each field."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ _MAX_VISIBLE_ROWS = 14
 
 @dataclass(frozen=True)
 class FieldStyle:
-    """Presentation of a field where the panel differs from the model.
+    """Presentation of a field in the panel, where it differs from that of the model.
 
     label : label to show; in "shown###name" the name identifies the control in positions and undo
-    value_range : range of the slider, instead of that of the model
-    unit : value of one displayed unit, in units of the field
+    value_range : range of the slider, None for that of the model
+    unit : size of one displayed unit, in units of the field; 0.01 displays a fraction in percent
     number_format : printf format of the number
-    options : integers to choose from
+    options : integers to choose from in a drop-down list
     names : text to show for each keyword of the field
-    custom_value : function that returns the first custom value of a field that may also be a keyword
+    custom_value : function that returns the initial custom value of a field that may also be a keyword
     """
 
     label: str = ""
@@ -74,7 +74,8 @@ def draw_fields(
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
     make_state : function that returns a state, given the new value of a field as keyword argument
-    names : names of the fields, all by default
+    styles : presentation of fields by their names
+    names : names of the fields to draw, None for all
     suffix : "##id" that distinguishes controls with equal labels
     """
     for name in type(values).model_fields if names is None else names:
@@ -132,7 +133,10 @@ def _draw_keywords(
     with_value: ToState,
     style: FieldStyle,
 ) -> None:
-    """Draw a list of the keywords that a number or colour can be instead of a value."""
+    """Draw a drop-down list of the keywords that a field accepts instead of a number or colour.
+
+    with_value : function that returns a state, given the new value
+    """
     custom_value = style.custom_value
 
     def choose(keyword: str) -> ViewerState:
@@ -143,14 +147,14 @@ def _draw_keywords(
 
 
 def _field_label(name: str) -> str:
-    """Return the name of the field without its unit."""
+    """Return the label of a field: its name with spaces and without the suffix of its unit."""
     for unit in _UNIT_FORMATS:
         name = name.removesuffix(unit)
     return name.replace("_", " ")
 
 
 def draw_tooltip(text: str) -> None:
-    """Draw a tooltip for the last control."""
+    """Draw a tooltip for the last control while the pointer rests on it."""
     if not text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
         return
     imgui.begin_tooltip()
@@ -161,7 +165,11 @@ def draw_tooltip(text: str) -> None:
 
 
 def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
-    """Draw many controls in a scrollable area; only the visible ones are drawn."""
+    """Draw many controls in a scrollable area; only the visible rows are drawn.
+
+    count : number of rows
+    draw : function that draws a row, given its index
+    """
     width, line = imgui.calc_item_width(), imgui.get_frame_height_with_spacing()
     imgui.begin_child(label, imgui.ImVec2(0.0, min(count, _MAX_VISIBLE_ROWS) * line))
     imgui.push_item_width(width)
@@ -182,19 +190,27 @@ def slider(
     value_range: SliderRange,
     number_format: str,
 ) -> None:
-    """Draw a slider for a number."""
+    """Draw a slider for a number.
+
+    with_value : function that returns a state, given the new number
+    number_format : printf format of the number
+    """
     flags = _LOG if value_range.logarithmic else 0
     result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
     edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
 
 
 def clamp(value: float, value_range: SliderRange) -> float:
-    """Clamp a value to a range, which typed values and rounding to single precision can exceed."""
+    """Clamp a value to a range, as typed values and rounding to single precision can exceed it."""
     return min(value_range.high, max(value_range.low, value))
 
 
 def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ToState) -> None:
-    """Apply the new value of a control; all changes while it is held are one step of the undo history."""
+    """Change the state to the new value of a control; changes while it is held are undone together.
+
+    result : whether the control has changed, and its value
+    with_value : function that returns a state, given the new value
+    """
     record_position(session, label)
     is_changed, new_value = result
     if is_changed:
@@ -211,9 +227,10 @@ def combo(
     with_value: ToState,
     display_names: Mapping[str, str] = _NO_DISPLAY_NAMES,
 ) -> None:
-    """Draw a drop-down list that changes the state.
+    """Draw a drop-down list, and change the state when a name is chosen.
 
     names : choices; "" is a separator
+    with_value : function that returns a state, given the chosen name
     display_names : text to show for each name, where it differs
     """
     chosen = choose(session, label, current, names, display_names)
@@ -224,7 +241,12 @@ def combo(
 def choose(
     session: Session, label: str, current: str, names: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
-    """Draw a drop-down list as in `combo` and return the clicked name; None if there is none."""
+    """Draw a drop-down list and return the name that was clicked, None without a click.
+
+    current : name that is selected now
+    names : choices; "" is a separator
+    display_names : text to show for each name, where it differs
+    """
     chosen = None
     if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST):
         record_position(session, label)
@@ -249,7 +271,10 @@ def button(session: Session, label: str) -> bool:
 
 
 def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], highest: float) -> bool:
-    """Begin a plot from 0 to slightly above the highest value; return whether it is visible."""
+    """Begin a plot whose vertical axis ends slightly above `highest`; return whether it is visible.
+
+    axes : labels of the horizontal and of the vertical axis
+    """
     if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT_FLAGS):
         return False
     hidden = int(implot.AxisFlags_.no_tick_labels) if axes[0] == "frames" else 0
@@ -259,7 +284,9 @@ def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], 
 
 
 def record_position(session: Session, label: str) -> None:
-    """Record a position inside the last control, in its left part, which is never its label.
+    """Record the position of the last control in the window, so that scripts can click on it.
+
+    The position is in the left part of the control, because its label may be in the right part.
 
     label : label whose part after "###", if any, is the key of the position
     """

@@ -1,4 +1,4 @@
-"""Dear ImGui on a wgpu device: style, frames, input, and recovery from errors within a frame."""
+"""Dear ImGui on a wgpu device: style, frames, input, and recovery from errors while a frame is laid out."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _GREYS = (  # no hues, because they would affect the perception of the skin besi
 
 
 def set_style() -> None:
-    """Set a legible font on a dark background."""
+    """Set a legible font and a dark colour scheme."""
     io, style = imgui.get_io(), imgui.get_style()
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
     if font.is_file():
@@ -52,9 +52,9 @@ ReportError = Callable[[Exception], None]
 
 
 class ImguiFrames:
-    """Dear ImGui context with the resources that draw it.
+    """Dear ImGui context, with the GPU resources that draw it.
 
-    report_error : function that receives errors; later frames are still drawn
+    report_error : function that receives errors of a layout; later frames are still drawn
     """
 
     def __init__(self, report_error: ReportError) -> None:
@@ -62,7 +62,10 @@ class ImguiFrames:
         self._is_new = self._has_layout = False
 
     def open(self, device: Device, target: str) -> None:
-        """Create the resources for drawing into textures of the given format."""
+        """Create the context and the resources that draw it.
+
+        target : format of the textures to draw into
+        """
         # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
         self._plots = implot.create_context()
@@ -78,9 +81,10 @@ class ImguiFrames:
         implot.set_current_context(self._plots)
 
     def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
-        """Process the input so far and lay out the next frame for `render`.
+        """Process pending input and lay out the next frame, which `render` then draws.
 
         size : logical size of the window
+        draw : function that declares the windows and controls
         """
         try:
             imgui.get_io().display_size = imgui.ImVec2(*size)
@@ -96,7 +100,7 @@ class ImguiFrames:
             self._recreate_context()
 
     def render(self, target: TextureView) -> None:
-        """Draw over the target, unless the last layout failed."""
+        """Draw the last layout over the target; nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
@@ -107,7 +111,7 @@ class ImguiFrames:
         self._device.handle.queue.submit([encoder.finish()])
 
     def _recreate_context(self) -> None:
-        """Replace the context, which resets the open sections."""
+        """Replace the context after an error of Dear ImGui; open sections of the panel are reset."""
         self._has_layout = False
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
@@ -116,7 +120,7 @@ class ImguiFrames:
 
 @contextmanager
 def recover_imgui(report_error: ReportError) -> Iterator[None]:
-    """Close what an error inside the block left open: windows, tables, pushed styles and ids."""
+    """Close the windows, tables, styles and ids that an exception inside the block left open."""
     state = imgui.internal.ErrorRecoveryState()
     imgui.internal.error_recovery_store_state(state)
     try:
@@ -135,7 +139,7 @@ _WHEEL_SPEED = 0.01
 
 
 def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
-    """Pass an event of `POINTER` to Dear ImGui.
+    """Pass a pointer event, one of the types in `POINTER`, to Dear ImGui.
 
     frame : function that lays out the panel with the events so far
     """
@@ -151,7 +155,9 @@ def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
 
 
 def feed_key(event: Event, frame: Callable[[], None]) -> None:
-    """Pass a key or character to Dear ImGui in a frame of its own, as keys between two frames cancel out.
+    """Pass a key or character to Dear ImGui, followed by a layout of its own.
+
+    Without it, a press and a release of a key between two frames would cancel out.
 
     frame : function that lays out the panel with the events so far
     """

@@ -1,4 +1,4 @@
-"""Panel at the left of the window, drawn with Dear ImGui, and overlays on the picture."""
+"""Control panel at the left of the window, drawn with Dear ImGui, and overlays on the picture."""
 
 from __future__ import annotations
 
@@ -64,7 +64,11 @@ def draw_divider(split: SplitView, left: float, size: tuple[float, float]) -> No
 
 
 def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) -> None:
-    """Draw lines of text on a dark background at the lower edge of the picture, which begins at `left`."""
+    """Draw lines of text on a dark background along the lower edge of the picture.
+
+    left : left edge of the picture
+    size : logical size of the window
+    """
     if not lines:
         return
     draw_list = imgui.get_foreground_draw_list()
@@ -81,8 +85,9 @@ def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) 
 
 
 def draw_help(left: float, size: tuple[float, float]) -> None:
-    """Draw the list of shortcuts in the centre of the picture, which begins at `left`; ignore pointers.
+    """Draw the list of shortcuts in the centre of the picture; pointers pass through it.
 
+    left : left edge of the picture
     size : logical size of the window
     """
     width = min(_HELP_WIDTH, size[0] - left - 2.0 * _TEXT_MARGIN)
@@ -113,7 +118,7 @@ _BUTTON_MARGIN, _BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
 
 
 class Panel:
-    """Panel with its sections, and the decision whether an event is for the panel or the picture.
+    """Control panel with its sections; it decides which events are for the panel, not the picture.
 
     is_visible : whether the panel is shown in a wide window
     is_drawer_open : whether the panel is shown in a narrow window, as a drawer over the picture
@@ -129,15 +134,24 @@ class Panel:
         self.label_width = 0.0  # space right of the controls [logical pixel]
 
     def open(self, device: Device, target: str) -> None:
-        """Create the resources for drawing into textures of the given format."""
+        """Create the resources that draw the panel.
+
+        target : format of the textures to draw into
+        """
         self._frames.open(device, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Return the logical width that the panel takes from the picture in a window of the given size."""
+        """Return the width by which the panel narrows the picture, 0 for a drawer [logical pixel].
+
+        size : logical size of the window
+        """
         return 0.0 if is_drawer(size) else self._covered_width(size)
 
     def _covered_width(self, size: tuple[float, float]) -> float:
-        """Return the logical width that the panel covers; 0 if it is hidden."""
+        """Return the width of the window that the panel covers, 0 if it is hidden [logical pixel].
+
+        size : logical size of the window
+        """
         fraction, is_shown = _MAX_WIDTH_FRACTION, self.is_visible
         if is_drawer(size):
             fraction, is_shown = _DRAWER_FRACTION, self.is_drawer_open
@@ -151,7 +165,10 @@ class Panel:
             self.is_visible = not self.is_visible
 
     def handle_event(self, event: Event, size: tuple[float, float]) -> bool:
-        """Process an event; return whether it was for the panel instead of the picture."""
+        """Process an event if it is for the panel and not for the picture; return whether it is.
+
+        size : logical size of the window
+        """
         self._frames.enter()
         self._size = size
         io, kind = imgui.get_io(), event["event_type"]
@@ -184,7 +201,7 @@ class Panel:
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
     def _shortcut(self, event: Event) -> bool:
-        """Process a key; return whether it is a shortcut of the panel."""
+        """Run the shortcut of a key, if it has one; return whether it has."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
@@ -216,7 +233,11 @@ class Panel:
         return True
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Return whether a pointer is over the panel; Dear ImGui would know it only a frame later."""
+        """Return whether a pointer is over the panel, because Dear ImGui knows this only a frame later.
+
+        x, y : position of the pointer in the window
+        size : logical size of the window
+        """
         width = self._covered_width(size)
         on_button = not width and x < self._button_end[0] and y < self._button_end[1]
         return x < width or on_button or self._has_popup or bool(imgui.is_any_item_active())
@@ -292,7 +313,7 @@ class Panel:
             self.toggle()
 
     def _scroll_by_touch(self) -> None:
-        """Scroll with a drag that began beside all controls, because fingers have no wheel."""
+        """Scroll the panel by a drag that began beside all controls, as fingers have no wheel."""
         if imgui.is_mouse_clicked(0):
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):

@@ -1,4 +1,4 @@
-"""Sections of the panel for lights, motion, head, view, settings and files."""
+"""Sections of the panel for lights, motion, head, view, settings, files and timing."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ _OTHER_SETTINGS = ("size", "parts")  # determined by the window and by the view
 
 
 def draw_lights(session: Session) -> None:
-    """Draw the lighting rig, the selected light and the environment."""
+    """Draw the controls of the light preset, the selected light and the environment."""
     combo(session, "rig", session.state.rig or _CUSTOM, light_presets(), session.state.with_rig)
     _draw_light_selector(session)
     combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KINDS)
@@ -161,7 +161,7 @@ def _draw_environment(session: Session) -> None:
 
 
 def has_expressions(session: Session) -> bool:
-    """Return whether the head has morph targets or bones."""
+    """Return whether the head has morph targets or bones, for which sliders are drawn."""
     head = session.state.scene.head
     return bool(head.targets or head.bones)
 
@@ -198,7 +198,7 @@ def draw_expressions(session: Session) -> None:
 
 
 def draw_motion(session: Session) -> None:
-    """Draw the motion file, play and pause, and the time slider."""
+    """Draw the controls of the motion: its file, play and pause, and the time slider."""
     player, clip = session.player, session.player.clip
     _, session.motion_file = imgui.input_text("file", session.motion_file)
     if button(session, "open"):
@@ -218,7 +218,7 @@ def draw_motion(session: Session) -> None:
 
 
 def _animated_names(session: Session) -> frozenset[str]:
-    """Return the names that the playing motion animates, whose sliders are read-only."""
+    """Return the names of morph targets and bones that the playing motion moves; their sliders are locked."""
     clip = session.player.clip if session.player.is_playing else None
     return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
 
@@ -236,7 +236,10 @@ def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
 
 
 def _draw_angles(session: Session, name: str, animated: frozenset[str]) -> None:
-    """Draw three angle sliders; only the one that is moved changes, even if others are out of range."""
+    """Draw a slider for each of the three angles of a bone, and change only the one that is moved.
+
+    animated : names of morph targets and bones that the playing motion moves
+    """
     angles = posing.bone_angles(session.displayed_state.scene, name)
 
     def with_value(new_angles: list[float]) -> ViewerState:
@@ -255,7 +258,7 @@ def _draw_angles(session: Session, name: str, animated: frozenset[str]) -> None:
 
 
 def draw_head(session: Session) -> None:
-    """Draw the choice of the head, the seed of a random person, and the file to open."""
+    """Draw the controls that choose a head: a list, the seed of a random person, and a file to open."""
     _draw_head_list(session)
     seed = _person_seed(session)
     is_entered, new_seed = imgui.input_int("person###seed", seed, flags=_ON_ENTER)
@@ -300,7 +303,7 @@ def _person_seed(session: Session) -> int:
 class Section(NamedTuple):
     """Collapsible section of the panel.
 
-    applies : function that returns whether the section is shown
+    applies : function that returns whether the section is shown for a session
     """
 
     title: str
@@ -310,7 +313,7 @@ class Section(NamedTuple):
 
 
 def draw_view(session: Session) -> None:
-    """Draw the choice of the view and the camera presets."""
+    """Draw the list of views, such as the picture or the blurred irradiance, and the camera presets."""
     state = session.state
     combo(session, "show", state.view, VIEWS, state.with_view)
     if state.view == ATLAS:
@@ -328,7 +331,7 @@ def draw_view(session: Session) -> None:
 
 
 def draw_comparison(session: Session) -> None:
-    """Draw the buttons that freeze the state left of the divider, swap the sides, or release it."""
+    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, or end it."""
     split, state = session.split, session.state
     if button(session, "freeze"):
         split.freeze(session.displayed_state)
@@ -346,7 +349,10 @@ def draw_comparison(session: Session) -> None:
 
 
 def draw_technique(session: Session) -> None:
-    """Draw all settings that no other section shows, choices first; new settings appear here."""
+    """Draw the settings that no other section shows, drop-down lists first.
+
+    New settings appear here by default.
+    """
     settings = session.state.settings
     kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_OTHER_SETTINGS}
     names = sorted(
@@ -357,12 +363,12 @@ def draw_technique(session: Session) -> None:
 
 
 def draw_picture(session: Session) -> None:
-    """Draw the settings that convert linear light to the picture."""
+    """Draw the settings that convert radiance to the picture: exposure, tone curve, bloom, ..."""
     draw_fields(session, session.state.settings, session.state.with_settings, _SETTINGS, _PICTURE_SETTINGS)
 
 
 def draw_talk(session: Session) -> None:
-    """Draw the comparisons of the 2007 talk: fields of the skin and of the settings."""
+    """Draw the skin fields and settings by which faults of the 2007 talk are reproduced for comparison."""
     state, skin, settings = session.state, session.state.scene.skin, session.state.settings
     draw_fields(session, skin, state.with_skin, SURFACE, fields_under(COMPARISONS, type(skin)))
     names = fields_under(COMPARISONS, type(settings))
@@ -372,7 +378,7 @@ def draw_talk(session: Session) -> None:
 
 
 def draw_files(session: Session) -> None:
-    """Draw the scene file, and screenshots with the size of the view by default."""
+    """Draw the controls that save and load the scene, and that write screenshots."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if button(session, "save"):
         run_action(session, lambda: session.save(Path(session.scene_file)))
@@ -394,7 +400,7 @@ def draw_files(session: Session) -> None:
 
 
 def draw_timing(session: Session) -> None:
-    """Plot the stage times of the last frames, and list those of the last frame."""
+    """Plot the device times of the stages over the last frames, and list those of the last frame."""
     series = stage_series(list(session.view_renderer.stage_times))
     if not series:
         imgui.text_disabled("this adapter reports no times")
@@ -410,7 +416,7 @@ def draw_timing(session: Session) -> None:
 
 
 def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
-    """Return the (n,) times of each stage over n frames, 0 in frames without that stage [ms]."""
+    """Return the times of each stage over n frames, (n,) by stage; 0 in frames without it [ms]."""
     names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL)
     return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
 
@@ -418,7 +424,12 @@ def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
 def _plot_stacked(
     series: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total: Floats
 ) -> None:
-    """Plot stacked areas with the last frame at the right edge."""
+    """Plot the times of stages as stacked areas, with the last frame at the right edge.
+
+    series : (n,) times of each stage [ms]
+    colours : colour of each stage
+    total : (n,) total times of the frames [ms]
+    """
     last = max(1.0, len(total) - 1.0)
     if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total.max()), 1e-3)):
         return

@@ -52,7 +52,7 @@ _RADII_MM = np.geomspace(0.01, 30.0, 160)
 
 
 def draw_profile(session: Session) -> None:
-    """Draw the name of the profile, the source of its colour, and its pigments or layers."""
+    """Draw the controls of the diffusion profile: its name, its colour, and its pigments or layers."""
     skin, with_skin = session.state.scene.skin, session.state.with_skin
 
     def with_profile(name: str) -> ViewerState:
@@ -73,7 +73,7 @@ def draw_profile(session: Session) -> None:
 
 
 def draw_surface(session: Session) -> None:
-    """Draw all skin fields that do not belong to the profile; new fields appear here."""
+    """Draw the skin fields that do not belong to the profile; new fields appear here by default."""
     state, earlier_states = session.state, session.history.states
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
@@ -103,7 +103,10 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
 
 
 def _plot_profile(session: Session) -> None:
-    """Plot r R(r) by channel of the Gaussians that the frame blurs with."""
+    """Plot r R(r), the diffusion profile R times the radius r, for red, green and blue.
+
+    The curve is the sum of Gaussians with which the frame blurs light.
+    """
     try:
         profile = session.view_renderer.renderer.skin_profile(session.state.scene.skin)
     except DermisError:  # reported by the message over the picture
@@ -122,7 +125,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
-    """Return the cached layers of a named profile; an empty tuple for a table of Gaussians."""
+    """Return the tissue layers of a named profile, cached; none for a profile that is a sum of Gaussians."""
     try:
         return tissue_layers(Skin(profile=profile))
     except (
@@ -132,7 +135,7 @@ def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
 
 
 def _draw_layers(session: Session, layers: Layers) -> None:
-    """Draw the layers, topmost first, each with its coefficients."""
+    """Draw the coefficients of all tissue layers, the topmost first."""
     for index, layer in enumerate(layers):
         depth = "semi-infinite" if layer.thickness_mm is None else f"{layer.thickness_mm:.3g} mm"
         is_open = imgui.tree_node_ex(f"layer{index}", 0, f"{index + 1} {layer.name}, {depth}")
@@ -159,6 +162,6 @@ def _draw_layer(session: Session, layers: Layers, index: int) -> None:
 
 
 def _replace_layer(session: Session, layers: Layers, index: int, *new_layers: TissueLayer) -> ViewerState:
-    """Return the state with one layer replaced by zero or more others."""
+    """Return the state in which one tissue layer is replaced by zero or more others."""
     all_layers = (*layers[:index], *new_layers, *layers[index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in all_layers])

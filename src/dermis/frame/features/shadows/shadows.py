@@ -21,7 +21,7 @@ class ShadowMaps:
 
     layers : depth map of each light
     bounds : texture of the nearest depth in squares of increasing size of each map, by which area lights skip
-        empty space
+        squares without occluders
     """
 
     layers: ViewLayers
