@@ -69,7 +69,9 @@ def test_finds_skin_and_light(fitted: FitResult) -> None:
     true = np.array([0.5, 0.4, 0.77])
     assert towards @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
     assert strength == pytest.approx(2.0, rel=0.1)
-    assert light_basis.panorama(fitted.strengths[: light_basis.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
+    assert light_basis.panorama(fitted.strengths[: light_basis.BASIS_SIZE]).mean() == pytest.approx(
+        0.3, rel=0.2
+    )
     assert fitted.residual < 0.02
 
 

@@ -76,11 +76,11 @@ def fit(
         Print one JSON object with the estimates and their uncertainties.
     """
     from dermis.apps.inverse.fitting.fit import fit as fitted
-    from dermis.apps.inverse.fitting.result import SUMMARY, save_fit
+    from dermis.apps.inverse.fitting.result import FIT_SUMMARY_FILE, save_fit
     from dermis.base.atomic_write import check_folder
 
     colour = white if white == "specular" else parse_colour(white, "--white")
-    check_folder(output, SUMMARY)
+    check_folder(output, FIT_SUMMARY_FILE)
     options: Options = {"camera": camera, "landmarks": landmarks, "adapter": adapter, "suns": suns}
     options |= {"exposure": exposure, "white": colour, "noise": noise, "side": side, "atlas": atlas}
     with progress_bar("fitting") as report_progress:

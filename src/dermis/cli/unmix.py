@@ -85,12 +85,12 @@ def unmix(
         Print one JSON object with statistics of the maps.
     """
     from dermis.apps.inverse.unmixing.profile_widths import profile_mixture, save_mixture
-    from dermis.apps.inverse.unmixing.unmix import SUMMARY, save_maps
+    from dermis.apps.inverse.unmixing.unmix import UNMIX_SUMMARY_FILE, save_maps
     from dermis.apps.inverse.unmixing.unmix import unmix as unmixed
     from dermis.base.atomic_write import check_folder
 
     started = time.perf_counter()
-    check_folder(output, SUMMARY)
+    check_folder(output, UNMIX_SUMMARY_FILE)
     change = _parse_change(melanin, blood, oxygen, eumelanin)
     skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
     with progress_bar("unmixing") as report_progress:

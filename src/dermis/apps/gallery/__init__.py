@@ -1,1 +1,1 @@
-"""Gallery of pictures that explain the technique: scripts of a few lines each, and one page of all."""
+"""Gallery of pictures that explain the technique: short scripts, and a page with all pictures."""

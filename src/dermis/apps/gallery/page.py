@@ -32,11 +32,13 @@ _TEX_SYMBOLS = {
 
 
 def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapter: str) -> None:
-    """Write the page atomically.
+    """Write the HTML page with all pictures atomically.
 
-    head, adapter : names of the head in the pictures, and of the adapter that drew them
+    pictures : pictures in the order of the page
+    head : name of the head in the pictures
+    adapter : name of the adapter that drew them
 
-    Raises DermisError when it cannot be written.
+    Raises DermisError when the file cannot be written.
     """
     page = Template(_resource("page.html")).substitute(
         style=_resource("page.css"),
@@ -67,7 +69,7 @@ def _section(picture: GalleryPicture) -> str:
 
 
 def _equation(text: str) -> str:
-    """Return HTML of an equation in one line, where _ begins a subscript and ^ a superscript."""
+    """Convert an equation in one line to HTML; _ begins a subscript and ^ a superscript."""
     text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
 
@@ -122,7 +124,10 @@ def _short_number(value: float) -> str:
 
 
 def _deck(pictures: Sequence[GalleryPicture]) -> str:
-    """Return rows of the talk's table with the pictures that show them and their commands."""
+    """Return table rows for the rows of the 2007 talk, with links to pictures, and commands.
+
+    The command of a row draws its picture.
+    """
     rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
     return "".join(_deck_row(row, pictures) for row in rows)
 
@@ -147,7 +152,7 @@ def _resource(name: str) -> str:
 
 
 def format_reference(key: str) -> str:
-    """Return a reference in one line: authors, title, year.
+    """Format a work of the bibliography in one line: authors, title, year.
 
     Raises DermisError for a key that is not in the bibliography.
     """
@@ -159,7 +164,10 @@ def format_reference(key: str) -> str:
 
 
 def _fields(entry: str) -> Iterator[tuple[str, str]]:
-    """Yield names and values of a BibTeX entry; values may span lines and contain braces."""
+    """Yield the name and the text of each field of a BibTeX entry.
+
+    Texts may span lines and contain braces.
+    """
     at = 0
     while found := _FIELD.search(entry, at):
         at, depth = found.end(), 1
@@ -170,7 +178,7 @@ def _fields(entry: str) -> Iterator[tuple[str, str]]:
 
 
 def _without_tex(value: str) -> str:
-    """Return a value without TeX markup."""
+    """Convert TeX accents and symbols to Unicode, and remove braces."""
     text = value.replace("{", "").replace("}", "")
     for markup, character in _TEX_SYMBOLS.items():
         text = text.replace(markup, character)

@@ -1,4 +1,4 @@
-"""Panels of gallery pictures: conversion to bytes, plots, landmarks, and sheets with captions."""
+"""Panels of gallery pictures: conversion to sRGB, plots, landmarks, and sheets with captions."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ _BAR, _TEXT, _INK, _PAPER = 24, 14, (200, 200, 206), (22, 22, 26)
 
 
 def to_srgb8(image: Image) -> Bytes:
-    """Return sRGB bytes of an image; floats are linear light."""
+    """Convert an image to 8-bit sRGB; floating-point images are linear light."""
     if image.dtype == np.uint8:
         return np.asarray(image, np.uint8)
     return encode_srgb8(np.maximum(image, 0.0).astype(np.float32))
 
 
 def first_frame(panel: Panel) -> Image:
-    """Return a panel, or the first frame of an animation."""
+    """Return a panel that is a picture, or the first frame of a panel that is an animation."""
     return panel[0] if isinstance(panel, list) else panel
 
 
 def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
-    """Return (h, w, 3) sRGB bytes of all panels in rows with captions; animations show their first frame.
+    """Arrange panels with captions in rows of one sRGB image (h, w, 3); animations show their first frame.
 
-    columns : panels in a row; 0 for all in one row
+    columns : number of panels in a row; 0 for a single row
     """
     cells = [_cell(to_srgb8(first_frame(panel)), name) for name, panel in panels.items()]
     step = columns or len(cells)
@@ -47,10 +47,10 @@ def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
 
 
 def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
-    """Return sRGB bytes of a square figure.
+    """Draw a matplotlib plot as a square sRGB image.
 
     plot : function that draws into matplotlib axes
-    side : of the picture [pixel]
+    side : side of the image [pixel]
     """
     canvases = import_extra("matplotlib.backends.backend_agg", "the gallery")
     figure = import_extra("matplotlib.figure", "the gallery").Figure(
@@ -90,7 +90,7 @@ _RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
 
 
 def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
-    """Return the picture (h, w, 3) with a dot on each landmark, green if visible and red if hidden."""
+    """Return a picture (h, w, 3) with a dot at each landmark: green if visible, red if hidden."""
     from PIL import Image, ImageDraw
 
     image = Image.fromarray(np.ascontiguousarray(picture[..., :3]))
@@ -103,13 +103,16 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
 
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
 _LABEL_COLOURS = 8192
-_QUANTILES = 0.02, 0.98  # of non-zero values, shown as black and white
+_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 
 
 def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return (h, w, 3) bytes of an output: light as sRGB, labels in random colours, others dark to bright.
+    """Convert a render output to an image (h, w, 3): light to sRGB, labels to random colours.
 
-    values : (h, w) or (h, w, c) of the output
+    Other outputs, such as depth, are scaled from black at a low quantile to white at a high one.
+
+    name : name of the output
+    values : (h, w) or (h, w, c) array of the output
     """
     if name in _LIGHT_FACTORS:
         return encode_srgb8(_LIGHT_FACTORS[name] * values)

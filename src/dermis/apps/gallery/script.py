@@ -1,4 +1,4 @@
-"""Gallery scripts: their descriptions from docstrings, their pictures, and WebP files."""
+"""Gallery scripts: descriptions from their docstrings, the pictures that they draw, and WebP files."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ _METADATA = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MU
 class Script:
     """Gallery script, described by its docstring.
 
-    title, caption : first line, and explanation
-    deck : rows of the talk that it shows, such as "S11"
-    equation : the equation behind it, or ""
-    sources : author-year keys
-    slider : captions of two panels to compare with a slider
-    columns : panels in a row; 0 for the page's choice
+    path : file of the script
+    title, caption : first line of the docstring, and the explanation below it
+    deck : rows of the table of the talk's slides that the picture shows, such as "S11"
+    equation : equation of the technique, or ""
+    sources : keys of the bibliography
+    slider : captions of two panels that are compared with a slider, or None
+    columns : number of panels in a row; 0 lets the page choose
     """
 
     path: Path
@@ -47,13 +48,13 @@ class Script:
 
     @property
     def name(self) -> str:
-        """Return the file's name without its suffix."""
+        """Return the name of the script, its file name without suffix."""
         return self.path.stem
 
     def draw(self, studio: Studio) -> Panels:
         """Run the script and return its panels by caption.
 
-        Raises DermisError when the script lacks something that it needs.
+        Raises DermisError when a package or file that the script needs is missing.
         """
         with import_extra("matplotlib.style", "the gallery").context("dark_background"):
             panels: Panels = runpy.run_path(str(self.path))["draw"](studio)
@@ -61,7 +62,7 @@ class Script:
 
 
 def read_script(path: Path) -> Script:
-    """Return the description in a script's docstring, without running the script."""
+    """Read the description of a script from its docstring, without running the script."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     metadata: dict[str, str] = dict(_METADATA.findall(text))
     title, _, caption = _METADATA.sub("", text).partition("\n")
@@ -79,9 +80,11 @@ def read_script(path: Path) -> Script:
 
 
 def find_scripts(only: Sequence[str] = ()) -> list[Script]:
-    """Return the scripts in order; `only` selects some by number, name or part of a name.
+    """Return the gallery scripts in the order of their numbers.
 
-    Raises DermisError for a name that matches no script.
+    only : numbers, names or parts of names that select scripts; all scripts if empty
+
+    Raises DermisError for a selection that matches no script.
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in only:
@@ -92,14 +95,19 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
 
 
 def _matches(script: Script, wanted: str) -> bool:
-    """Return whether a number or part of a name matches the script."""
+    """Return whether a script has a given number, or a name that contains a given text."""
     if wanted.isdecimal():
         return int(wanted) == int(script.name.partition("_")[0])
     return wanted != "" and wanted in script.name
 
 
 def draw_script(draw: Callable[[Studio], Panels]) -> None:
-    """Write the picture of the running script: python gallery/NN_name.py OUTPUT [HEAD]."""
+    """Draw the picture of the running script and write it as PNG.
+
+    The command line is: python gallery/NN_name.py OUTPUT [HEAD].
+
+    draw : function of the script that returns its panels
+    """
     from dermis.images.io import write_png
 
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
@@ -109,7 +117,7 @@ def draw_script(draw: Callable[[Studio], Panels]) -> None:
 
 
 def scripts_folder() -> Path:
-    """Return the folder of the scripts, in the checkout or in the installed package."""
+    """Return the folder of the gallery scripts, in the checkout or in the installed package."""
     installed = Path(__file__).parent / "scripts"
     return installed if installed.is_dir() else Path(__file__).parents[4] / "gallery"
 
@@ -123,13 +131,14 @@ _QUALITY, _FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """Result of a script.
+    """Picture that a gallery script has drawn, as WebP files, or the reason why it could not.
 
-    panels : WebP files by caption
-    size : width and height of the first one [pixel]
-    seconds : time of the script
-    frame_ms : median time of its frames [ms]; None if it drew none
-    fault : reason for a missing picture
+    script : gallery script
+    panels : WebP file of each panel, by caption
+    size : width and height of the first panel [pixel]
+    seconds : run time of the script [s]
+    frame_ms : median time of the frames that it rendered; None without frames [ms]
+    fault : reason for a missing picture, or ""
     """
 
     script: Script
@@ -141,7 +150,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Yield the picture of each script; a script that cannot run yields a picture with the reason."""
+    """Run the scripts and yield their pictures; a script that fails yields a picture with the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:
@@ -156,7 +165,10 @@ def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Gallery
 
 
 def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
-    """Return a panel as a WebP file, animated if it has several frames."""
+    """Encode a panel as a WebP file, animated if it has several frames.
+
+    quality : WebP quality, 0 to 100
+    """
     from PIL import Image as Pillow
 
     images = panel if isinstance(panel, list) else [panel]
@@ -168,9 +180,9 @@ def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
 
 
 def write_panels(folder: Path, picture: GalleryPicture) -> None:
-    """Write the panels of a picture as separate files.
+    """Write the panels of a picture to separate WebP files in a folder.
 
-    Raises DermisError when that is not possible.
+    Raises DermisError when a file cannot be written.
     """
     for number, data in enumerate(picture.panels.values(), 1):
         with atomic_file(folder / f"{picture.script.name}-{number}.webp") as file:

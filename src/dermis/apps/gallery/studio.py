@@ -1,4 +1,4 @@
-"""Renderer and head shared by all gallery scripts."""
+"""Renderer and head that all gallery scripts share."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ _SCAN = "lee_perry_smith"
 
 
 class Studio:
-    """Renderer, and the head that pictures show.
+    """Renderer with the head that gallery pictures show, passed to each script.
 
-    name : head to show; by default the scan if it is downloaded, else the human
-    side : of a panel [pixel]
-    settings : fields of `Settings` that override those of scripts
+    name : name of the head; by default the scan if it is downloaded, else the human
+    side : side of a panel [pixel]
+    adapter : "auto", "cpu" or part of the name of an adapter
+    settings : fields of `Settings` that override those of the scripts
     """
 
     def __init__(
@@ -38,37 +39,44 @@ class Studio:
 
     @cached_property
     def renderer(self) -> Renderer:
-        """Return the renderer, opened on first use."""
+        """Return the renderer, which is opened on first use."""
         return Renderer(self.adapter)
 
     def head(self, name: str | None = None, **options: Any) -> Head:
-        """Return the head to show, or another one, subdivided once.
+        """Load a head and subdivide it once.
 
-        options : of `load_head`
+        name : name of the head; by default the head of the gallery
+        options : arguments of `load_head`
         """
         return self._load(name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the head to show with its colours as a map, even if the device paints them."""
+        """Return the gallery's head with a colour map; a head that the device paints gets a painted map."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """Return (h, w, 3) sRGB bytes of a scene.
+        """Render a scene to 8-bit sRGB, (h, w, 3).
 
-        scale : factor by which the side of the panel is multiplied
+        scale : side of the image over that of a panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
 
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
-        """Return (h, w, 3) linear Rec. 709 of a scene: `render` before encoding."""
+        """Render a scene to linear Rec. 709, (h, w, 3).
+
+        scale : side of the image over that of a panel [-]
+        settings : fields of `Settings`
+        """
         return self._draw(scene, scale, settings).linear()
 
     def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """Return (h, w, 3) sRGB bytes of an intermediate result as the viewer shows it.
+        """Render an intermediate result of the frame as the viewer shows it, in 8-bit sRGB, (h, w, 3).
 
-        view : name in the viewer, such as "blur 3"
+        view : name of the view in the viewer, such as "blur 3"
+        scale : side of the image over that of a panel [-]
+        settings : fields of `Settings`
         """
         from dermis.apps.viewer.state import PARTS
         from dermis.apps.viewer.views import IntermediateViews
@@ -85,9 +93,10 @@ class Studio:
         return self.renderer.reopening_device.run(draw_view)
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
-        """Return (n, n, 3) light on the atlas, as irradiance over pi.
+        """Return the diffused irradiance on the atlas, divided by pi, (n, n, 3).
 
-        level : 0 for the light that enters, higher ones for blurred levels
+        level : pyramid level: 0 for the light that enters, higher for light blurred by more Gaussians
+        settings : fields of `Settings`
         """
         from dermis.gpu import download
 
@@ -103,7 +112,11 @@ class Studio:
         return self.renderer.reopening_device.run(read_light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
-        """Return the settings of a panel."""
+        """Return the settings with which a panel is rendered.
+
+        scale : side of the image over that of a panel [-]
+        settings : fields of `Settings` that override the gallery's defaults
+        """
         side = round(scale * self.side)
         defaults: dict[str, Any] = {"size": (side, side), "atlas": 1024}
         return Settings(**(defaults | settings | self._settings))

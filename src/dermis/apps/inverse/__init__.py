@@ -1,1 +1,1 @@
-"""Skin and light from pictures: unmixing of colour maps and fits to photographs."""
+"""Estimation of skin and light from pictures: unmixing of colour maps, and fits to photographs."""

@@ -1,1 +1,1 @@
-"""Light and skin of a photograph by least squares."""
+"""Fits of light and skin to photographs by least squares."""

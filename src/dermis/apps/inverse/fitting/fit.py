@@ -1,4 +1,4 @@
-"""Fit of light and skin to a photograph, from a coarse search over suns and pigments."""
+"""Fit of light and skin to a photograph, which starts from a coarse search over suns and pigments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
 from dermis.apps.inverse.fitting.inputs import Photograph, fit_subject, read_photograph
-from dermis.apps.inverse.fitting.light_basis import BASIS, solve_normal_equations, squared_residual
+from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_normal_equations, squared_residual
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, light_tint, solve_fit
@@ -29,11 +29,12 @@ from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 
 _SUN_COUNT = 28
-_MIN_SUN_COSINE = -0.35  # least cosine to the camera of a sun that lights the face
+_MIN_SUN_COSINE = -0.35  # smallest cosine between sun and camera directions
 _MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _STRENGTH_GRID = 0.5, 0.75, 1.0
 _RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6
-"""Rings around a sun of the coarse search, whose suns are 35 degrees apart, and directions on each ring."""
+"""Angular radii of rings around a sun of the coarse search, and number of directions on each ring. The suns
+of the coarse search are 35 degrees apart."""
 DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
 _MIN_PIXELS = 200
@@ -41,16 +42,19 @@ WhitePoint = Sequence[float] | Literal["specular"]
 
 
 def candidate_suns(towards_camera: Floats) -> Floats:
-    """Return directions (k, 3) around a camera from which a sun lights the face.
+    """Return directions (k, 3) towards suns that light what a camera sees of the face.
 
-    towards_camera : (3,) unit vector
+    towards_camera : (3,) unit vector from the face to the camera
     """
     grid = fibonacci_sphere(_SUN_COUNT)
     return grid[grid @ towards_camera > _MIN_SUN_COSINE]
 
 
 def neighbouring_suns(towards: Floats) -> Floats:
-    """Return directions (k, 3) and others on two rings around each, for a finer search."""
+    """Return the given sun directions (k, 3) and two rings of directions around each, (n, 3).
+
+    They are the candidates of a finer search.
+    """
     azimuth = np.linspace(0.0, 2.0 * np.pi, _RING_DIRECTIONS, endpoint=False)
     ring = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
     rings = (np.tan(np.radians(angle)) * ring for angle in _RING_DEGREES)
@@ -60,11 +64,15 @@ def neighbouring_suns(towards: Floats) -> Floats:
 
 
 class InitialGuess:
-    """Coarse search, from normal equations of the diffuse and the specular radiance under each light.
+    """Coarse search for suns and pigments, from which a fit starts.
 
-    frames, point : the face, with the candidate suns in `point.suns`
-    target : (p, 3) radiance of the photograph
-    weight : (p, 3) inverse standard deviations
+    For each light alone, diffuse and specular radiance are rendered once; other pigments and strengths only
+    scale them. Each trial then solves small normal equations without rendering.
+
+    frames : renderer of the face
+    point : pigments and candidate suns of the rendered frames
+    target : (p, 3) radiance of the photograph's pixels in the mask
+    weight : (p, 3) inverse standard deviations of the pixels
     """
 
     def __init__(self, frames: FaceRenderer, point: FitPoint, target: Floats, weight: Floats) -> None:
@@ -82,7 +90,7 @@ class InitialGuess:
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
     def best(self, count: int) -> FitPoint:
-        """Return the best point with `count` suns."""
+        """Return the pigments, specular strength and `count` suns with the smallest residual."""
         grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
         log_skin, suns = self.point.logs, self._nearest(self.point.logs, count)
         for _ in range(2):
@@ -92,7 +100,10 @@ class InitialGuess:
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
     def _nearest(self, logs: Floats, count: int) -> list[int]:
-        """Return the suns with the smallest residual, chosen greedily."""
+        """Return the indices of the suns with the smallest residual, selected greedily.
+
+        logs : (4,) logarithms of the skin unknowns
+        """
         selected: list[int] = []
         for _ in range(count):
             remaining = [k for k in range(len(self.point.suns)) if k not in selected]
@@ -100,11 +111,14 @@ class InitialGuess:
         return selected
 
     def _cost(self, logs: Floats, suns: list[int]) -> float:
-        """Return the squared residual for other skin values.
+        """Return the squared residual of the best light strengths for a skin and a set of suns.
 
-        Diffuse radiance is scaled by the skin's colour, specular radiance by its strength.
+        Diffuse radiance is scaled by the skin's colour, specular radiance by its specular strength.
+
+        logs : (4,) logarithms of the skin unknowns
+        suns : indices of the candidate suns
         """
-        lights = np.array([*range(BASIS), *(BASIS + k for k in suns)])
+        lights = np.array([*range(BASIS_SIZE), *(BASIS_SIZE + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
         ratio = self._colour(logs) / self._colour(self.point.logs)
         gram, right = np.zeros((len(lights),) * 2), np.zeros(len(lights))
@@ -139,8 +153,8 @@ def fit(
 ) -> FitResult:
     """Fit light and skin to a photograph of a head of known shape.
 
-    All light has one colour. Its strength and the exposure are one unknown, which a photograph cannot
-    separate.
+    All light has one colour. The strength of the light and the exposure are one unknown, as a photograph
+    cannot separate them.
 
     Parameters
     ----------
@@ -161,9 +175,9 @@ def fit(
     noise : float
         Relative standard deviation of a pixel [-].
     robust : float
-        Number of standard deviations from which a residual counts less [Huber1964].
+        Number of standard deviations above which the weight of a residual decreases [Huber1964].
     side : int
-        Longer side of the picture that is fitted [pixel].
+        Longer side to which the photograph is reduced for the fit [pixel].
     atlas : int
         Side of the renderer's atlas [texel].
     adapter : str
@@ -232,7 +246,7 @@ def fit(
 
 
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
-    """Find the pixels of lit skin, and return the prior's point with the candidate suns."""
+    """Set the renderer's mask to pixels of lit skin, and return the prior's skin with the candidate suns."""
     camera = frames.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
     candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
@@ -247,7 +261,7 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
 
 
 def _initial_point(problem: FitProblem, candidate: FitPoint, suns: int) -> FitPoint:
-    """Return the start of the fit: the result of a coarse search, then of a finer one around its suns."""
+    """Return the start of the fit, found by a coarse search and a finer one around its suns."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     start = InitialGuess(frames, candidate, target, weight).best(suns)
     if suns:
@@ -257,7 +271,10 @@ def _initial_point(problem: FitProblem, candidate: FitPoint, suns: int) -> FitPo
 
 
 def _checked_white(white: WhitePoint) -> Floats:
-    """Return the given colour of the light (3,), with green 1."""
+    """Return the user's colour of the light (3,), scaled so that green is 1.
+
+    For "specular" it is (1, 1, 1).
+    """
     if isinstance(white, str):
         if white != "specular":
             actual = f"got {format_value(white)}"

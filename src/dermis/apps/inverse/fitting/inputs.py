@@ -34,7 +34,7 @@ class Photograph:
     """Photograph in linear light, at full or reduced size.
 
     linear : (h, w, 3) linear Rec. 709 as in the file, including exposure and white balance
-    unclipped : (h, w) fraction of the pixel without clipped channels
+    unclipped : (h, w) fraction of each pixel's area in which no channel is clipped
     """
 
     linear: Floats
@@ -42,11 +42,11 @@ class Photograph:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Return width and height [pixel]."""
+        """Return the width and height of the photograph [pixel]."""
         return self.linear.shape[1], self.linear.shape[0]
 
     def within(self, side: int) -> Photograph:
-        """Return the photograph downsampled by area to a longer side of at most `side` pixels."""
+        """Return the photograph reduced by area averaging to a longer side of at most `side` pixels."""
         width, height = self.size
         if max(width, height) <= side:
             return self
@@ -57,11 +57,12 @@ class Photograph:
 
 
 def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
-    """Return the photograph of a file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear) or of pixels.
+    """Read a photograph from a file or an array, and convert it to linear light.
 
-    source : a file, (h, w, 3) bytes in sRGB, or floats in linear Rec. 709
+    source : file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear), or (h, w, 3) bytes in sRGB, or floats in
+        linear Rec. 709
 
-    Raises DermisError for anything that is not a colour picture.
+    Raises DermisError if the source is not a colour picture.
     """
     image = read_image(source) if isinstance(source, str | Path | EmbeddedPicture) else np.asarray(source)
     name = source if isinstance(source, str | Path | EmbeddedPicture) else "photo"
@@ -82,7 +83,10 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
 
 
 def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
-    """Return a picture (h, w, c) downsampled by area, with fractional weights of pixels on edges."""
+    """Downsample a picture (h, w, c) by area; pixels at the edges of larger ones count in part.
+
+    size : width and height of the result [pixel]
+    """
     for axis, count in ((0, size[1]), (1, size[0])):
         sums = np.cumsum(image, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
@@ -99,10 +103,12 @@ _POSITION_TOLERANCE_MM = 0.01
 
 @dataclass(frozen=True)
 class FitSubject:
-    """Head of a photograph, as a scene without light.
+    """Head in a photograph, with its camera, as a scene without light.
 
-    person : person whose skin is painted, None for other heads
-    table : [head] table of a scene's file for other heads; empty for people without a name
+    scene : head, camera, pose and surface
+    person : parametric person whose skin is painted, None for other heads
+    table : table [head] for the scene's file, for heads that are not a person; empty for people without a
+        name
     """
 
     scene: Scene
@@ -111,12 +117,12 @@ class FitSubject:
 
 
 def fit_subject(source: object, camera: object = None) -> FitSubject:
-    """Return the subject with the head, camera, pose and surface of a scene, head or person.
+    """Return the head, camera and pose to fit, from a scene, a head or a person.
 
     source : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
     camera : a camera, the name of a preset or a file; None for the scene's own
 
-    Raises DermisError for anything else.
+    Raises DermisError for sources and cameras of other types.
     """
     table: Mapping[str, object] = {}
     if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".toml":
@@ -143,7 +149,7 @@ def _as_camera(source: object, head: Head) -> Camera | Callable[[Head], Camera]:
 
 
 def _painted_person(head: Head) -> Human | None:
-    """Return the person of a painted head, with the skin that is painted on it."""
+    """Return the person whose shape and painted skin a head has, or None for other heads."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
@@ -154,7 +160,7 @@ def _painted_person(head: Head) -> Human | None:
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, with the pigments that are not fitted."""
+    """Return the scene without light, and with a skin whose fixed pigments are those of the head."""
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look

@@ -24,7 +24,7 @@ from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
 _LANDMARK_NOISE = 0.004
-"""Standard deviation of landmarks, relative to the height of the photograph."""
+"""Standard deviation of a landmark's position, over the height of the photograph."""
 _FOCAL_SD = 0.3
 """Prior standard deviation of the logarithm of the focal length, around that of a portrait."""
 _MACRO_NAMES = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
@@ -33,7 +33,7 @@ _TARGET_SD = 0.15
 _TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
 _TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
 _ITERATIONS = 2
-_IDENTITY_STEP = 0.2  # of finite differences, in standard deviations of the prior
+_IDENTITY_STEP = 0.2  # step of finite differences, in standard deviations of the prior
 _DISTANCE_MM = 1100.0
 _FRAME_MM = 300.0
 
@@ -56,14 +56,16 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
     solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.count)])
     solution[:3], solution[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
     for _ in range(_ITERATIONS if person else 1):
-        solution = _solve(model, pixels, size, solution)
+        solution = _fit_camera_and_identity(model, pixels, size, solution)
         if person is not None:
             person = model.person(solution[7:])
             model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
             solution[7:] = 0.0
     if person is not None:
         subject = fit_subject(person)
-        solution = _solve(replace(model, derivatives=model.derivatives[:0]), pixels, size, solution[:7])
+        solution = _fit_camera_and_identity(
+            replace(model, derivatives=model.derivatives[:0]), pixels, size, solution[:7]
+        )
     return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(solution, size)))
 
 
@@ -99,14 +101,18 @@ class _LandmarkModel:
         indices = np.array([k for k, one in enumerate(points.names) if one in pixels_by_name])
         names = tuple(points.names[k] for k in indices)
         if person is None:
-            positions = _interpolate(points, indices, plain.positions_mm.astype(np.float64)) - plain.centre_mm
+            positions = (
+                _landmark_positions(points, indices, plain.positions_mm.astype(np.float64)) - plain.centre_mm
+            )
             return cls(names, positions, np.zeros((0, *positions.shape)), None, ())
         centre = np.array(person.head(subdivide=0).centre_mm)
         targets = (one for one in human_targets() if one.startswith(_TARGET_FOLDERS))
         details = tuple(one for one in targets if one.endswith(_TARGET_SUFFIXES))
 
         def positions_of(other: Human) -> Floats:
-            return np.asarray(_interpolate(points, indices, other.positions_mm.astype(np.float64)) - centre)
+            return np.asarray(
+                _landmark_positions(points, indices, other.positions_mm.astype(np.float64)) - centre
+            )
 
         model = cls(names, positions_of(person), np.zeros((0, 0, 3)), person, details)
         unknowns = range(len(_MACRO_NAMES) + len(details))
@@ -125,7 +131,9 @@ class _LandmarkModel:
         """
         assert self.prior is not None
         macro: dict[str, Any] = {
-            name: float(np.clip(getattr(self.prior, name) + _prior_sd(name) * step, *_limits(name)))
+            name: float(
+                np.clip(getattr(self.prior, name) + _macro_prior_sd(name) * step, *_macro_limits(name))
+            )
             for name, step in zip(_MACRO_NAMES, identity, strict=False)
         }
         targets = dict(self.prior.targets)
@@ -156,19 +164,21 @@ def _log_focal(size: tuple[int, int]) -> float:
     return float(np.log(size[1] * _DISTANCE_MM / _FRAME_MM))
 
 
-def _prior_sd(name: str) -> float:
+def _macro_prior_sd(name: str) -> float:
     return _MACRO_SD * (OLD - YOUNG if name == "age" else 1.0)
 
 
-def _limits(name: str) -> tuple[float, float]:
+def _macro_limits(name: str) -> tuple[float, float]:
     return {"age": (YOUNG, OLD), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
 
 
-def _interpolate(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
+def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
     return np.asarray(np.einsum("nk,nkc->nc", points.weight[indices], positions[points.point[indices]]))
 
 
-def _solve(model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats) -> Floats:
+def _fit_camera_and_identity(
+    model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats
+) -> Floats:
     """Fit camera and identity to landmarks; return rotation, translation, log focal length and identity.
 
     pixels : (n, 2) landmarks in the photograph
@@ -181,17 +191,17 @@ def _solve(model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: 
 
     def residuals(x: Floats) -> Floats:
         positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)
-        error = (_project(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
+        error = (_project_landmarks(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
         return np.concatenate([error.ravel(), [(x[6] - prior_median) / _FOCAL_SD], x[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.count)])
     return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
-def _project(x: Floats, positions: Floats, size: tuple[int, int]) -> Floats:
+def _project_landmarks(x: Floats, positions: Floats, size: tuple[int, int]) -> Floats:
     """Project positions (n, 3) into the photograph; return pixels (n, 2).
 
-    x : (7 + u,) unknowns in the order of `_solve`, of which the camera's seven are used
+    x : (7 + u,) unknowns in the order of `_fit_camera_and_identity`, of which the camera's seven are used
     """
     from scipy.spatial.transform import Rotation
 
@@ -207,9 +217,9 @@ def _fitted_camera(x: Floats, size: tuple[int, int]) -> Camera:
     return Camera.from_opencv(K, Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], size)
 
 
-_EXPECTED = "landmarks: CSV rows of name,x,y in pixels, or JSON by MediaPipe or dermis render"
-_BY_COUNT = {68: "ibug-68", 70: "face-synthetics-70", 468: "mediapipe", 478: "mediapipe"}
-_MEDIAPIPE = "face_landmarks", "faceLandmarks", "multi_face_landmarks", "landmarks", "landmark"
+_LANDMARK_FORMATS = "landmarks: CSV rows of name,x,y in pixels, or JSON by MediaPipe or dermis render"
+_SET_BY_COUNT = {68: "ibug-68", 70: "face-synthetics-70", 468: "mediapipe", 478: "mediapipe"}
+_MEDIAPIPE_KEYS = "face_landmarks", "faceLandmarks", "multi_face_landmarks", "landmarks", "landmark"
 _MIN_LANDMARKS = 6
 
 
@@ -223,30 +233,30 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
 
     Raises DermisError for files without landmarks, and for unknown landmark sets.
     """
-    text = read_text(path, _EXPECTED)
+    text = read_text(path, _LANDMARK_FORMATS)
     if Path(path).suffix.lower() == ".json":
-        name, pixels = _parse_landmarks(path, parse_json(text, path, _EXPECTED), size)
+        name, pixels = _parse_landmarks(path, parse_json(text, path, _LANDMARK_FORMATS), size)
     else:
-        with parsing(path, _EXPECTED, KeyError, TypeError, csv.Error):
+        with parsing(path, _LANDMARK_FORMATS, KeyError, TypeError, csv.Error):
             rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
         pixels = {str(one): np.array([x, y]) for one, x, y in rows}
-        name = _BY_COUNT.get(len(pixels), "")
+        name = _SET_BY_COUNT.get(len(pixels), "")
     if len(pixels) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in pixels.values()):
         refuse(path, f"at least {_MIN_LANDMARKS} landmarks", f"got {len(pixels)}", "Correct the file")
     if name not in LANDMARK_SETS:
-        expected = f"as many landmarks as {', '.join(map(str, _BY_COUNT))}, or JSON that names their set"
+        expected = f"as many landmarks as {', '.join(map(str, _SET_BY_COUNT))}, or JSON that names their set"
         refuse(path, expected, f"got {len(pixels)}", "Give all landmarks of a set")
     return name, pixels
 
 
 def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
     """Return set name and pixels from JSON written by `dermis render --landmarks` or by MediaPipe."""
-    with parsing(path, _EXPECTED, KeyError, TypeError, IndexError):
+    with parsing(path, _LANDMARK_FORMATS, KeyError, TypeError, IndexError):
         if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
             name, rows = next(iter(data["landmarks"].items()))
             return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
         while not (isinstance(data, list) and data and isinstance(data[0], Mapping) and "x" in data[0]):
             nested = isinstance(data, Mapping)  # else a list of faces, of which the first one is used
-            data = data[next(key for key in _MEDIAPIPE if key in data) if nested else 0]
+            data = data[next(key for key in _MEDIAPIPE_KEYS if key in data) if nested else 0]
         pixels = np.array([[one["x"], one["y"]] for one in data], np.float64) * size - 0.5
-    return _BY_COUNT.get(len(pixels), ""), {str(k): pixel for k, pixel in enumerate(pixels)}
+    return _SET_BY_COUNT.get(len(pixels), ""), {str(k): pixel for k, pixel in enumerate(pixels)}

@@ -1,4 +1,4 @@
-"""Result of a fit: light, skin and their uncertainty, written as files of a folder."""
+"""Result of a fit: light and skin with uncertainties, and files in which they are saved."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import FitSubject
-from dermis.apps.inverse.fitting.light_basis import BASIS, panorama
+from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, panorama
 from dermis.apps.inverse.fitting.solve import Uncertainty
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
@@ -33,23 +33,27 @@ from dermis.scene.model import Scene
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 
-SUMMARY = "fit.json"
-_NO_DIFFERENCE = 0.5
+FIT_SUMMARY_FILE = "fit.json"
+_GREY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """Light and skin of a photograph.
+    """Light and skin of a photograph, as found by `dermis.fit`.
 
     subject : head, person, camera and pose
-    point : skin and directions of suns
-    strengths : (9 + k,) of the lobes of ambient light and of the suns
+    point : skin unknowns and directions towards the suns
+    strengths : (9 + k,) strengths of the ambient lobes and of the suns
     white : (3,) colour of the light in linear Rec. 709, green 1
+    exposure : factor from radiance to the photograph [-]
+    size : width and height of the photograph [pixel]
     uncertainty : standard deviations of the unknowns
-    photo, picture : (h, w, 3) linear pictures at the size of the fit, with exposure and white balance
-    mask : (h, w) pixels that were fitted
-    residual : median relative difference on these [-]
-    frames, seconds : number of frames, and time of the fit
+    photo, picture : (h, w, 3) photograph and fitted picture at the size of the fit, linear, with exposure and
+        white balance
+    mask : (h, w) mask of the fitted pixels
+    residual : median relative difference of photograph and fitted picture in the mask [-]
+    frames : number of frames that were rendered
+    seconds : duration of the fit [s]
     """
 
     subject: FitSubject
@@ -69,18 +73,18 @@ class FitResult:
 
     @property
     def values(self) -> dict[str, float]:
-        """Return melanin, blood, roughness and rho_s by name [-]."""
+        """Return the fitted skin: melanin, blood, roughness and rho_s by name [-]."""
         return self.point.values()
 
     @property
     def suns(self) -> list[tuple[Floats, float]]:
-        """Return unit vectors towards the suns with their irradiance at normal incidence."""
-        return list(zip(self.point.suns, map(float, self.strengths[BASIS:]), strict=True))
+        """Return the unit vector towards each sun, and the sun's irradiance at normal incidence."""
+        return list(zip(self.point.suns, map(float, self.strengths[BASIS_SIZE:]), strict=True))
 
     def summary(self) -> dict[str, Any]:
-        """Return all numbers with standard deviations, undetermined unknowns and priors.
+        """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
 
-        Standard deviations are relative for the skin, in degrees for directions. They do not include
+        Standard deviations are relative for the skin and in degrees for directions. They do not include
         systematic errors of the renderer.
         """
         uncertainty, sd = self.uncertainty, self.uncertainty.sd
@@ -96,7 +100,7 @@ class FitResult:
         return {
             "skin": skin,
             "suns": suns,
-            "around": {"mean_radiance": float(panorama(self.strengths[:BASIS]).mean())},
+            "around": {"mean_radiance": float(panorama(self.strengths[:BASIS_SIZE]).mean())},
             "white": self.white.tolist(),
             "white_sd": [sd[name] for name in ("white red", "white blue") if name in sd],
             "exposure": self.exposure,
@@ -111,7 +115,7 @@ class FitResult:
         }
 
     def _priors(self) -> list[str]:
-        """Return descriptions of priors and given values."""
+        """Return sentences that describe the priors of the unknowns and the fixed parameters."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
         sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of the initial guess"
@@ -132,7 +136,9 @@ class FitResult:
 
 
 def save_fit(folder: Path, result: FitResult) -> list[Path]:
-    """Write scene.toml with the files it needs, fit.json, and pictures, each file atomically.
+    """Write scene.toml with the files that it needs, fit.json, and pictures, each file atomically.
+
+    Returns the paths of the written files.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -141,7 +147,7 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
         actual = "got a head without a name or file"
         refuse("head", "a Human or a head with a name, for scene.toml", actual, "Fit the Human itself")
     written = []
-    radiance = panorama(result.strengths[:BASIS])
+    radiance = panorama(result.strengths[:BASIS_SIZE])
     if radiance.max() > 0.0:
         written.append(folder / "light.exr")
         with atomic_file(written[-1]) as file:
@@ -154,28 +160,31 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
     written.append(folder / "scene.toml")
     settings = Settings(size=result.size, exposure=result.exposure)
     save_scene(written[-1], fitted_scene(result, folder), settings, table)
-    for name, image in pictures(result).items():
+    for name, image in result_pictures(result).items():
         written.append(folder / f"{name}.png")
         write_image(written[-1], image)
-    written.append(folder / SUMMARY)
+    written.append(folder / FIT_SUMMARY_FILE)
     with atomic_file(written[-1]) as file:
         file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
     return written
 
 
 def fitted_scene(result: FitResult, folder: Path) -> Scene:
-    """Return the fitted scene, whose ambient light is a file of the folder."""
-    suns = sun_lights(result.point.suns, result.strengths[BASIS:], result.white)
-    has_sky = panorama(result.strengths[:BASIS]).max() > 0.0
+    """Return the scene with the fitted skin and lights; its ambient light is light.exr in a folder."""
+    suns = sun_lights(result.point.suns, result.strengths[BASIS_SIZE:], result.white)
+    has_sky = panorama(result.strengths[:BASIS_SIZE]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
     return with_skin(replace(result.subject.scene, lights=lights, environment=ambient), result.point)
 
 
-def pictures(result: FitResult) -> dict[str, Floats]:
-    """Return linear pictures: photograph, fit, and their difference on grey within the mask."""
+def result_pictures(result: FitResult) -> dict[str, Floats]:
+    """Return the photograph, the fitted picture, and their difference within the mask, linear, by name.
+
+    Grey is no difference.
+    """
     peak = max(float(np.percentile(result.photo[result.mask], 99.5)), 1e-9)
     difference = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)
     pictures_by_name = {"photo": result.photo / max(peak, 1.0), "fit": result.picture / max(peak, 1.0)}
     pictures_by_name = {name: np.clip(image, 0.0, 1.0) for name, image in pictures_by_name.items()}
-    return pictures_by_name | {"difference": np.clip(_NO_DIFFERENCE + difference, 0.0, 1.0) ** 2.2}
+    return pictures_by_name | {"difference": np.clip(_GREY + difference, 0.0, 1.0) ** 2.2}

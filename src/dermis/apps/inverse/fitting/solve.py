@@ -1,4 +1,4 @@
-"""Least squares of skin and light: light strengths linearly, all else by damped Gauss-Newton steps."""
+"""Least squares over skin and light: strengths linearly, other unknowns by damped Gauss-Newton steps."""
 
 from __future__ import annotations
 
@@ -9,30 +9,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.light_basis import BASIS, solve_strengths
+from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_strengths
 from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, SUN_SD, SUN_STEP, WHITE_SD, FitPoint
 from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
 
 _NOISE_FLOOR = 0.03
-"""Absolute noise over the median of the photograph, which limits the weight of dark pixels."""
+"""Radiance over the photograph's median that is added to a pixel for its standard deviation, so that the
+weight of dark pixels is limited."""
 ROBUST_LIMIT = 3.0
-"""Number of standard deviations from which a residual counts less [Huber1964]."""
+"""Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
 _MAD_TO_SD = 1.4826
 _MAX_STEPS = 8
 _STEP_TOLERANCE = 0.01
 _MIN_GAIN = 1e-4
 _DAMPING = 1e-3
 _MAX_TRIALS = 3
-_MAX_STEP = 0.7  # of a logarithm or of a direction [rad]
+_MAX_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class FitState:
-    """Point, and the light strengths that fit best there.
+    """Current unknowns of a fit, with the light strengths that fit best and the residual.
 
-    basis : (9 + k, p, 3) radiance under each light alone
+    point : skin, directions of the suns, and colour of the light
+    strengths : (9 + k,) strengths of the ambient lobes and of the suns
+    basis : (9 + k, p, 3) radiance of the masked pixels under each light alone
+    residual : (p, 3) radiance of the photograph minus that of the model
     weight : (p, 3) inverse standard deviation of each pixel, reduced for outliers
+    cost : sum of squared weighted residuals and of squared deviations from the priors
     """
 
     point: FitPoint
@@ -45,12 +50,13 @@ class FitState:
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Photograph to fit, with its noise.
+    """Photograph to fit, with its noise and the renderer of the face.
 
-    target : (p, 3) radiance of the pixels in the mask, divided by the given white
+    frames : renderer of the face
+    target : (p, 3) radiance of the masked pixels, divided by exposure and the given colour of the light
     noise : relative standard deviation of a pixel
     free_white : whether the colour of the light is an unknown
-    robust : number of standard deviations from which a residual counts less
+    robust : number of standard deviations above which the weight of a residual decreases
     """
 
     frames: FaceRenderer
@@ -60,19 +66,19 @@ class FitProblem:
     robust: float = ROBUST_LIMIT
 
     def weights(self, radiance: Floats) -> Floats:
-        """Return the inverse standard deviations (p, 3) of pixels of a radiance."""
+        """Return the inverse standard deviations (p, 3) of pixels with a given radiance."""
         return np.asarray(1.0 / (self.noise * (radiance + _NOISE_FLOOR * float(np.median(self.target)))))
 
     def initial_weights(self) -> Floats:
-        """Return weights from the photograph's own brightness."""
+        """Return the inverse standard deviations (p, 3) that follow from the photograph's brightness."""
         return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
     def state(self, point: FitPoint, weight: Floats) -> FitState:
-        """Return the state with the best light at a point."""
+        """Render the face at a point, and return the state with the best light strengths there."""
         return self._state(point, self.frames.basis(point) * light_tint(point), weight)
 
-    def reweighted(self, state: FitState) -> FitState:
-        """Return the state with weights from the model's brightness, reduced for outliers."""
+    def reweighted_state(self, state: FitState) -> FitState:
+        """Return the state with weights from the model's brightness, which are reduced for outliers."""
         weights = self.weights(np.maximum(self.target - state.residual, 0.0))
         scaled = np.abs(state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
@@ -88,7 +94,10 @@ class FitProblem:
         return FitState(point, x, basis, residual, weight, cost)
 
     def derivatives(self, state: FitState, name: str) -> Floats:
-        """Return derivatives of the picture (p, 3, u) by finite differences of frames under all lights."""
+        """Return derivatives of the radiance by the u unknowns, (p, 3, u), from finite differences of frames.
+
+        name : file name of the ambient light's panorama, without suffix
+        """
         point, count = state.point, 2 * len(state.point.suns)
         centre = self.frames.combined(point, state.strengths, name)
         shifted = []
@@ -104,55 +113,58 @@ class FitProblem:
         return np.moveaxis(derivatives, 0, -1)
 
     def steps(self, sun_angles: int) -> list[float]:
-        """Return the steps of the finite differences.
+        """Return the steps of the finite differences, for the skin unknowns and the directions of suns.
 
-        sun_angles : number of angles that describe the suns
+        sun_angles : number of angles that describe the directions of all suns
         """
         return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP] * sun_angles
 
     def prior_sd(self, sun_angles: int) -> Floats:
-        """Return the standard deviation of the prior of each unknown (u,)."""
+        """Return the standard deviations of the priors of all unknowns (u,).
+
+        sun_angles : number of angles that describe the directions of all suns
+        """
         white = WHITE_SD if self.free_white else 1e-6
         return np.array([one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_SD] * sun_angles + [white] * 2)
 
     def prior_offsets(self, point: FitPoint) -> Floats:
-        """Return the differences of the unknowns from the means of their priors (u,), 0 for directions."""
+        """Return the differences of the unknowns from the means of their priors (u,), 0 for suns."""
         skin = point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
         return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
 
 
 def light_tint(point: FitPoint) -> Floats:
-    """Return the colour of the light relative to the given white (3,), with green 1."""
+    """Return the fitted colour of the light over the colour that the user gave (3,), with green 1."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
 def solve_fit(
     problem: FitProblem, start: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[FitState, Floats]:
-    """Return the best state, and derivatives (p, 3, u) there or one step before.
+    """Minimise the cost from a start point; return the best state, and derivatives of the radiance (p, 3, u).
 
-    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975], which eliminates the
-    light strengths.
+    The derivatives are those at the best state or one step before. Light strengths are eliminated by variable
+    projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975].
     """
-    state = problem.reweighted(problem.state(start, problem.initial_weights()))
+    state = problem.reweighted_state(problem.state(start, problem.initial_weights()))
     damping = _DAMPING
     for iteration in range(_MAX_STEPS):
         progress(iteration, _MAX_STEPS)
         derivatives = problem.derivatives(state, f"light_{iteration}")
-        improved, step, damping = _improve(problem, state, derivatives, damping)
+        improved, step, damping = _try_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives
         gain = 1.0 - improved.cost / state.cost
-        state = problem.reweighted(improved)
+        state = problem.reweighted_state(improved)
         if np.abs(step).max() < _STEP_TOLERANCE or gain < _MIN_GAIN:
             break
     return state, derivatives
 
 
-def _improve(
+def _try_steps(
     problem: FitProblem, state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
-    """Return a better state or None, the step to it, and the damping for the next step."""
+    """Try damped steps; return a state of lower cost or None, the step to it, and the next damping."""
     H, g = _normal_equations(problem, state, derivatives)
     for _ in range(_MAX_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
@@ -167,7 +179,7 @@ def _improve(
 
 
 def _normal_equations(problem: FitProblem, state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
-    """Return the curvature and the negative gradient of half the cost, with light strengths eliminated."""
+    """Return the Gauss-Newton matrix and the negative gradient of half the cost, without light strengths."""
     J = (derivatives * state.weight[..., None]).reshape(-1, derivatives.shape[-1])
     J, r = _eliminate_lights(state, J)
     prior_sd = problem.prior_sd(2 * len(state.point.suns))
@@ -176,14 +188,19 @@ def _normal_equations(problem: FitProblem, state: FitState, derivatives: Floats)
 
 
 def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return weighted derivatives orthogonal to the lights, except suns of strength 0, and the residual."""
-    free = [k for k in range(len(state.basis)) if k < BASIS or state.strengths[k] > 0.0]
+    """Return the part of weighted derivatives that light strengths cannot compensate, and the residual.
+
+    Suns of strength 0 cannot become weaker and are not eliminated.
+
+    J : (3 p, u) derivatives of the radiance, multiplied by the weights
+    """
+    free = [k for k in range(len(state.basis)) if k < BASIS_SIZE or state.strengths[k] > 0.0]
     Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
     return J - Q @ (Q.T @ J), (state.residual * state.weight).ravel()
 
 
-_BLOCK_COUNT = 16
-"""Blocks along the longer side; errors of the frame are correlated within a block."""
+_BLOCKS_PER_SIDE = 16
+"""Number of blocks along the longer side of the picture; residuals are correlated within a block."""
 _LIMIT_TOLERANCE = 1e-6
 _MIN_PRIOR_RATIO = 0.5
 _MIN_CORRELATION = 0.95
@@ -191,12 +208,15 @@ _MIN_CORRELATION = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Uncertainty of the unknowns by name, all as logarithms or angles.
+    """Uncertainty of the unknowns of a fit by name.
+
+    Skin and colour of the light are logarithms, directions are angles [rad].
 
     sd : standard deviations, from residuals that are correlated within blocks of the picture
-    undetermined : names whose standard deviation is more than half of their prior's, and those at a limit
-    correlated : pairs that the photograph cannot separate, with their correlation
-    singular_values : of the derivatives in units of the priors, largest first
+    undetermined : unknowns with a standard deviation of more than half of their prior's, and unknowns at a
+        limit
+    correlated : pairs of unknowns that the photograph cannot separate, with their correlation
+    singular_values : singular values of the derivatives in units of the priors, largest first
     """
 
     sd: dict[str, float]
@@ -207,7 +227,10 @@ class Uncertainty:
 
 
 def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -> Uncertainty:
-    """Return the uncertainty from derivatives without the lights, over blocks of pixels [White1980]."""
+    """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
+
+    derivatives : (p, 3, u) derivatives of the radiance by the unknowns
+    """
     sun_angles = 2 * len(state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
     names = [*(one.name for one in SKIN_UNKNOWNS), *suns, "white red", "white blue"]
@@ -237,7 +260,7 @@ def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -
 
 
 def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:
-    """Return the index of each pixel's block (p,)."""
+    """Return the index of the block of the picture that contains each masked pixel (p,)."""
     rows, columns = np.nonzero(frames.mask)
-    side = max(1, max(frames.mask.shape) // _BLOCK_COUNT)
-    return np.asarray(rows // side * (_BLOCK_COUNT * 2) + columns // side, np.int64)
+    side = max(1, max(frames.mask.shape) // _BLOCKS_PER_SIDE)
+    return np.asarray(rows // side * (_BLOCKS_PER_SIDE * 2) + columns // side, np.int64)

@@ -1,4 +1,4 @@
-"""Unknowns of a fit, their priors, and the scene for given values."""
+"""Unknowns of a fit with their priors, and the skin and suns of a scene for given unknowns."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
 SUN_DEGREES = 0.53
-"""Angular diameter of the sun, for shadows."""
+"""Angular diameter of the sun, which determines the penumbra of its shadows [degrees]."""
 
 
 @dataclass(frozen=True)
 class SkinUnknown:
-    """Unknown of the skin, fitted as its logarithm.
+    """Unknown parameter of the skin, which is fitted as its logarithm.
 
-    prior_median, prior_sd : median of the prior, and standard deviation of its logarithm
-    low, high : limits
-    step : of finite differences, in the logarithm
+    name : name of the parameter
+    prior_median, prior_sd : median of the prior, and standard deviation of the logarithm
+    low, high : smallest and largest value
+    step : step of finite differences of the logarithm
     """
 
     name: str
@@ -40,24 +41,24 @@ SKIN_UNKNOWNS = (
     SkinUnknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
     SkinUnknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
 )
-"""Unknowns with wide priors: melanin varies as over all populations, roughness as over the regions of a face,
-and `rho_s`, which depends on oil, between dry skin and a smooth boundary."""
+"""Unknown parameters of the skin. The priors are wide: melanin covers all populations, roughness all regions
+of a face, and `rho_s` the range from dry skin to a smooth boundary."""
 _PROFILE_STEP = 0.25
-"""Step to which logarithms of pigments are rounded for the profile, whose computation is slow."""
+"""Step to which logarithms of pigments are rounded for the diffusion profile, as profiles are slow to fit."""
 SUN_STEP = 0.02
 """Step of finite differences of a sun's direction [rad]."""
 SUN_SD = 1.0
 WHITE_SD = 0.2
-"""Prior standard deviation of the logarithms of red and blue over green of the light."""
+"""Prior standard deviation of the logarithms of red over green and of blue over green of the light."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitPoint:
-    """Values of all unknowns except the strengths of lights.
+    """Values of all unknowns of a fit except the strengths of lights.
 
     logs : (4,) logarithms of `SKIN_UNKNOWNS`
     suns : (k, 3) unit vectors towards the suns
-    white : (2,) logarithms of red and blue over green of the light
+    white : (2,) logarithms of red over green and of blue over green of the light
     """
 
     logs: Floats
@@ -65,13 +66,14 @@ class FitPoint:
     white: Floats
 
     def values(self) -> dict[str, float]:
-        """Return the values of the skin by name."""
+        """Return the parameters of the skin by name."""
         return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
     def stepped(self, step: Floats) -> FitPoint:
-        """Return the point after a step, within the limits.
+        """Return the point after a step, with the skin clipped to its limits.
 
-        step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
+        step : (4 + 2 k + 2,) steps of the skin's logarithms, of the suns along two tangents each, and of the
+            light's colour
         """
         skin, count = len(SKIN_UNKNOWNS), len(self.suns)
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
@@ -85,12 +87,12 @@ class FitPoint:
 
 
 def prior_point(suns: Floats) -> FitPoint:
-    """Return the point at the medians of the priors."""
+    """Return the point at the medians of the priors, with given suns (k, 3)."""
     return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), suns, np.zeros(2))
 
 
 def tangents(towards: Floats) -> Floats:
-    """Return two tangents (k, 2, 3) of each direction (k, 3)."""
+    """Return two perpendicular unit vectors in the plane normal to each direction (k, 3), (k, 2, 3)."""
     helper = np.where(np.abs(towards[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     first = np.cross(helper, towards)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -100,9 +102,9 @@ def tangents(towards: Floats) -> Floats:
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
     """Return the scene with the skin of a point.
 
-    Painted people are painted with these pigments, and their profile is that of pigments rounded to a coarse
-    grid. Other heads get the uniform colour of the pigments' profile, since the pigments of their colour map
-    are unknown.
+    A painted person is painted with the pigments of the point, but diffused with the profile of pigments
+    rounded to a coarse grid, as profiles are slow to compute. Other heads get the uniform colour of the
+    pigments, since the pigments of their colour map are unknown.
     """
     numbers = point.values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}
@@ -121,7 +123,12 @@ def with_skin(scene: Scene, point: FitPoint) -> Scene:
 
 
 def sun_lights(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
-    """Return directional lights of a colour (3,) and strengths (k,), their irradiance at normal incidence."""
+    """Return directional lights with given directions, irradiance at normal incidence, and colour.
+
+    towards : (k, 3) unit vectors towards the suns
+    strengths : (k,) irradiance of each sun
+    white : (3,) colour of all suns, by which the irradiance is multiplied
+    """
     return [
         DirectionalLight(direction=tuple(-sun), irradiance=tuple(float(s) * white), angle_degrees=SUN_DEGREES)
         for sun, s in zip(towards, strengths, strict=True)

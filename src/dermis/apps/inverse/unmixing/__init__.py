@@ -1,1 +1,1 @@
-"""Pigments from skin colours: melanin and blood of colour maps, and recolouring."""
+"""Unmixing of skin colours: maps of melanin and blood from colour maps, and recolouring."""

@@ -1,4 +1,4 @@
-"""Unmixing and recolouring of pictures on a device in strips, and estimation of slow shading."""
+"""Unmixing and recolouring of pictures on the device, in strips of rows, and estimation of shading."""
 
 from __future__ import annotations
 
@@ -30,15 +30,17 @@ from dermis.optics.pigments.parameters import SkinParameters
 Pixels = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
 _FOLDER = Path(__file__).parent
-_GUESS_SIDE = 96  # of the grid of initial guesses
+_GUESS_SIDE = 96  # number of nodes along each side of the grid of initial guesses
 _MAX_STEPS = 8
-_STRIP_TEXELS = 1 << 22  # of 16 bytes each in five textures
+_STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
 _FORMAT = "rgba32float"
 
 
 class Unmixer:
-    """Inverse of a skin model on a device, from colours to melanin and blood.
+    """Inversion of a skin model on the device: melanin and blood of each texel's colour.
 
+    device : device on which pictures are unmixed
+    model : table of skin colours that is inverted
     noise : relative standard deviation of a channel [-]
     """
 
@@ -47,18 +49,21 @@ class Unmixer:
         self._table = _table_texture(device, model)
         self._outputs: tuple[Texture, Texture] | None = None
         self._guesses = device.storage_buffer(8 * _GUESS_SIDE**2, "initial guesses")
-        shader = _program(device, "unmix_start", model)
+        shader = _unmixing_program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
-        frame.compute("start", shader, self._bound(shader, 0), (_GUESS_SIDE, _GUESS_SIDE))
+        frame.compute("start", shader, self._shader_bindings(shader, 0), (_GUESS_SIDE, _GUESS_SIDE))
         frame.submit()
 
     def unmix(
         self, colours: Pixels, progress: ProgressCallback = lambda done, of: None
     ) -> tuple[Pixels, Pixels, Pixels]:
-        """Return pigments (h, w, 3), standard deviations (h, w, 2) and residual (h, w, 3) of colours.
+        """Unmix a picture; return pigments (h, w, 3), standard deviations (h, w, 2) and residual (h, w, 3).
 
-        The pigments are melanin, blood and the third unknown; the standard deviations are those of the first
-        two.
+        The pigments are melanin, blood and the third unknown of the model; the standard deviations are those
+        of melanin and blood. The residual is the colour over that of the model.
+
+        colours : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
+        progress : called with the number of finished rows and the number of all rows
         """
         height, width = colours.shape[:2]
         estimate, sd, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
@@ -74,21 +79,21 @@ class Unmixer:
         return estimate, sd, residual
 
     def record(self, frame: CommandList, colours: Texture) -> tuple[Texture, Texture]:
-        """Record the pass from a texture of colours to two textures of results.
+        """Record the pass that unmixes a texture of colours into two textures, and return these.
 
-        The first one has melanin, blood and their standard deviations, the second one the residual and the
-        third unknown. They are reused by the next call with the same size.
+        The first texture has melanin, blood and their standard deviations, the second one the residual and
+        the third unknown. The next call with this size overwrites both.
         """
         size = colours.size[:2]
-        shader = _program(self.device, "unmix", self.model)
+        shader = _unmixing_program(self.device, "unmix", self.model)
         if self._outputs is None or self._outputs[0].size[:2] != size:
             self._outputs = make_texture(self.device, size, _FORMAT), make_texture(self.device, size, _FORMAT)
         fractions, residual = self._outputs
         bound = {"colours": colours, "fractions": fractions, "residual": residual}
-        frame.compute("unmix", shader, bound | self._bound(shader, _MAX_STEPS), size)
+        frame.compute("unmix", shader, bound | self._shader_bindings(shader, _MAX_STEPS), size)
         return fractions, residual
 
-    def _bound(self, shader: ComputeProgram, steps: int) -> MutableBindings:
+    def _shader_bindings(self, shader: ComputeProgram, steps: int) -> MutableBindings:
         record = _model_record(shader, self.model, self.noise, steps)
         return {"model": record, "table": self._table, "guesses": self._guesses}
 
@@ -96,12 +101,14 @@ class Unmixer:
 def recolour(
     device: Device, model: SkinModel, estimate: Pixels, residual: Pixels, factors: Floats, added: Floats
 ) -> Pixels:
-    """Return the colours (h, w, 3) of the model for changed pigments, times the residual (h, w, 3).
+    """Return the model's colours (h, w, 3) for changed pigments, times the residual of the original colours.
 
     estimate : (h, w, 3) melanin, blood and the third unknown
-    factors, added : (3,) applied to each of them, in this order
+    residual : (h, w, 3) original colour over that of the model
+    factors, added : (3,) factor of melanin, blood and the third unknown, and constant that is then added to
+        each
     """
-    table, shader = _table_texture(device, model), _program(device, "recolour", model)
+    table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added)
     output = np.empty(residual.shape, np.float32)
     for rows in row_strips(*estimate.shape[:2]):
@@ -119,7 +126,7 @@ def recolour(
 
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
-    """Return strips of rows of a picture that fit in a device's memory."""
+    """Return slices of rows of a picture, each small enough for the device's memory."""
     rows = max(1, _STRIP_TEXELS // width)
     return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
 
@@ -136,7 +143,7 @@ def _table_texture(device: Device, model: SkinModel) -> Texture:
     return texture
 
 
-def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
+def _unmixing_program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
     thirds, nodes = model.log_colours.shape[:2]
     numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _GUESS_SIDE}
     path = _FOLDER / f"{name}.wgsl"
@@ -153,15 +160,15 @@ def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps:
     return shader.record("Model", **numbers, **priors, **limits)
 
 
-_SHADING_SIDE = 256  # of the downsampled picture [texels]
+_SHADING_SIDE = 256  # longer side of the downsampled picture [texel]
 _SHADING_SIGMA = 1.0 / 24.0  # standard deviation of the blur over the longer side
 
 
 def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
-    """Return the shading of each texel (h, w), with mean 1 over the skin [-].
+    """Return the low-frequency shading of each texel (h, w), with mean 1 over the skin [-].
 
-    It is the brightness of a downsampled picture that melanin and blood do not explain, low-pass filtered
-    with weights by how well each colour matches a skin.
+    It is the brightness of a downsampled picture that melanin and blood do not explain, low-pass filtered.
+    The weights of the filter are larger where a colour is close to that of a skin.
     """
     small = _block_means(colours)
     estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
@@ -169,11 +176,11 @@ def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, nois
     weight = (1.0 / (1.0 + misfit)) * (small.min(axis=-1) > 0.0)
     smooth = _weighted_blur(estimate[..., 2].astype(np.float64), weight.astype(np.float64))
     mean = float((smooth * weight).sum() / max(float(weight.sum()), 1e-12))
-    return _upsampled(np.exp(smooth - mean), (colours.shape[0], colours.shape[1]))
+    return _upsample(np.exp(smooth - mean), (colours.shape[0], colours.shape[1]))
 
 
 def _block_means(colours: Pixels) -> Pixels:
-    """Return means over blocks of texels."""
+    """Downsample a picture to at most about 256 texels along the longer side by means over blocks."""
     block = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
     height, width = (max(1, side // block) for side in colours.shape[:2])
     cropped = colours[: height * block, : width * block] if block > 1 else colours
@@ -189,8 +196,8 @@ def _weighted_blur(values: NDArray[np.float64], weight: NDArray[np.float64]) -> 
     return np.asarray(blurred[0] / np.maximum(blurred[1], 1e-6))
 
 
-def _upsampled(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
-    """Return a picture interpolated bilinearly between the centres of blocks."""
+def _upsample(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
+    """Upsample a picture of block means bilinearly to a given height and width."""
     from scipy.ndimage import map_coordinates
 
     output = np.empty(shape, np.float32)

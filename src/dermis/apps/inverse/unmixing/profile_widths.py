@@ -1,4 +1,4 @@
-"""Spatially varying diffusion profile of a picture: three profiles and a map that mixes them."""
+"""Diffusion profile that varies over a picture: three profiles, and a map that mixes them by texel."""
 
 from __future__ import annotations
 
@@ -23,22 +23,24 @@ from dermis.optics.tissue import Tissue, load_tissue
 
 Pixels = NDArray[np.float32]
 PROFILE_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
-"""Names of the profiles' files, with their indices along melanin and blood: pale without blood, pale with
-blood, dark with blood."""
+"""File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
+skin with blood, and dark skin with blood."""
 MAP_NAME = "profile_map"
-_NODES = 4  # along the logarithms of melanin and of blood
-_PERCENTILES = 0.5, 99.5  # of the skin, between which profiles are mixed
-_MIN_FRACTION, _MIN_RATIO = 1e-3, 1.02  # of a volume fraction, and between the ends of an axis
-_SUM_WEIGHT = 1e4  # of the equation that the weights sum to 1
+_NODES = 4  # number of grid nodes along the logarithms of melanin and of blood
+_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
+# Smallest volume fraction of a grid axis, and smallest ratio of its ends.
+_MIN_FRACTION, _MIN_RATIO = 1e-3, 1.02
+_SUM_WEIGHT = 1e4  # weight of the equation by which the mixture weights sum to 1
 
 
 @dataclass(frozen=True, eq=False)
 class ProfileMixture:
-    """Three profiles on the same Gaussians, and a map of their weights.
+    """Three profiles with common variances, and a map of their weights.
 
-    weights : (h, w, 2) weights of the second and the third profile [-]
-    error, single_error : (3,) relative RMS error of ring energies over a grid of pigments, by channel, of the
-        mixture and of the single profile in the middle of the grid [-]
+    profiles : pale skin without blood, pale skin with blood, dark skin with blood
+    weights : (h, w, 2) weights of the second and the third profile; the first profile has the rest [-]
+    error, single_error : (3,) relative root-mean-square error of ring energies over a grid of pigments, of
+        the mixture and of a single profile in the middle of the grid [-]
     """
 
     profiles: tuple[GaussianSum, ...]
@@ -47,20 +49,20 @@ class ProfileMixture:
     single_error: Floats
 
     def summary(self) -> dict[str, list[float]]:
-        """Return the errors."""
+        """Return the errors of the mixture and of a single profile, as they are written to JSON."""
         return {"mixed": self.error.tolist(), "one_profile": self.single_error.tolist()}
 
 
 def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
-    """Return three profiles, and their weights by each texel's melanin and blood.
+    """Compute three profiles and their weights in each texel from unmixed melanin and blood.
 
     Raises DermisError for a picture without skin.
     """
     skin = unmixed.skin_texels()
     if not skin.any():
         refuse("widths", "a picture of skin", "no texel is like skin", "Give the skin's albedo")
-    axes = [_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
-    tissues = [_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
+    axes = [_fraction_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
+    tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
     corners = [(m % _NODES) * _NODES + b % _NODES for m, b in PROFILE_CORNERS.values()]
     weights = _mixture_weights(nodes, nodes[corners])
@@ -73,7 +75,7 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
 
 
 def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
-    """Write the profiles and the map of weights, each file atomically.
+    """Write the three profiles and the map of weights, each file atomically; return the files' paths.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -86,24 +88,29 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
     return [*written, path]
 
 
-def _axis(fractions: Pixels) -> Floats:
+def _fraction_axis(fractions: Pixels) -> Floats:
     low, high = np.maximum(np.percentile(fractions, _PERCENTILES), _MIN_FRACTION)
     return np.geomspace(low, max(high, _MIN_RATIO * low), _NODES)
 
 
-def _tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
+def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
     fixed = {name: getattr(skin, name) for name in ("eumelanin", "oxygen", "epidermis_mm")}
     return load_tissue("spectral", pigments={"melanin": float(melanin), "blood": float(blood), **fixed})
 
 
 def _ring_fractions(tissue: Tissue) -> Floats:
-    """Return the fraction (n, 3) of the diffuse reflectance that leaves through each ring."""
+    """Return the fraction (n, 3) of a tissue's diffuse reflectance that emerges through each ring."""
     rings = tissue.rings()
     return np.asarray(rings.energy / rings.total)
 
 
 def _mixture_weights(nodes: Floats, corners: Floats) -> Floats:
-    """Return non-negative weights (n, k) with sum 1 of the corners, which approximate each node."""
+    """Fit the ring fractions of each node by a mixture of corner profiles; return the weights (n, k).
+
+    The weights are non-negative and sum to 1 for each node.
+
+    nodes, corners : ring fractions of n pigment mixtures, and of the k profiles that are mixed
+    """
     from scipy.optimize import nnls
 
     equations = np.vstack([corners.reshape(len(corners), -1).T, np.full((1, len(corners)), _SUM_WEIGHT)])
@@ -112,13 +119,16 @@ def _mixture_weights(nodes: Floats, corners: Floats) -> Floats:
 
 
 def _rms_error(result: Floats, nodes: Floats) -> Floats:
-    """Return the relative RMS error over all nodes, by channel (3,)."""
+    """Return the relative root-mean-square error of ring fractions over all nodes, by channel (3,)."""
     squares = ((result - nodes) ** 2).sum(axis=1) / (nodes**2).sum(axis=1)
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
 def _interpolate_map(weights: Floats, axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
-    """Return weights (h, w, 2) interpolated between nodes in the logarithms of melanin and blood."""
+    """Interpolate mixture weights from the grid of pigments to each texel, (h, w, 2).
+
+    The grid is regular in the logarithms of melanin and blood.
+    """
     from scipy.interpolate import RegularGridInterpolator
 
     logarithms = [np.log(axis) for axis in axes]

@@ -1,6 +1,6 @@
-// Skin model, and its inverse by damped Gauss-Newton steps; skin_model.py is the same in float64.
+// Skin model and its inversion by damped Gauss-Newton steps, as in skin_model.py, which computes in float64.
 
-override NODES: u32; // along the roots of melanin and of blood
+override NODES: u32; // number of table nodes along the square roots of melanin and of blood
 override THIRDS: u32; // nodes of the third unknown, 1 if it is not in the table
 override SHADE: bool; // whether the third unknown is the logarithm of a factor
 

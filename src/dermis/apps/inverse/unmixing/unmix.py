@@ -1,4 +1,4 @@
-"""Melanin and blood of a picture of skin colour, recolouring, and their files."""
+"""Unmixing of a picture of skin into melanin and blood, recolouring, and files of the results."""
 
 from __future__ import annotations
 
@@ -31,26 +31,29 @@ DEFAULT_NOISE = 0.01
 MAX_SKIN_DELTA_E = 5.0
 """Largest CIEDE2000 difference from the model's nearest colour at which a texel counts as skin."""
 _DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
-_SUMMARY_SIDE = 512  # texels along the longer side, for the summary
+_SUMMARY_SIDE = 512  # largest number of texels along the longer side that the summary reads
 _NOISE_RANGE = 1e-4, 0.5
-_BLACK_LEVEL = 1e-3  # for texels between the charts of a map
-_MAX_LOG_RESIDUAL = 0.15  # of texels that count for medians
+_BLACK_LEVEL = 1e-3  # largest channel of texels between the charts of a map
+_MAX_LOG_RESIDUAL = 0.15  # largest logarithm of the residual of a skin texel
 _FACTOR_RANGE = 0.0, 100.0
 
 
 @dataclass(frozen=True)
 class FractionChange:
-    """Change of a map of volume fractions: a factor, or another median.
+    """Change of a map of volume fractions, by a factor or to a given median.
 
-    A larger median adds a constant, because a factor would amplify the noise of pale skin; a smaller one
-    multiplies.
+    A map is raised to a larger median by adding a constant, because a factor would amplify the noise of pale
+    skin. It is lowered to a smaller median by a factor.
+
+    factor : factor of all fractions, if no median is given [-]
+    median : median of the changed map, or None [-]
     """
 
     factor: float = 1.0
     median: float | None = None
 
     def scale_and_offset(self, median: float) -> tuple[float, float]:
-        """Return the factor for a map of this median, and the constant that is then added."""
+        """Return the factor for a map with a given median, and the constant that is added afterwards."""
         if self.median is None:
             return self.factor, 0.0
         if self.median < median:
@@ -60,9 +63,10 @@ class FractionChange:
 
 @dataclass(frozen=True)
 class PigmentChange:
-    """Change of the pigments of a skin; None leaves a value unchanged.
+    """Change of the pigments of a skin, for recolouring.
 
-    oxygen, eumelanin : fractions, as in `SkinParameters` [-]
+    melanin, blood : changes of the maps
+    oxygen, eumelanin : new fractions as in `SkinParameters`; None leaves a fraction unchanged [-]
     """
 
     melanin: FractionChange = FractionChange()
@@ -71,21 +75,24 @@ class PigmentChange:
     eumelanin: float | None = None
 
     def applied_to(self, skin: SkinParameters) -> SkinParameters:
-        """Return a skin with the changed oxygen and eumelanin."""
+        """Return the skin parameters with the new fractions of oxygen and eumelanin."""
         changed = {name: getattr(self, name) for name in ("oxygen", "eumelanin")}
         return replace(skin, **{name: one for name, one in changed.items() if one is not None})
 
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Return factors and constants for melanin, blood and the third unknown, by medians of the maps."""
+        """Return factors (3,) and constants (3,) for melanin, blood and the third unknown.
+
+        melanin, blood : medians of the maps before the change [-]
+        """
         pairs = self.melanin.scale_and_offset(melanin), self.blood.scale_and_offset(blood), (1.0, 0.0)
         factors, added = np.array(pairs).T
         return factors, added
 
 
 def parse_fraction_change(option: str, text: str) -> FractionChange:
-    """Parse x2 as a factor and 0.1 as a median.
+    """Parse the text of an option: x2 is a factor, 0.1 a median.
 
-    Raises DermisError for anything else.
+    Raises DermisError for any other text.
     """
     factor = text[:1] in "x×*" and bool(text)
     try:
@@ -99,13 +106,16 @@ def parse_fraction_change(option: str, text: str) -> FractionChange:
 
 @dataclass(frozen=True, eq=False)
 class UnmixResult:
-    """Pigments of a picture of skin. All maps are (h, w), row 0 at the top.
+    """Maps of the pigments of a picture of skin, (h, w) with row 0 at the top, as found by `dermis.unmix`.
 
     melanin, blood : volume fractions of melanosomes in the epidermis and of blood in the dermis [-]
     melanin_sd, blood_sd : lower bounds of their standard deviations due to noise, by the Cramér-Rao bound [-]
-    third : oxygenated fraction of haemoglobin, if it was requested [-]
-    shading : shading that the colours were divided by, if it was requested [-]
-    residual : (h, w, 3) colour over that of the model: paint, hair, and all else that is not skin [-]
+    residual : (h, w, 3) colour over that of the model, which contains paint, hair and all else that is not
+        skin [-]
+    third : oxygenated fraction of haemoglobin, None if it was not requested [-]
+    shading : shading by which the colours were divided, None if it was not requested [-]
+    skin : parameters of the model's skins
+    model : model of skin colours
     devices : devices used so far, by requested adapter; they stay open
     """
 
@@ -121,14 +131,14 @@ class UnmixResult:
     devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
-        """Return the maps that exist, by the names of their files."""
+        """Return the maps that were computed, by the names of their files."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
         optional = {"oxygen": self.third, "shading": self.shading}
         return named | {name: one for name, one in optional.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
-        """Return medians over the skin, errors of the reconstruction, and the fraction of skin.
+        """Return medians of the pigments, colour differences, and the fraction of texels that are skin.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
         skin.
@@ -150,9 +160,12 @@ class UnmixResult:
         return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
-        """Return the colours (h, w, 3), linear Rec. 709, of the same skin with other pigments.
+        """Return the colours (h, w, 3) of this skin with other pigments, linear Rec. 709.
 
         The residual is kept, and so is shading that was not removed.
+
+        change : change of the pigments
+        adapter : "auto", "cpu" or part of the name of an adapter
 
         Raises DermisError as `dermis.gpu.open_device`.
         """
@@ -169,12 +182,12 @@ class UnmixResult:
         return recolour(device, target, estimate, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
-        """Return the mask (h, w) of texels whose colour is near one of the model's."""
+        """Return the mask (h, w) of texels whose colour is close to a colour of the model."""
         logs = np.log(np.maximum(self.residual, _BLACK_LEVEL))
         return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
     def _median(self, fraction: Pixels) -> float:
-        """Return the median over the skin."""
+        """Return the median of a map over the skin texels."""
         skin = self.skin_texels()
         return float(np.median(fraction[skin] if skin.any() else fraction))
 
@@ -194,21 +207,21 @@ def unmix(
     adapter: str = "auto",
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> UnmixResult:
-    """Return melanin and blood of a picture of skin colour, such as the albedo map of a scan.
+    """Estimate melanin and blood in each texel of a picture of skin, such as the albedo map of a scan.
 
     Parameters
     ----------
     picture : str, Path, EmbeddedPicture or array_like
         File (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
     skin : SkinParameters
-        Thickness, eumelanin and oxygen of the model's skins; its melanin and blood are ignored.
+        Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
         "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior of standard deviation 0.1
-        around the skin's own value; "none" keeps that value.
+        around that of `skin`; "none" keeps the fraction of `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool
-        Whether to estimate low-frequency shading and divide by it.
+        Whether to estimate low-frequency shading and divide the picture by it.
     adapter : str
         "auto", "cpu" or part of the name of an adapter.
     progress : callable
@@ -268,15 +281,18 @@ def _checked_colours(colours: ArrayLike) -> Pixels:
     return result.astype(np.float32, copy=False)
 
 
-SUMMARY = "unmixed.json"
+UNMIX_SUMMARY_FILE = "unmixed.json"
 
 
 def save_maps(
     folder: Path, result: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
 ) -> list[Path]:
-    """Write each map as EXR, the summary, and the recoloured picture if any, each file atomically.
+    """Write all maps as EXR files, the summary, and the recoloured picture, each file atomically.
 
-    linear : whether the recoloured picture is written as EXR rather than PNG
+    recoloured : (h, w, 3) recoloured picture in linear Rec. 709, or None
+    linear : whether the recoloured picture is written as EXR instead of PNG
+
+    Returns the paths of the written files.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -290,13 +306,13 @@ def save_maps(
         path = folder / ("recoloured.exr" if linear else "recoloured.png")
         write_image(path, recoloured)
         written.append(path)
-    with atomic_file(folder / SUMMARY) as file:
+    with atomic_file(folder / UNMIX_SUMMARY_FILE) as file:
         file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
-    return [*written, folder / SUMMARY]
+    return [*written, folder / UNMIX_SUMMARY_FILE]
 
 
 def __getattr__(name: str) -> Any:
-    """Return an object by its name in the last release."""
+    """Return an object of this module by the name that it had in the last release."""
     if new := successor(__name__, name):
         return globals()[new]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-// Initial guesses: the skins that are nearest by red and by blue over green.
+// Initial guesses: at each grid node the skin with the nearest log(red) and log(blue / green).
 //#include "skin_model.wgsl"
 //#include "first_guess.wgsl"
 
