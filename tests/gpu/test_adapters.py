@@ -96,7 +96,7 @@ def test_all_gpus_of_the_best_kind_are_taken_once_each(machine: Any) -> None:
 
 
 def test_only_optional_features_are_listed() -> None:
-    assert module._describe(fake("x", "CPU", features=("shader-f16",))).features == ()
+    assert module._describe_adapter(fake("x", "CPU", features=("shader-f16",))).features == ()
 
 
 @pytest.mark.parametrize("wanted", ["auto", "cpu", "GeForce"])

@@ -57,7 +57,9 @@ def test_wgpu_is_told_what_it_asks_for() -> None:
     from wgpu.backends.wgpu_native import ffi
 
     declared = ffi._parser._declarations
-    told = {name for name, _ in (*native_types._types(declared), *native_types._callbacks(declared))}
+    told = {
+        name for name, _ in (*native_types._named_types(declared), *native_types._callback_types(declared))
+    }
     assert register_types(ffi) == len(told) and told <= set(ffi._parsed_types)
     assert {"WGPUBindGroupEntry *", "WGPUBindGroupEntry[]", "WGPUExtent3D *", "WGPUCommandBuffer[]"} <= told
     assert "void(WGPUDevice const *, WGPUErrorType, WGPUStringView, void *, void *)" in told

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu import Device, download, make_texture, upload
-from dermis.gpu.textures import _FORMATS, texture_from_array
+from dermis.gpu.textures import _TEXEL_FORMATS, texture_from_array
 
-MAPS = sorted(set(_FORMATS) - {"depth32float"})  # depth is drawn, never uploaded
+MAPS = sorted(set(_TEXEL_FORMATS) - {"depth32float"})  # depth is drawn, never uploaded
 
 
 def noise(shape: tuple[int, int], texel: str, seed: int = 0) -> NDArray[np.generic]:
-    kind, channels = _FORMATS[texel]
+    kind, channels = _TEXEL_FORMATS[texel]
     full = (*shape, channels) if channels > 1 else shape
     numbers = np.random.default_rng(seed).uniform(0, 250, full)
     return numbers.astype(kind)

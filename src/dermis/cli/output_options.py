@@ -21,7 +21,7 @@ from dermis.scene.outputs import OUTPUTS, check_outputs
 if TYPE_CHECKING:
     from dermis.base.arrays import Bytes, Floats
     from dermis.frame.features.outputs.planes import PlaneArray
-    from dermis.frame.observation import LandmarksOption as ProjectedLandmarks
+    from dermis.frame.observation import Landmarks as ProjectedLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
     from dermis.mesh.head import Head
