@@ -20,7 +20,7 @@ PANEL, PICTURE = np.s_[:470, :195], np.s_[:380, 205:]  # without the messages at
 def calm(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
     """Yield the shared viewer without reported errors, and restore its list of errors afterwards."""
     session = shared_driver.viewer.session
-    session._faults.clear()
+    session._reported_errors.clear()
     session.message = ""
     shared_driver.event("pointer_move", x=300.0, y=240.0, button=0, buttons=())
     yield shared_driver

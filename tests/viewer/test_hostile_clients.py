@@ -18,7 +18,7 @@ from page_client import PATIENCE_S, Page, difference, visit
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
 from dermis.apps.viewer.browser import server
-from dermis.apps.viewer.browser.server import HEADERS
+from dermis.apps.viewer.browser.server import RESPONSE_HEADERS
 
 RESIZE = '{"type": "resize", "timestamp": 1, "width": 1, "height": 1, "pwidth": 400, "pheight": 300, '
 BAD = [
@@ -87,12 +87,15 @@ def test_every_response_tells_browsers_what_the_page_may(
 ) -> None:
     with answered(shown, method, path) as response:
         assert response.status == status
-        assert {name: response.headers.get_all(name) for name in HEADERS} == {
-            name: [value] for name, value in HEADERS.items()
+        assert {name: response.headers.get_all(name) for name in RESPONSE_HEADERS} == {
+            name: [value] for name, value in RESPONSE_HEADERS.items()
         }
-    policy = HEADERS["Content-Security-Policy"]
+    policy = RESPONSE_HEADERS["Content-Security-Policy"]
     assert "frame-ancestors 'none'" in policy and "unsafe" not in policy
-    assert HEADERS["Cache-Control"] == "no-store" and HEADERS["X-Content-Type-Options"] == "nosniff"
+    assert (
+        RESPONSE_HEADERS["Cache-Control"] == "no-store"
+        and RESPONSE_HEADERS["X-Content-Type-Options"] == "nosniff"
+    )
 
 
 def test_who_is_refused_is_told_the_same_and_hung_up_on(shown: Any) -> None:

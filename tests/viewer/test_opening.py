@@ -86,15 +86,15 @@ def test_the_page_is_there_while_a_head_is_read_and_hears_each_stage(
             assert (told["text"], told["number"], told["total"]) == (
                 "reading the head",
                 1,
-                len(server.STAGES),
+                len(server.PREPARATION_STAGES),
             )
         one.send('{"type": "pointer_down", "timestamp": 1, "x": 5, "y": 5, "button": 1}')  # harms nothing
         gate.set()
         stages = dict[int, str]()  # some come twice, as a page that comes hears the stage of now
-        while len(server.STAGES) not in stages:
+        while len(server.PREPARATION_STAGES) not in stages:
             told = heard(one, "stage")
             stages[told["number"]] = told["text"]
-        assert list(stages.items()) == list(enumerate(server.STAGES, 1))
+        assert list(stages.items()) == list(enumerate(server.PREPARATION_STAGES, 1))
         page = Page(one)
         page.show()
         assert page.still().max() > 50

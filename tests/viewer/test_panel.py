@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
 from dermis.apps.viewer.panel.sections import stage_series
-from dermis.apps.viewer.panel.skin import _CHANNELS
+from dermis.apps.viewer.panel.skin import _CHANNEL_COLOURS
 
 PANEL = np.s_[:, :190]
 
@@ -36,7 +36,7 @@ def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> N
 
 def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDriver) -> None:
     wide = driver.settled()
-    for colour in _CHANNELS:
+    for colour in _CHANNEL_COLOURS:
         assert count_of(wide, colour) > 15
     driver.viewer.session.change(driver.viewer.session.state.with_skin(profile="dark"))
     assert np.abs(driver.settled()[PANEL].astype(int) - wide[PANEL]).max() > 50

@@ -14,9 +14,9 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin, TissueLayer
 
 KINDS = {
-    Skin: fields.SURFACE | fields.ALBEDO,
-    Settings: fields.TECHNIQUE,
-    TissueLayer: fields.LAYER,
+    Skin: fields.SURFACE_STYLES | fields.ALBEDO_STYLES,
+    Settings: fields.TECHNIQUE_STYLES,
+    TissueLayer: fields.LAYER_STYLES,
 }
 
 
@@ -28,9 +28,9 @@ def test_words_are_about_fields_and_choices_that_exist(kind: type[FrozenModel]) 
 
 
 def test_words_are_about_kinds_of_light_that_exist() -> None:
-    assert set(fields.LIGHT_KINDS) <= set(LIGHTS)
-    assert all(any(name in kind.model_fields for kind in LIGHTS.values()) for name in fields.LIGHT)
-    assert set(fields.PROFILES) <= set(preset_names())
+    assert set(fields.LIGHT_KIND_NAMES) <= set(LIGHTS)
+    assert all(any(name in kind.model_fields for kind in LIGHTS.values()) for name in fields.LIGHT_STYLES)
+    assert set(fields.PROFILE_NAMES) <= set(preset_names())
 
 
 def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
@@ -40,7 +40,7 @@ def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
     driver.frame()
     room = driver.viewer.panel.label_width
     styles: list[FieldStyle] = [one for table in KINDS.values() for one in table.values()]
-    labels = [style.label.partition("###")[0] for style in (*styles, *fields.LIGHT.values())]
+    labels = [style.label.partition("###")[0] for style in (*styles, *fields.LIGHT_STYLES.values())]
     wide = {label: imgui.calc_text_size(label).x for label in labels}
     driver.canvas.set_logical_size(400, 480)
     assert {label for label, width in wide.items() if width > room} == set()

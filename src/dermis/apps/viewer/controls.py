@@ -12,7 +12,7 @@ from dermis.scene.camera import camera_preset
 
 Event = Mapping[str, Any]
 Point = tuple[float, float]
-CAMERAS = ("portrait", "three-quarter", "profile", "ear", "cheek")
+CAMERA_PRESETS = ("portrait", "three-quarter", "profile", "ear", "cheek")
 """Camera presets of the keys 1 to 5."""
 LIGHT_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
@@ -83,7 +83,7 @@ class Controls:
         if pinch or self._pinch:
             self._two_fingers(pinch, size)
             return
-        state, side = self.history.state, self._side(size)
+        state, side = self.history.state, self._drag_unit(size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
         if state.view == ATLAS or self._button != _LEFT:
             new_state = _pan(state, right, down)
@@ -100,7 +100,7 @@ class Controls:
         """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
-            side = self._side(size)
+            side = self._drag_unit(size)
             new_state = _pan(self.history.state, (x - x0) / side, (y - y0) / side)
             self.history.change(new_state, f"drag {self._gesture}")
             self._zoom(spread0 / spread, (x, y), size, f"drag {self._gesture}")
@@ -114,13 +114,13 @@ class Controls:
         """
         state = self.history.state
         if state.view == ATLAS:
-            x, y = ((a - 0.5 * b) / self._side(size) for a, b in zip(pointer, size, strict=True))
+            x, y = ((a - 0.5 * b) / self._drag_unit(size) for a, b in zip(pointer, size, strict=True))
             new_state = state.with_atlas_view(state.atlas_view.zoomed(factor, x, y))
         else:
             new_state = state.with_camera(dolly(state.scene.camera, factor))
         self.history.change(new_state, gesture)
 
-    def _side(self, size: Point) -> float:
+    def _drag_unit(self, size: Point) -> float:
         """Return the length by which drags are divided: image height, or shorter side for the atlas view."""
         return max(1.0, min(size) if self.history.state.view == ATLAS else size[1])
 
@@ -140,8 +140,8 @@ class Controls:
                 self.history.redo() if "Shift" in modifiers else self.history.undo()
             elif key.lower() == "y":
                 self.history.redo()
-        elif key.isdigit() and 0 < int(key) <= len(CAMERAS):
-            self.set_camera_preset(CAMERAS[int(key) - 1])
+        elif key.isdigit() and 0 < int(key) <= len(CAMERA_PRESETS):
+            self.set_camera_preset(CAMERA_PRESETS[int(key) - 1])
 
 
 class SplitView:
@@ -191,7 +191,7 @@ def picture_event(event: Event, left: float) -> Event:
 def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
     """Return the state with its camera, or its part of the atlas, moved along with the pointer.
 
-    right, down : motion of the pointer over the length `Controls._side`
+    right, down : motion of the pointer over the length `Controls._drag_unit`
     """
     if state.view == ATLAS:
         return state.with_atlas_view(state.atlas_view.panned(right, down))

@@ -69,7 +69,7 @@ class HeadLoader:
         self._name = str(Path(name).resolve()) if Path(name).is_file() else name
         if uploaded_as:
             self._names[self._name] = uploaded_as
-        self._future = self._thread.submit(_load, self._name)
+        self._future = self._thread.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
@@ -91,7 +91,7 @@ class HeadLoader:
         return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
-def _load(name: str) -> LoadedHead:
+def _load_head_or_scene(name: str) -> LoadedHead:
     return load_state(Path(name)) if Path(name).suffix.lower() == ".toml" else load_head(name)
 
 
@@ -160,7 +160,7 @@ class Session:
         self.offer_download: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
-        self._faults: set[str] = set()
+        self._reported_errors: set[str] = set()
 
     @property
     def state(self) -> ViewerState:
@@ -186,8 +186,8 @@ class Session:
         failure : what cannot be done, such as "The head cannot be opened"
         """
         message = f"{failure} ({type(error).__name__}: {_shorten(str(error))})"
-        if message not in self._faults:
-            self._faults.add(message)
+        if message not in self._reported_errors:
+            self._reported_errors.add(message)
             self.message = message
             _log.error(message, exc_info=error)
 
@@ -200,7 +200,7 @@ class Session:
         if "name" in state.head:  # the scene refers to an uploaded file by its original name
             name = self.heads.uploaded_name(str(state.head["name"]))
             state = replace(state, head={**state.head, "name": name})
-        self._write(path, lambda target: save_state(target, state))
+        self._write_or_offer(path, lambda target: save_state(target, state))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -247,10 +247,12 @@ class Session:
             refuse(f"picture {path}", "a name that ends in .png or .exr", f"got {path.name!r}", "Rename it")
         if suffix == ".exr" and view not in (PICTURE, *PARTS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
-        self._write(path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size))
+        self._write_or_offer(
+            path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size)
+        )
         self.message = f"wrote {path}, {size[0]} x {size[1]}"
 
-    def _write(self, path: Path, write_file: Callable[[Path], None]) -> None:
+    def _write_or_offer(self, path: Path, write_file: Callable[[Path], None]) -> None:
         if self.offer_download is None:
             write_file(path)
             return

@@ -36,7 +36,7 @@ _MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
 class AtlasView:
     """Part of the atlas that fills the picture in the view "atlas".
 
-    layer : map to show, one of `views.LAYERS`
+    layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
     span : extent of the picture's shorter side, in sides of the atlas [-]
     """
@@ -51,7 +51,7 @@ class AtlasView:
         right, down : motion of the pointer, in fractions of the picture's shorter side
         """
         u, v = self.centre
-        return self._at(u - self.span * right, v - self.span * down)
+        return self._with_centre(u - self.span * right, v - self.span * down)
 
     def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
@@ -61,9 +61,9 @@ class AtlasView:
         """
         span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
         (u, v), reduction = self.centre, self.span - span
-        return replace(self, span=span)._at(u + reduction * x, v + reduction * y)
+        return replace(self, span=span)._with_centre(u + reduction * x, v + reduction * y)
 
-    def _at(self, u: float, v: float) -> AtlasView:
+    def _with_centre(self, u: float, v: float) -> AtlasView:
         return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))
 
 
@@ -81,7 +81,7 @@ class ViewerState:
 
     settings : render settings; `size` is ignored because the window determines it
     head : [head] table of a scene file from which the head was loaded
-    view : one of `views.VIEWS`: the picture or an intermediate result
+    view : one of `views.VIEW_NAMES`: the picture or an intermediate result
     rig : name of the light preset, empty for custom lights
     atlas_view : part of the atlas that the view "atlas" shows
     seconds : time in the motion at which the pose was taken [s]
@@ -142,7 +142,7 @@ class ViewerState:
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:
-        """Return a copy that shows another of `views.VIEWS`."""
+        """Return a copy that shows another of `views.VIEW_NAMES`."""
         return replace(self, view=name)
 
     def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:

@@ -22,7 +22,7 @@ from dermis.scene.camera import Camera
 
 Canvas = Any
 """Canvas of any backend of rendercanvas, which has no type annotations."""
-Box = tuple[int, int, int, int]
+PixelBox = tuple[int, int, int, int]
 """Left, top, width and height [pixel]."""
 
 
@@ -34,8 +34,8 @@ class Patch(NamedTuple):
     """
 
     image: Texture
-    viewport: Box
-    scissor: Box
+    viewport: PixelBox
+    scissor: PixelBox
 
 
 class BlitProgram(Program):
@@ -82,8 +82,8 @@ _STILL_AFTER_S = 0.25  # time since the last change after which the picture is r
 _MAX_STEP_S = 0.2  # of the camera easing per frame
 _MAX_FAILURES = 1  # consecutive failures of the device
 _PANEL_FRAMES = 3  # frames that the panel needs to settle after an event
-_POINTER = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
-_KEYS = "key_down", "key_up", "char"
+_POINTER_EVENTS = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
+_KEY_EVENTS = "key_down", "key_up", "char"
 
 
 class Viewer:
@@ -127,8 +127,8 @@ class Viewer:
         self._failures = self._panel_frames = 0
         self.failure: DermisError | None = None
         self._on_panel, self._pressed_left = False, 0.0
-        self._open()
-        canvas.add_event_handler(self._on_event, *_POINTER, *_KEYS)
+        self._configure_canvas()
+        canvas.add_event_handler(self._on_event, *_POINTER_EVENTS, *_KEY_EVENTS)
         canvas.request_draw(self.draw)
 
     def draw(self) -> None:
@@ -138,7 +138,7 @@ class Viewer:
                 self._draw(self._clock())
             self._failures = 0
         except DermisError as error:
-            self._recover(error)
+            self._reopen_device(error)
         except Exception as error:
             self.session.report_error("This frame cannot be drawn", error)
             return  # the next event draws another frame
@@ -166,7 +166,7 @@ class Viewer:
         if state is not self._last_state or camera != old_camera or size != self._last_size:
             self._last_change, self._last_state, self._last_size = now, state, size
         self._last_draw, session.view_size = now, size
-        images = self._images(state, camera, size, self._is_moving(now))
+        images = self._render_images(state, camera, size, self._is_moving(now))
         session.status = self._status(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._patches(*images, size), target)
@@ -198,7 +198,9 @@ class Viewer:
         )
         return [patch for patch in patches if patch.scissor[2]]
 
-    def _images(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Images:
+    def _render_images(
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+    ) -> Images:
         """Return the live and the frozen image; the last image for a state that cannot be rendered."""
         import wgpu
 
@@ -215,18 +217,18 @@ class Viewer:
             except DermisError as error:
                 if session.view_renderer.last_image is None or isinstance(error, DeviceLostError):
                     raise
-                self._reject(state, str(error))
+                self._reject_state(state, str(error))
             except wgpu.GPUError:
                 raise  # converted to an error of the device by `draw`
             except Exception as error:
                 if session.view_renderer.last_image is None:
                     raise
-                self._reject(state)
+                self._reject_state(state)
                 session.report_error("This cannot be drawn", error)
         assert session.view_renderer.last_image is not None  # otherwise an exception was raised
         return session.view_renderer.last_image, None
 
-    def _reject(self, state: ViewerState, message: str = "") -> None:
+    def _reject_state(self, state: ViewerState, message: str = "") -> None:
         self._rejected_state = state
         self.session.message = message
 
@@ -270,7 +272,7 @@ class Viewer:
         if not self.session.split.handle(shifted, size[0]):
             self.session.controls.handle(shifted, size)
 
-    def _open(self) -> None:
+    def _configure_canvas(self) -> None:
         """Configure the canvas and the panel for the device of the renderer."""
         device = self.session.view_renderer.renderer.device
         format_ = str(self._context.get_preferred_format(device.adapter.handle)).removesuffix("-srgb")
@@ -289,7 +291,7 @@ class Viewer:
         session.heads.request_frame = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
         return session.heads.request_frame
 
-    def _recover(self, error: DermisError) -> None:
+    def _reopen_device(self, error: DermisError) -> None:
         """Reopen the device after it was lost or ran out of memory."""
         import wgpu
 
@@ -301,7 +303,7 @@ class Viewer:
                 raise error.lost_twice() if isinstance(error, DeviceLostError) else error
             self.session.view_renderer = ViewRenderer(self._adapter)
             self._preparation.reset()
-            self._open()
+            self._configure_canvas()
         except DermisError as final_error:
             self.failure = final_error
             self.canvas.close()

@@ -33,14 +33,19 @@ from dermis.scene.settings import Settings
 LEVEL_VIEWS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Pyramid level of the irradiance by name of its view."""
 
-LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
+ATLAS_LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
 """Names of the layers of the atlas."""
 
-VIEWS = ("picture", *PARTS, *LAYERS, "shadow", "normals", ATLAS)
+VIEW_NAMES = ("picture", *PARTS, *ATLAS_LAYERS, "shadow", "normals", ATLAS)
 """Names of all views."""
 
-_INTERMEDIATE = Path(__file__).parent / "intermediate.wgsl"
-_QUANTITIES = {"stretch": 1, "thickness": 2, "shadow": 3, "normals": 4}  # as in the shaders; irradiance is 0
+_INTERMEDIATE_SHADER = Path(__file__).parent / "intermediate.wgsl"
+_QUANTITY_NUMBERS = {
+    "stretch": 1,
+    "thickness": 2,
+    "shadow": 3,
+    "normals": 4,
+}  # as in the shaders; irradiance is 0
 _ATLAS_ADVICE = "Choose a narrower blur, or the technique texture-space"
 
 
@@ -66,11 +71,11 @@ class IntermediateViews:
         inputs = self._renderer.prepare(scene, settings, side)
         unused = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # not declared by the shader
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in unused)
-        shader = program(self._renderer.device, _INTERMEDIATE, constants)
+        shader = program(self._renderer.device, _INTERMEDIATE_SHADER, constants)
         layer, scale = self._atlas_layer(inputs, view, settings)
         view_fields = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
-        record["quantity"], record["scale"] = _QUANTITIES.get(view, 0), scale
+        record["quantity"], record["scale"] = _QUANTITY_NUMBERS.get(view, 0), scale
         bindings = {
             **inputs.bindings,
             "view_parameters": record,
@@ -89,7 +94,7 @@ class IntermediateViews:
         inputs = self._renderer.prepare(scene, settings, side)
         layer, scale = self._atlas_layer(inputs, atlas_view.layer, settings)
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
-        quantity = _QUANTITIES.get(atlas_view.layer, 0)
+        quantity = _QUANTITY_NUMBERS.get(atlas_view.layer, 0)
         record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 

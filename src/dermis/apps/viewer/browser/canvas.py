@@ -29,9 +29,9 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
-        self._encoding = 0  # lossy frames being encoded
-        self._drawn = self._sent = 0  # numbers of the last drawn and of the last sent frame
-        self._lossless = 0  # number of the current lossless frame, 0 after a newer frame
+        self._encoding_count = 0  # lossy frames being encoded
+        self._drawn_number = self._sent_number = 0  # numbers of the last drawn and of the last sent frame
+        self._lossless_number = 0  # number of the current lossless frame, 0 after a newer frame
         self._ticket_holder = 0
         self.ticket = ""  # upload ticket of the page that has control
         self.on_file: Callable[[Path, str], None] | None = None  # handler of uploads, set by the viewer
@@ -67,7 +67,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         if self._active_client != self._ticket_holder:
             self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
             asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
-        if self._startup_message and not self._sent:
+        if self._startup_message and not self._sent_number:
             asgi.send_all(self._startup_message)
 
     def offer_download(self, name: str, data: bytes) -> None:
@@ -89,7 +89,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
     def _maybe_draw(self) -> None:
         """Draw a frame, unless too many frames are being encoded or not yet confirmed by the page."""
         info = self._frame_info_per_client.get(self._active_client)
-        if info and info["sent"] - info["confirmed"] + self._encoding >= self._max_buffered_frames:
+        if info and info["sent"] - info["confirmed"] + self._encoding_count >= self._max_buffered_frames:
             self._pending_maybe_draw = False  # retried after the next frame is encoded or confirmed
             self._send_last_frame_to_ready_clients()
         else:
@@ -98,36 +98,36 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
     def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
         """Encode a frame in a thread: as JPEG, or as PNG when the picture has stopped changing."""
         self._cancel_lossless_draw()
-        self._drawn += 1
+        self._drawn_number += 1
         if is_lossless_redraw:
-            self._lossless = self._drawn
+            self._lossless_number = self._drawn_number
         else:
-            self._encoding += 1
+            self._encoding_count += 1
             self._schedule_lossless_draw(array, _LOSSLESS_DELAY_S)
         task = partial(encode_image, array, lossless=is_lossless_redraw)
         future = asyncio.get_running_loop().run_in_executor(self._encoders, task)
-        future.add_done_callback(partial(self._send, self._drawn, is_lossless_redraw))
+        future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
         """Cancel the lossless frame that follows a still picture, even if it is already being encoded."""
-        self._lossless = 0
+        self._lossless_number = 0
         super()._cancel_lossless_draw()
 
-    def _send(self, number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
+    def _send_frame(self, number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
         """Send an encoded frame to all pages, unless a newer frame has been sent.
 
         number : number of the frame, in the order of drawing
         lossless : whether the frame is encoded as PNG
         future : result of `encode_image`
         """
-        self._encoding -= not lossless
+        self._encoding_count -= not lossless
         if self._is_closed:
             return
         self._schedule_maybe_draw()
         data = future.result()
-        if number < self._sent or (lossless and number != self._lossless):
+        if number < self._sent_number or (lossless and number != self._lossless_number):
             return
-        self._sent = number
+        self._sent_number = number
         message = {
             "type": "framebufferdata",
             "nbuffers": 1,

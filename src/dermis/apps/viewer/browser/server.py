@@ -77,7 +77,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
 
 LoadState = Callable[[], tuple[ViewerState, MotionFile | None]]
 
-STAGES = (
+PREPARATION_STAGES = (
     "reading the head",
     "opening the graphics device",
     "preparing the atlas and the maps",
@@ -101,13 +101,13 @@ async def prepare_viewer(
 
     Raises every exception of `load`, and DermisError if no device can be opened.
     """
-    loop, stages = asyncio.get_running_loop(), iter(enumerate(STAGES, 1))
+    loop, stages = asyncio.get_running_loop(), iter(enumerate(PREPARATION_STAGES, 1))
 
     def begin_stage() -> None:
         if http_server.should_exit:
             raise InterruptedError  # the server has stopped
         number, stage = next(stages)
-        loop.call_soon_threadsafe(canvas.send_stage, stage, number, len(STAGES))
+        loop.call_soon_threadsafe(canvas.send_stage, stage, number, len(PREPARATION_STAGES))
 
     def prepare() -> tuple[ViewerState, ViewRenderer, MotionFile | None]:
         begin_stage()
@@ -120,7 +120,7 @@ async def prepare_viewer(
 
     try:
         state, view_renderer, motion = await asyncio.wrap_future(run_in_thread(prepare))
-        canvas.send_stage(STAGES[-1], len(STAGES), len(STAGES))
+        canvas.send_stage(PREPARATION_STAGES[-1], len(PREPARATION_STAGES), len(PREPARATION_STAGES))
         return Viewer(state, canvas, adapter, motion=motion, view_renderer=view_renderer)
     except Exception as error:
         canvas.send_failure(str(error))
@@ -134,7 +134,7 @@ _TOKEN_BYTES = 18
 _MAX_MESSAGE_BYTES = 1 << 16
 _SHUTDOWN_S = 1
 _PAGE_FILES = {"page.css": "css", "page.js": "javascript", "files.js": "javascript", "stage.js": "javascript"}
-HEADERS = {
+RESPONSE_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
@@ -202,7 +202,7 @@ def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uv
     config = uvicorn.Config(
         RequestFilter(Uploads(asgi, canvas, upload_folder), address.token, f"dermis-{address.port}"),
         http=LimitedConnection,
-        headers=list(HEADERS.items()),
+        headers=list(RESPONSE_HEADERS.items()),
         log_level="warning",
         ws_max_size=_MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # images are already compressed

@@ -27,7 +27,7 @@ IDLE_TIMEOUT_S = 20.0
 """Maximum time between two pieces of a file [s]."""
 
 TICKET_HEADER = b"x-dermis-ticket"
-_FOLDER = "upload"
+_UPLOAD_PATH = "upload"
 _MAX_CHARACTERS = 80
 
 
@@ -47,7 +47,7 @@ class Uploads:
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Handle a request (ASGI entry point)."""
         parts = str(scope.get("path", "")).split("/")
-        if scope["type"] != "http" or scope["method"] != "POST" or _FOLDER not in parts[-2:-1]:
+        if scope["type"] != "http" or scope["method"] != "POST" or _UPLOAD_PATH not in parts[-2:-1]:
             await self._app(scope, receive, send)
             return
         headers, name = dict(scope["headers"]), _printable(parts[-1])

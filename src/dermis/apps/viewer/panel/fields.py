@@ -24,8 +24,8 @@ from dermis.scene.frozen_model import (
 
 FieldsToState = Callable[..., ViewerState]
 ToState = Callable[[Any], ViewerState]
-_LOG = int(imgui.SliderFlags_.logarithmic)
-_HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
+_LOG_SLIDER = int(imgui.SliderFlags_.logarithmic)
+_HDR_COLOUR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
 _TALL_LIST = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
@@ -60,7 +60,7 @@ class FieldStyle:
 
 
 _DEFAULT_STYLE = FieldStyle()
-_COLOUR: Any = Colour
+_COLOUR_TYPE: Any = Colour
 
 
 def draw_fields(
@@ -112,11 +112,13 @@ def _draw_field(
         number = style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
         slider(session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number)
-    elif kind.model_fields[name].annotation == _COLOUR:
-        result = imgui.color_edit3(label, list(value), _HDR)
+    elif kind.model_fields[name].annotation == _COLOUR_TYPE:
+        result = imgui.color_edit3(label, list(value), _HDR_COLOUR)
         edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
     elif isinstance(value, tuple) and value_range.logarithmic:
-        result = imgui.slider_float3(label, list(value), value_range.low, value_range.high, "%.3g", _LOG)
+        result = imgui.slider_float3(
+            label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER
+        )
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
     elif len(keywords := field_choices(kind, name)) > 1:
         combo(session, label, str(value), keywords, with_value, style.names)
@@ -139,11 +141,11 @@ def _draw_keywords(
     """
     custom_value = style.custom_value
 
-    def choose(keyword: str) -> ViewerState:
+    def choose_name(keyword: str) -> ViewerState:
         return with_value(custom_value(session) if custom_value and keyword == _CUSTOM else keyword)
 
     chosen = value if isinstance(value, str) else _CUSTOM
-    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, choose)
+    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, choose_name)
 
 
 def _field_label(name: str) -> str:
@@ -195,7 +197,7 @@ def slider(
     with_value : function that returns a state, given the new number
     number_format : printf format of the number
     """
-    flags = _LOG if value_range.logarithmic else 0
+    flags = _LOG_SLIDER if value_range.logarithmic else 0
     result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
     edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
 
@@ -233,12 +235,12 @@ def combo(
     with_value : function that returns a state, given the chosen name
     display_names : text to show for each name, where it differs
     """
-    chosen = choose(session, label, current, names, display_names)
+    chosen = choose_name(session, label, current, names, display_names)
     if chosen is not None:
         run_action(session, lambda: session.change(with_value(chosen)))
 
 
-def choose(
+def choose_name(
     session: Session, label: str, current: str, names: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
     """Draw a drop-down list and return the name that was clicked, None without a click.
@@ -309,7 +311,7 @@ def run_action(session: Session, action: Callable[[], None]) -> None:
         session.report_error("This cannot be done", error)
 
 
-SURFACE = {
+SURFACE_STYLES = {
     "mix": FieldStyle("colour before blur###mix"),
     "roughness": FieldStyle("roughness m###roughness"),
     "rho_s": FieldStyle("specular strength ρ_s###rho_s"),
@@ -334,10 +336,12 @@ SURFACE = {
 }
 """Labels of the surface fields of `Skin`."""
 
-ALBEDO = {"albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})}
+ALBEDO_STYLES = {
+    "albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})
+}
 """Labels of the profile fields of `Skin`."""
 
-TECHNIQUE = {
+TECHNIQUE_STYLES = {
     "technique": FieldStyle(
         names={"none": "none (dry skin)", "one-blur": "one Gaussian", "gpu-gems-3": "GPU Gems 3"}
     ),
@@ -355,14 +359,14 @@ TECHNIQUE = {
 }
 """Labels of `Settings`."""
 
-LAYER = {
+LAYER_STYLES = {
     "thickness_mm": FieldStyle("thickness###thickness"),
     "absorption_per_mm": FieldStyle("absorption σ_a###absorption"),
     "scattering_per_mm": FieldStyle("scattering σ_s'###scattering"),
 }
 """Labels of `TissueLayer`."""
 
-LIGHT = {
+LIGHT_STYLES = {
     "irradiance": FieldStyle("colour###irradiance"),
     "softness_mm": FieldStyle("shadow softness###softness"),
     "shadows": FieldStyle("casts shadows###shadows"),
@@ -370,7 +374,7 @@ LIGHT = {
 }
 """Labels of the lights."""
 
-LIGHT_KINDS = {
+LIGHT_KIND_NAMES = {
     "point": "point light",
     "spot": "spotlight",
     "rectangle": "softbox (rectangle)",
@@ -380,7 +384,7 @@ LIGHT_KINDS = {
 }
 """Display names of the kinds of lights."""
 
-PROFILES = {
+PROFILE_NAMES = {
     "gpu-gems-3": "GPU Gems 3",
     "skin1": "skin 1 (measured)",
     "skin2": "skin 2 (measured)",

@@ -134,12 +134,12 @@ def recover_imgui(report_error: ReportError) -> Iterator[None]:
         report_error(error)
 
 
-POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
+POINTER_EVENTS = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
 _WHEEL_SPEED = 0.01
 
 
 def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
-    """Pass a pointer event, one of the types in `POINTER`, to Dear ImGui.
+    """Pass a pointer event, one of the types in `POINTER_EVENTS`, to Dear ImGui.
 
     frame : function that lays out the panel with the events so far
     """

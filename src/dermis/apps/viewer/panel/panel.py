@@ -10,7 +10,13 @@ from imgui_bundle import imgui
 
 from dermis.apps.viewer.controls import Event, SplitView
 from dermis.apps.viewer.panel.fields import button, record_position, run_action
-from dermis.apps.viewer.panel.imgui_frames import POINTER, ImguiFrames, feed_key, feed_pointer, recover_imgui
+from dermis.apps.viewer.panel.imgui_frames import (
+    POINTER_EVENTS,
+    ImguiFrames,
+    feed_key,
+    feed_pointer,
+    recover_imgui,
+)
 from dermis.apps.viewer.panel.sections import SECTIONS
 from dermis.apps.viewer.session import Session
 from dermis.gpu import Device, TextureView
@@ -107,7 +113,10 @@ def draw_help(left: float, size: tuple[float, float]) -> None:
     imgui.end()
 
 
-_WIDTH, _CONTROL_FRACTION = 330.0, 0.5  # logical width of the panel, and fraction of it for the controls
+_PANEL_WIDTH, _CONTROL_FRACTION = (
+    330.0,
+    0.5,
+)  # logical width of the panel, and fraction of it for the controls
 _MAX_WIDTH_FRACTION = 0.5  # of the window
 _MIN_TEXT_SCALE = 0.8  # in a narrow panel
 _NARROW_WINDOW, _PHONE_WINDOW = 400.0, 480.0  # width below which windows, and upright phones, have a drawer
@@ -155,7 +164,7 @@ class Panel:
         fraction, is_shown = _MAX_WIDTH_FRACTION, self.is_visible
         if is_drawer(size):
             fraction, is_shown = _DRAWER_FRACTION, self.is_drawer_open
-        return round(min(_WIDTH, fraction * size[0])) if is_shown else 0.0
+        return round(min(_PANEL_WIDTH, fraction * size[0])) if is_shown else 0.0
 
     def toggle(self) -> None:
         """Show or hide the panel."""
@@ -172,12 +181,14 @@ class Panel:
         self._frames.enter()
         self._size = size
         io, kind = imgui.get_io(), event["event_type"]
-        if kind == "key_down" and not io.want_text_input and self._shortcut(event):
+        if kind == "key_down" and not io.want_text_input and self._run_shortcut(event):
             return True
         if kind == "pointer_down" and event["x"] >= self._covered_width(size):
             self.shows_help = False
-        if kind in POINTER:
-            is_on_panel = self._covers(event["x"], event["y"], size)  # evaluated before a press closes a list
+        if kind in POINTER_EVENTS:
+            is_on_panel = self._is_over_panel(
+                event["x"], event["y"], size
+            )  # evaluated before a press closes a list
             feed_pointer(event, lambda: self._frame(size))
             return is_on_panel
         if kind == "pointer_leave":
@@ -200,7 +211,7 @@ class Panel:
         self._size = size
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
-    def _shortcut(self, event: Event) -> bool:
+    def _run_shortcut(self, event: Event) -> bool:
         """Run the shortcut of a key, if it has one; return whether it has."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
@@ -210,7 +221,7 @@ class Panel:
         elif key == "Tab":
             self.toggle()
         elif key == "Escape":
-            return self._escape()
+            return self._close_topmost()
         elif key in HELP_KEYS:
             self.shows_help = not self.shows_help
         elif key == PLAY_KEY and session.player.clip is not None:
@@ -219,7 +230,7 @@ class Panel:
             return False
         return True
 
-    def _escape(self) -> bool:
+    def _close_topmost(self) -> bool:
         """Close the topmost popup, help or search; return whether there was one."""
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
@@ -232,7 +243,7 @@ class Panel:
             return False
         return True
 
-    def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
+    def _is_over_panel(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Return whether a pointer is over the panel, because Dear ImGui knows this only a frame later.
 
         x, y : position of the pointer in the window
@@ -275,7 +286,7 @@ class Panel:
 
     def _draw_panel(self, size: tuple[float, float]) -> None:
         session, width = self._session, self._covered_width(size)
-        imgui.get_style().font_scale_main = max(_MIN_TEXT_SCALE, min(1.0, width / _WIDTH))
+        imgui.get_style().font_scale_main = max(_MIN_TEXT_SCALE, min(1.0, width / _PANEL_WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse

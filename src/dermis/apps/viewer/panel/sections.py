@@ -15,16 +15,16 @@ from imgui_bundle import imgui, implot
 from numpy.typing import NDArray
 
 from dermis.apps.viewer import posing
-from dermis.apps.viewer.controls import CAMERAS
+from dermis.apps.viewer.controls import CAMERA_PRESETS
 from dermis.apps.viewer.panel.fields import (
-    LIGHT,
-    LIGHT_KINDS,
-    SURFACE,
-    TECHNIQUE,
+    LIGHT_KIND_NAMES,
+    LIGHT_STYLES,
+    SURFACE_STYLES,
+    TECHNIQUE_STYLES,
     FieldStyle,
     begin_plot,
     button,
-    choose,
+    choose_name,
     clamp,
     combo,
     draw_fields,
@@ -38,7 +38,7 @@ from dermis.apps.viewer.panel.fields import (
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
 from dermis.apps.viewer.session import Session, built_in_heads
 from dermis.apps.viewer.state import ATLAS, ViewerState, validated_copy
-from dermis.apps.viewer.views import LAYERS, VIEWS
+from dermis.apps.viewer.views import ATLAS_LAYERS, VIEW_NAMES
 from dermis.formats.samples import SAMPLES
 from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import SliderRange, field_choices, fields_under
@@ -62,7 +62,7 @@ _ON_ENTER = int(imgui.InputTextFlags_.enter_returns_true)
 _BUTTONS_PER_ROW = 3
 _MAP_SIZES = (256, 512, 1024, 2048, 4096)
 _SETTINGS = {
-    **TECHNIQUE,
+    **TECHNIQUE_STYLES,
     "atlas": FieldStyle(options=_MAP_SIZES),
     "shadow_size": FieldStyle("shadow map", options=_MAP_SIZES),
     "samples": FieldStyle(options=(1, 2, 4, 8, 16)),
@@ -77,7 +77,7 @@ def draw_lights(session: Session) -> None:
     """Draw the controls of the light preset, the selected light and the environment."""
     combo(session, "rig", session.state.rig or _CUSTOM, light_presets(), session.state.with_rig)
     _draw_light_selector(session)
-    combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KINDS)
+    combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KIND_NAMES)
     lights, index = session.state.scene.lights, session.controls.light
     if index < len(lights):
         _draw_light(session, index, lights[index])
@@ -117,9 +117,9 @@ def _draw_light(session: Session, index: int, light: Light) -> None:
         factor = 2.0**stops * math.pi / strength
         return make_state(irradiance=tuple(factor * c for c in light.irradiance))
 
-    imgui.text_disabled(f"{LIGHT_KINDS.get(light.kind, light.kind)}, Shift and drag to move")
+    imgui.text_disabled(f"{LIGHT_KIND_NAMES.get(light.kind, light.kind)}, Shift and drag to move")
     slider(session, "strength", math.log2(strength / math.pi), with_stops, _STOP_RANGE, "%.2f stops")
-    draw_fields(session, light, make_state, LIGHT | _cone_styles(light))
+    draw_fields(session, light, make_state, LIGHT_STYLES | _cone_styles(light))
     if button(session, "copy"):  # raises DermisError if there are too many lights
         lights = session.state.scene.lights
         run_action(session, lambda: session.change(session.state.with_lights([*lights, light])))
@@ -289,7 +289,7 @@ def _draw_head_list(session: Session) -> None:
     current = str(session.state.head.get("name", session.state.scene.head.name))
     names = dict.fromkeys((*built_in_heads(), *session.heads.recent, current))
     display_names = {name: session.heads.display_name(name) for name in names}
-    chosen = choose(session, "head", current, names, display_names)
+    chosen = choose_name(session, "head", current, names, display_names)
     if chosen is not None:
         session.heads.open(chosen)
 
@@ -315,15 +315,15 @@ class Section(NamedTuple):
 def draw_view(session: Session) -> None:
     """Draw the list of views, such as the picture or the blurred irradiance, and the camera presets."""
     state = session.state
-    combo(session, "show", state.view, VIEWS, state.with_view)
+    combo(session, "show", state.view, VIEW_NAMES, state.with_view)
     if state.view == ATLAS:
 
         def with_layer(name: str) -> ViewerState:
             return state.with_atlas_view(replace(state.atlas_view, layer=name))
 
-        combo(session, "layer", state.atlas_view.layer, LAYERS, with_layer)
+        combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
         imgui.text_disabled("wheel: zoom; double click: show all")
-    for index, name in enumerate(CAMERAS):
+    for index, name in enumerate(CAMERA_PRESETS):
         if index % _BUTTONS_PER_ROW:
             imgui.same_line()
         if button(session, f"{name}##camera"):
@@ -370,7 +370,7 @@ def draw_picture(session: Session) -> None:
 def draw_talk(session: Session) -> None:
     """Draw the skin fields and settings by which faults of the 2007 talk are reproduced for comparison."""
     state, skin, settings = session.state, session.state.scene.skin, session.state.settings
-    draw_fields(session, skin, state.with_skin, SURFACE, fields_under(COMPARISONS, type(skin)))
+    draw_fields(session, skin, state.with_skin, SURFACE_STYLES, fields_under(COMPARISONS, type(skin)))
     names = fields_under(COMPARISONS, type(settings))
     if settings.seams != "clear-colour":
         names.remove("seam_colour")

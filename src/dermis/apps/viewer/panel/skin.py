@@ -8,10 +8,10 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from dermis.apps.viewer.panel.fields import (
-    ALBEDO,
-    LAYER,
-    PROFILES,
-    SURFACE,
+    ALBEDO_STYLES,
+    LAYER_STYLES,
+    PROFILE_NAMES,
+    SURFACE_STYLES,
     FieldStyle,
     begin_plot,
     button,
@@ -34,20 +34,20 @@ from dermis.scene.tissue import tissue_layers
 Layers = tuple[TissueLayer, ...]
 _PROFILE_FIELDS = ("profile", "profile_map", "other_profiles", "albedo", "pigments", "layers")
 _EPIDERMAL_BLOOD_STRUCTURE = "donner2008"  # the only structure with blood in the epidermis
-_DERMIS = ("blood", "oxygen")
-_PERCENT = {
+_DERMIS_PIGMENTS = ("blood", "oxygen")
+_PERCENT_STYLES = {
     name: FieldStyle(unit=0.01, number_format="%.2f %%") for name in Pigments.model_fields if "_" not in name
 }
-_PIGMENTS = _PERCENT | {
+_PIGMENT_STYLES = _PERCENT_STYLES | {
     "structure": FieldStyle("layers"),
     "eumelanin": FieldStyle("eumelanin fraction###eumelanin", unit=0.01, number_format="%.2f %%"),
     "oxygen": FieldStyle("oxygen saturation###oxygen", unit=0.01, number_format="%.2f %%"),
     "epidermis_mm": FieldStyle("thickness"),
     "epidermal_blood": FieldStyle("blood##epidermis", unit=0.01, number_format="%.2f %%"),
 }
-_SKINS = (PUBLISHED_PRESET, "skin1", "skin2", "dj3", *SKINS)
+_SKIN_PROFILES = (PUBLISHED_PRESET, "skin1", "skin2", "dj3", *SKINS)
 _NEW_LAYER_MM = 0.2
-_CHANNELS = ((0.9, 0.35, 0.3), (0.35, 0.8, 0.4), (0.4, 0.55, 1.0))
+_CHANNEL_COLOURS = ((0.9, 0.35, 0.3), (0.35, 0.8, 0.4), (0.4, 0.55, 1.0))
 _RADII_MM = np.geomspace(0.01, 30.0, 160)
 
 
@@ -58,9 +58,9 @@ def draw_profile(session: Session) -> None:
     def with_profile(name: str) -> ViewerState:
         return with_skin(profile=name, pigments=None, layers=())
 
-    other_media = (name for name in preset_names() if name not in _SKINS)
-    combo(session, "profile", skin.profile, (*_SKINS, "", *other_media), with_profile, PROFILES)
-    draw_fields(session, skin, with_skin, ALBEDO, ["albedo"])
+    other_media = (name for name in preset_names() if name not in _SKIN_PROFILES)
+    combo(session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES)
+    draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
     if skin.profile in SKINS:
         _draw_pigments(session, skin)
     elif layers := skin.layers or _profile_layers(skin.profile):
@@ -83,7 +83,7 @@ def draw_surface(session: Session) -> None:
         if name == "rho_s" and has_region_table(state.head):
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
-            draw_fields(session, state.scene.skin, state.with_skin, SURFACE, [name])
+            draw_fields(session, state.scene.skin, state.with_skin, SURFACE_STYLES, [name])
 
 
 def _draw_pigments(session: Session, skin: Skin) -> None:
@@ -93,13 +93,19 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
     defaults = {name: getattr(preset, name) for name in numbers} | {"structure": DEFAULT_STRUCTURE}
     values = Pigments(**defaults | pigments.model_dump(exclude_none=True))
     make_state = session.state.with_pigments
-    draw_fields(session, values, make_state, _PIGMENTS, ["structure"])
+    draw_fields(session, values, make_state, _PIGMENT_STYLES, ["structure"])
     if values.structure != _EPIDERMAL_BLOOD_STRUCTURE:
         numbers.remove("epidermal_blood")
     imgui.separator_text("epidermis")
-    draw_fields(session, values, make_state, _PIGMENTS, [name for name in numbers if name not in _DERMIS])
+    draw_fields(
+        session,
+        values,
+        make_state,
+        _PIGMENT_STYLES,
+        [name for name in numbers if name not in _DERMIS_PIGMENTS],
+    )
     imgui.separator_text("dermis")
-    draw_fields(session, values, make_state, _PIGMENTS, _DERMIS)
+    draw_fields(session, values, make_state, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
 
 
 def _plot_profile(session: Session) -> None:
@@ -116,7 +122,7 @@ def _plot_profile(session: Session) -> None:
     if not begin_plot("profile", ("r [mm]", "r R(r) [1/mm]"), (r[0], r[-1]), max(highest, 1e-9)):
         return
     implot.setup_axis_scale(int(implot.ImAxis_.x1), int(implot.Scale_.log10))
-    for k, (name, colour) in enumerate(zip(("red", "green", "blue"), _CHANNELS, strict=True)):
+    for k, (name, colour) in enumerate(zip(("red", "green", "blue"), _CHANNEL_COLOURS, strict=True)):
         spec = implot.Spec()
         spec.line_color, spec.line_weight = imgui.ImVec4(*colour, 1.0), 1.5
         implot.plot_line(name, r, np.ascontiguousarray(r * values[:, k]), spec)
@@ -151,7 +157,7 @@ def _draw_layer(session: Session, layers: Layers, index: int) -> None:
     def make_state(**fields: object) -> ViewerState:
         return _replace_layer(session, layers, index, validated_copy(layer, **fields))
 
-    draw_fields(session, layer, make_state, LAYER, suffix=label_suffix)
+    draw_fields(session, layer, make_state, LAYER_STYLES, suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MAX_LAYERS and button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_MM)
