@@ -141,11 +141,11 @@ def _draw_keywords(
     """
     custom_value = style.custom_value
 
-    def choose_name(keyword: str) -> ViewerState:
+    def with_keyword(keyword: str) -> ViewerState:
         return with_value(custom_value(session) if custom_value and keyword == _CUSTOM else keyword)
 
     chosen = value if isinstance(value, str) else _CUSTOM
-    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, choose_name)
+    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, with_keyword)
 
 
 def _field_label(name: str) -> str:
