@@ -11,6 +11,8 @@ from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, Form
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
+pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
+
 OPPOSITE, BESIDE = 0.199825, 0.200044  # form factors of a cube's faces, in closed form
 CLOSE = 0.01
 

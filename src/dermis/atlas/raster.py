@@ -132,9 +132,9 @@ def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
     owner, hidden = _assign_texels(mesh, mapped, texel, triangle, size)
     mapped &= ~hidden
     for _ in range(GUTTER_TEXELS):
-        owner = _dilate(owner)
-    mapped &= _interpolable(mesh, size, owner)
-    barycentric = _barycentric(mesh, size, owner)
+        owner = _dilate_owners(owner)
+    mapped &= _interpolable_triangles(mesh, size, owner)
+    barycentric = _texel_weights(mesh, size, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
     stretch, shear = _texel_metric(mesh, size, owner, barycentric)
     corner_uv = mesh.uv[mesh.triangles]
@@ -189,7 +189,7 @@ def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size
     return owner, own < 0.5 * area
 
 
-def _dilate(owner: Ints) -> Ints:
+def _dilate_owners(owner: Ints) -> Ints:
     """Assign to each empty texel the triangle of one of its eight neighbours, direct neighbours first."""
     dilated = owner.copy()
     padded = np.pad(owner, 1, constant_values=-1)
@@ -200,7 +200,7 @@ def _dilate(owner: Ints) -> Ints:
     return dilated
 
 
-def _interpolable(mesh: Mesh, size: int, owner: Ints) -> Mask:
+def _interpolable_triangles(mesh: Mesh, size: int, owner: Ints) -> Mask:
     """Return the mask (f,) of triangles around whose corners all four texels are owned.
 
     Only such corners can be interpolated bilinearly; slivers may have no texels.
@@ -213,7 +213,7 @@ def _interpolable(mesh: Mesh, size: int, owner: Ints) -> Mask:
     return found
 
 
-def _barycentric(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
+def _texel_weights(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
     """Return the barycentric weights at each texel centre, (n, n, 2) [1/65535].
 
     A gutter texel has those of the nearest point of its triangle.

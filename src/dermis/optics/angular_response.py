@@ -21,10 +21,10 @@ CACHE_SIZE = 256
 
 
 def interpolate_table(column: Callable[[float], Floats], position: float) -> Floats:
-    """Interpolate linearly between the two table columns next to a position in [0, 1].
+    """Interpolate linearly between the two table columns nearest to a position in [0, 1].
 
-    column : function from a multiple of 1 / TABLE_STEPS in [0, 1] to a column of the table, an array; it is
-        called twice and should cache its results
+    column : function that computes the table's column, an array, at a multiple of 1 / TABLE_STEPS; it should
+        cache its results
     """
     scaled = min(max(position, 0.0), 1.0) * TABLE_STEPS
     low = min(int(scaled), TABLE_STEPS - 1)

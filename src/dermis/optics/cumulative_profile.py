@@ -80,7 +80,7 @@ class CumulativeProfile:
         return np.array([np.interp(fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile with unchanged fractions and a new total reflectance, (3,) [-]."""
+        """Return a profile with unchanged fractions and another total reflectance, (3,) [-]."""
         return CumulativeProfile(self.radii_mm, self.fraction, np.asarray(energy, np.float64))
 
 

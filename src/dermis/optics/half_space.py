@@ -48,7 +48,7 @@ class _PhotonTable(NamedTuple):
 
 
 def kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the tabulated kind of half-space, lit perpendicularly, for an index of refraction.
+    """Return the kind of perpendicularly lit half-space that is tabulated for an index of refraction.
 
     The result is None if no table exists for the index.
     """
@@ -92,7 +92,10 @@ def fractions_within(
 
 
 def tabulated_albedo(kind: HalfSpaceKind, total: ArrayLike) -> Floats:
-    """Return the single-scattering albedos of half-spaces with given total reflectances [-]."""
+    """Return the single-scattering albedos of half-spaces with given total reflectances, from a table [-].
+
+    kind : surface and illumination of the half-spaces
+    """
     table = _photon_table(kind)
     fine = np.linspace(table.scale[0], table.scale[-1], 2000)
     root = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])

@@ -50,27 +50,27 @@ class Layer:
 
     @property
     def sigma_t_prime(self) -> Floats:
-        """Return the reduced extinction coefficient, (c,) [1/mm]."""
+        """Return the reduced extinction coefficient, absorption plus reduced scattering, (c,) [1/mm]."""
         return self.sigma_a + self.sigma_s_prime
 
     @property
     def alpha_prime(self) -> Floats:
-        """Return the reduced albedo, (c,) [-]."""
+        """Return the reduced albedo, reduced scattering over reduced extinction, (c,) [-]."""
         return self.sigma_s_prime / self.sigma_t_prime
 
     @property
     def mean_free_path_mm(self) -> Floats:
-        """Return the reduced mean free path, (c,) [mm]."""
+        """Return the reduced mean free path, the inverse of the reduced extinction, (c,) [mm]."""
         return 1.0 / self.sigma_t_prime
 
     @property
     def D(self) -> Floats:
-        """Return the diffusion coefficient, (c,) [mm]."""
+        """Return the diffusion coefficient 1 / (3 sigma_t'), (c,) [mm]."""
         return 1.0 / (3.0 * self.sigma_t_prime)
 
     @property
     def sigma_tr(self) -> Floats:
-        """Return the effective transport coefficient, (c,) [1/mm]."""
+        """Return the effective transport coefficient sqrt(3 sigma_a sigma_t'), (c,) [1/mm]."""
         return np.sqrt(3.0 * self.sigma_a * self.sigma_t_prime)
 
 
@@ -143,7 +143,7 @@ def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
 
 @cache
 def media() -> Mapping[str, Medium]:
-    """Return the published media by name ("skin1", "dj3" ...), with the index of refraction of skin."""
+    """Return the published media by name, such as "skin1" or "dj3", with the index of refraction of skin."""
     named: dict[str, Medium] = {}
     for table, sources in _TABLE_SOURCES.items():
         for name, layers in _read_media(table).items():
@@ -158,7 +158,7 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     document : optional `name` and `eta`, and `[[layers]]`, topmost first, with `absorption_per_mm` and
         `scattering_per_mm` (lists of 3), and `thickness_mm` in all layers but the last
 
-    Raises DermisError for any other content.
+    Raises DermisError for missing or unknown entries, and for values out of range.
     """
     tables = document.get("layers")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):

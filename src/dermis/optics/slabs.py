@@ -123,7 +123,7 @@ def solve_doubled_slabs(
 ) -> Slabs:
     """Compute slabs of given thicknesses and all their doublings, in the time of the thickest alone.
 
-    albedo, eta, nodes, g : as for `solve_slabs`
+    albedo, eta, nodes, g : arguments of `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
     doublings : number d of doublings; the n (d + 1) slabs are ordered by the number of doublings, then by
         `smallest_depth`

@@ -10,7 +10,7 @@ from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
 
 
-def exponent(m: ArrayLike) -> Floats:
+def blinn_phong_exponent(m: ArrayLike) -> Floats:
     """Return the Blinn-Phong exponent s = 2 / m^2 - 2 of the lobe as wide as Beckmann's of roughness m [-].
 
     Source: [Walter2007] section 5.2.
@@ -21,7 +21,7 @@ def exponent(m: ArrayLike) -> Floats:
 def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the normalised Blinn-Phong BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
 
-    m : roughness, from which `exponent` yields s; broadcast against the angles [-]
+    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
     The factor (s + 2) / 8 pi is a quarter of that of a normalised slope distribution. The lobe has no masking
@@ -29,7 +29,7 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
-    s = exponent(m)
+    s = blinn_phong_exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(angles, s)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
@@ -37,14 +37,18 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the original Blinn-Phong highlight F (n.h)^s as a BRDF, divided by pi n.l [1/sr].
 
-    m : roughness, from which `exponent` yields s; broadcast against the angles [-]
+    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
 
     The original highlight has no factor n.l, so the BRDF is not reciprocal. Early renderers added it to a
     diffuse term without 1/pi; here both terms are divided by pi.
 
     Source: [Blinn1977].
     """
-    lobe = fresnel(angles.v_h) * _power_of_n_h(angles, exponent(m)) / (np.pi * np.maximum(angles.n_l, 1e-6))
+    lobe = (
+        fresnel(angles.v_h)
+        * _power_of_n_h(angles, blinn_phong_exponent(m))
+        / (np.pi * np.maximum(angles.n_l, 1e-6))
+    )
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 

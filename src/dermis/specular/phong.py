@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.specular.blinn_phong import exponent
+from dermis.specular.blinn_phong import blinn_phong_exponent
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
@@ -16,12 +16,12 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
 
     The factor (s + 2) / 2 pi makes the lobe reflect F at normal incidence.
 
-    m : roughness; s is a quarter of `exponent(m)`, as r rotates twice as far as the half vector
+    m : roughness; s is a quarter of `blinn_phong_exponent(m)`, as r rotates twice as far as the half vector
     fresnel : function that returns F from the cosine v.h, which keeps the BRDF reciprocal
 
     Source: [LafortuneWillems1994].
     """
-    s = 0.25 * exponent(m)
+    s = 0.25 * blinn_phong_exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power_of_r_v(angles, s)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
@@ -29,19 +29,20 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
 def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the highlight W(i) (r.v)^s of 1975 as a BRDF, divided by pi n.l [1/sr].
 
-    r is the mirrored light direction, s a quarter of `exponent(m)`, and W(i) the Fresnel reflectance at the
-    angle of incidence i. W(i) and the division by n.l make the BRDF not reciprocal. The original highlight
-    was added to a diffuse term without 1/pi; here both terms are divided by pi.
+    r is the light direction mirrored at the normal, s a quarter of `blinn_phong_exponent(m)`, and W(i) the
+    Fresnel reflectance at the angle of incidence i. W(i) and the division by n.l make the BRDF not
+    reciprocal. The original highlight was added to a diffuse term without 1/pi; here both terms are divided
+    by pi.
 
     Source: [Phong1975].
     """
     n_l = np.maximum(angles.n_l, 1e-6)
-    lobe = fresnel(n_l) * _power_of_r_v(angles, 0.25 * exponent(m)) / (np.pi * n_l)
+    lobe = fresnel(n_l) * _power_of_r_v(angles, 0.25 * blinn_phong_exponent(m)) / (np.pi * n_l)
     return np.asarray(np.where(angles.above, lobe, 0.0))
 
 
 def _power_of_r_v(angles: Cosines, s: Floats) -> Floats:
-    """Return (r.v)^s, with the mirrored light direction r."""
+    """Return (r.v)^s, where r is the light direction mirrored at the normal."""
     r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** s)
 

@@ -61,7 +61,7 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
         (chromophores.oxyhaemoglobin, "eps_HbO2_cm1_M1"),
         (chromophores.deoxyhaemoglobin, "eps_Hb_cm1_M1"),
         (chromophores.eumelanin, "mua_melanosome_mm1"),
-        (chromophores.baseline, "mua_baseline_mm1"),
+        (chromophores.baseline_absorption, "mua_baseline_mm1"),
         (chromophores.jacques_1998, "musp_mm1"),
     ]:
         assert np.allclose(name(wavelength), table[column], rtol=PUBLISHED, atol=0.0), column
@@ -97,7 +97,7 @@ def test_water_as_measured() -> None:
     """Absorption is 0.0060 per cm at 700 nm, and small compared with tissue."""
     assert chromophores.water(700.0) == pytest.approx(6.0e-4, rel=5e-3)
     up_to_700 = VISIBLE_NM[VISIBLE_NM <= 700.0]
-    assert (chromophores.water(up_to_700) < 0.03 * chromophores.baseline(up_to_700)).all()
+    assert (chromophores.water(up_to_700) < 0.03 * chromophores.baseline_absorption(up_to_700)).all()
 
 
 def test_scattering_in_the_reading_per_millimetre() -> None:
@@ -119,7 +119,7 @@ def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
     [
         chromophores.eumelanin,
         chromophores.pheomelanin,
-        chromophores.baseline,
+        chromophores.baseline_absorption,
         chromophores.oxyhaemoglobin,
         chromophores.deoxyhaemoglobin,
         chromophores.water,

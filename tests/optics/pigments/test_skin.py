@@ -16,7 +16,7 @@ from dermis.optics.pigments.parameters import SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
 from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
-    baseline,
+    baseline_absorption,
     blood,
     donner_jensen_2006,
     jacques_1998,
@@ -83,7 +83,7 @@ def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
 def test_blood_in_the_epidermis() -> None:
     bloody = replace(SKIN, epidermal_blood=0.01)
     added = layer("donner2008", "epidermis", bloody).sigma_a - layer("donner2008", "epidermis", SKIN).sigma_a
-    assert np.allclose(added, 0.01 * (blood(WAVELENGTHS_NM, 0.8) - baseline(WAVELENGTHS_NM)))
+    assert np.allclose(added, 0.01 * (blood(WAVELENGTHS_NM, 0.8) - baseline_absorption(WAVELENGTHS_NM)))
     for structure in ("dj2006", "biospec"):
         same = layer(structure, "epidermis", bloody), layer(structure, "epidermis", SKIN)
         assert np.array_equal(same[0].sigma_a, same[1].sigma_a)
@@ -91,7 +91,7 @@ def test_blood_in_the_epidermis() -> None:
 
 def test_biospec_has_bare_corneum_and_less_blood_below() -> None:
     corneum, epidermis, papillary, reticular = spectral_medium("biospec", SKIN).layers
-    tissue = baseline(WAVELENGTHS_NM)
+    tissue = baseline_absorption(WAVELENGTHS_NM)
     assert np.array_equal(corneum.sigma_a, tissue)
     assert [corneum.thickness_mm, epidermis.thickness_mm, papillary.thickness_mm] == [0.01, 0.1, 0.2]
     assert np.allclose((reticular.sigma_a - tissue) / (papillary.sigma_a - tissue), 0.0091 / 0.012)

@@ -16,8 +16,8 @@ from dermis.apps.gallery.script import GalleryPicture
 from dermis.base import citations as cite
 from dermis.base.atomic_write import atomic_file
 
-_FIELD = re.compile(r"(\w+)\s*=\s*\{")
-_ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
+_BIBTEX_FIELD = re.compile(r"(\w+)\s*=\s*\{")
+_TEX_ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
 _COMBINING_ACCENTS = {"'": "\u0301", '"': "\u0308", "`": "\u0300", "^": "\u0302", "~": "\u0303"}
 _TEX_SYMBOLS = {
     r"$\mu$": "µ",
@@ -40,21 +40,21 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
 
     Raises DermisError when the file cannot be written.
     """
-    page = Template(_resource("page.html")).substitute(
-        style=_resource("page.css"),
-        script=_resource("page.js"),
+    page = Template(_read_resource("page.html")).substitute(
+        style=_read_resource("page.css"),
+        script=_read_resource("page.js"),
         head=html.escape(head),
         adapter=html.escape(adapter),
-        contents="".join(_entry(picture) for picture in pictures),
+        contents="".join(_contents_entry(picture) for picture in pictures),
         pictures="\n".join(_section(picture) for picture in pictures),
-        deck=_deck(pictures),
+        deck=_deck_rows(pictures),
         works=_bibliography(pictures),
     )
     with atomic_file(path) as file:
         file.write_text(page, encoding="utf-8")
 
 
-def _entry(picture: GalleryPicture) -> str:
+def _contents_entry(picture: GalleryPicture) -> str:
     return f'<li><a href="#{picture.script.name}">{html.escape(picture.script.title)}</a></li>'
 
 
@@ -64,7 +64,7 @@ def _section(picture: GalleryPicture) -> str:
     return (
         f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
         f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
-        f'<p class="facts">{_facts(picture)}</p></section>'
+        f'<p class="facts">{_picture_facts(picture)}</p></section>'
     )
 
 
@@ -107,7 +107,7 @@ def _data_url(file: bytes) -> str:
     return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
 
 
-def _facts(picture: GalleryPicture) -> str:
+def _picture_facts(picture: GalleryPicture) -> str:
     script = picture.script
     width, height = picture.size
     facts = [f"<code>dermis gallery --only {script.name}</code>"]
@@ -123,12 +123,14 @@ def _short_number(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def _deck(pictures: Sequence[GalleryPicture]) -> str:
+def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
     """Return table rows for the rows of the 2007 talk, with links to pictures, and commands.
 
     The command of a row draws its picture.
     """
-    rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
+    rows = csv.DictReader(
+        line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")
+    )
     return "".join(_deck_row(row, pictures) for row in rows)
 
 
@@ -147,7 +149,7 @@ def _bibliography(pictures: Sequence[GalleryPicture]) -> str:
     return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(format_reference(key))}</dd>' for key in keys)
 
 
-def _resource(name: str) -> str:
+def _read_resource(name: str) -> str:
     return (resources.files("dermis.apps.gallery") / name).read_text(encoding="utf-8")
 
 
@@ -156,20 +158,20 @@ def format_reference(key: str) -> str:
 
     Raises DermisError for a key that is not in the bibliography.
     """
-    fields = dict(_fields(cite.bibtex([key])))
+    fields = dict(_bibtex_fields(cite.bibtex([key])))
     if "author" in fields:
         fields["author"] = "; ".join(re.split(r"\s+and\s+", fields["author"]))
     known = [_without_tex(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]
     return ". ".join(known)
 
 
-def _fields(entry: str) -> Iterator[tuple[str, str]]:
+def _bibtex_fields(entry: str) -> Iterator[tuple[str, str]]:
     """Yield the name and the text of each field of a BibTeX entry.
 
     Texts may span lines and contain braces.
     """
     at = 0
-    while found := _FIELD.search(entry, at):
+    while found := _BIBTEX_FIELD.search(entry, at):
         at, depth = found.end(), 1
         while depth:
             depth += {"{": 1, "}": -1}.get(entry[at], 0)
@@ -182,5 +184,5 @@ def _without_tex(value: str) -> str:
     text = value.replace("{", "").replace("}", "")
     for markup, character in _TEX_SYMBOLS.items():
         text = text.replace(markup, character)
-    text = _ACCENT.sub(lambda found: found[2] + _COMBINING_ACCENTS[found[1]], text)
+    text = _TEX_ACCENT.sub(lambda found: found[2] + _COMBINING_ACCENTS[found[1]], text)
     return " ".join(unicodedata.normalize("NFC", text).split())

@@ -17,12 +17,12 @@ Image = NDArray[np.uint8] | NDArray[np.float32]
 Panel = Image | list[Image]
 """A picture, or an animation as a list of frames."""
 Panels = Mapping[str, Panel]
-Bytes = NDArray[np.uint8]
+SrgbImage = NDArray[np.uint8]
 _FIGURE_INCHES = 4.4
-_BAR, _TEXT, _INK, _PAPER = 24, 14, (200, 200, 206), (22, 22, 26)
+_CAPTION_HEIGHT, _FONT_SIZE, _TEXT_COLOUR, _BACKGROUND = 24, 14, (200, 200, 206), (22, 22, 26)
 
 
-def to_srgb8(image: Image) -> Bytes:
+def to_srgb8(image: Image) -> SrgbImage:
     """Convert an image to 8-bit sRGB; floating-point images are linear light."""
     if image.dtype == np.uint8:
         return np.asarray(image, np.uint8)
@@ -34,19 +34,19 @@ def first_frame(panel: Panel) -> Image:
     return panel[0] if isinstance(panel, list) else panel
 
 
-def panel_sheet(panels: Panels, columns: int = 0) -> Bytes:
+def panel_sheet(panels: Panels, columns: int = 0) -> SrgbImage:
     """Arrange panels with captions in rows of one sRGB image (h, w, 3); animations show their first frame.
 
     columns : number of panels in a row; 0 for a single row
     """
-    cells = [_cell(to_srgb8(first_frame(panel)), name) for name, panel in panels.items()]
+    cells = [_captioned_panel(to_srgb8(first_frame(panel)), name) for name, panel in panels.items()]
     step = columns or len(cells)
-    rows = [_row(cells[start : start + step]) for start in range(0, len(cells), step)]
+    rows = [_panel_row(cells[start : start + step]) for start in range(0, len(cells), step)]
     width = max(row.shape[1] for row in rows)
-    return np.vstack([_padded(row, row.shape[0], width) for row in rows])
+    return np.vstack([_pad(row, row.shape[0], width) for row in rows])
 
 
-def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
+def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> SrgbImage:
     """Draw a matplotlib plot as a square sRGB image.
 
     plot : function that draws into matplotlib axes
@@ -65,28 +65,28 @@ def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     return np.array(canvas.buffer_rgba(), np.uint8)[..., :3]
 
 
-def _cell(image: Bytes, caption: str) -> Bytes:
+def _captioned_panel(image: SrgbImage, caption: str) -> SrgbImage:
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
-    bar = Pillow.new("RGB", (image.shape[1], _BAR), _PAPER)
-    centre = (image.shape[1] / 2, _BAR / 2)
-    ImageDraw.Draw(bar).text(centre, caption, _INK, ImageFont.load_default(_TEXT), anchor="mm")
+    bar = Pillow.new("RGB", (image.shape[1], _CAPTION_HEIGHT), _BACKGROUND)
+    centre = (image.shape[1] / 2, _CAPTION_HEIGHT / 2)
+    ImageDraw.Draw(bar).text(centre, caption, _TEXT_COLOUR, ImageFont.load_default(_FONT_SIZE), anchor="mm")
     return np.vstack([image, np.asarray(bar)])
 
 
-def _row(cells: Sequence[Bytes]) -> Bytes:
+def _panel_row(cells: Sequence[SrgbImage]) -> SrgbImage:
     height = max(cell.shape[0] for cell in cells)
-    return np.hstack([_padded(cell, height, cell.shape[1]) for cell in cells])
+    return np.hstack([_pad(cell, height, cell.shape[1]) for cell in cells])
 
 
-def _padded(image: Bytes, height: int, width: int) -> Bytes:
-    padded: Bytes = np.full((height, width, 3), _PAPER, np.uint8)
+def _pad(image: SrgbImage, height: int, width: int) -> SrgbImage:
+    padded: SrgbImage = np.full((height, width, 3), _BACKGROUND, np.uint8)
     padded[: image.shape[0], : image.shape[1]] = image
     return padded
 
 
-_RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
+_DOT_RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
 
 
 def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
@@ -96,14 +96,14 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
     image = Image.fromarray(np.ascontiguousarray(picture[..., :3]))
     draw = ImageDraw.Draw(image)
     for (x, y), visible in zip(landmarks.pixels.tolist(), landmarks.visible.tolist(), strict=True):
-        box = (x - _RADIUS, y - _RADIUS, x + _RADIUS, y + _RADIUS)
+        box = (x - _DOT_RADIUS, y - _DOT_RADIUS, x + _DOT_RADIUS, y + _DOT_RADIUS)
         draw.ellipse(box, fill=_VISIBLE_COLOUR if visible else _HIDDEN_COLOUR)
     return np.array(image)
 
 
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
 _LABEL_COLOURS = 8192
-_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
+_SHOWN_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 
 
 def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
@@ -122,7 +122,7 @@ def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
         return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
     channels = values.reshape(*values.shape[:2], -1)[..., :3]
     nonzero = (channels != 0).any(axis=-1)
-    low, high = np.quantile(channels[nonzero], _QUANTILES, axis=0)
+    low, high = np.quantile(channels[nonzero], _SHOWN_QUANTILES, axis=0)
     levels = np.clip((channels - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * nonzero[..., None]
     if levels.shape[2] == 1:
         levels = levels.repeat(3, axis=2)

@@ -88,13 +88,15 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in only:
-        if not any(_matches(script, wanted) for script in scripts):
+        if not any(_matches_selection(script, wanted) for script in scripts):
             names = ", ".join(script.name for script in scripts)
             refuse("--only", "names of pictures", f"got {wanted!r}", f"Choose from: {names}")
-    return [script for script in scripts if not only or any(_matches(script, name) for name in only)]
+    return [
+        script for script in scripts if not only or any(_matches_selection(script, name) for name in only)
+    ]
 
 
-def _matches(script: Script, wanted: str) -> bool:
+def _matches_selection(script: Script, wanted: str) -> bool:
     """Return whether a script has a given number, or a name that contains a given text."""
     if wanted.isdecimal():
         return int(wanted) == int(script.name.partition("_")[0])
@@ -126,7 +128,7 @@ def _split_list(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-_QUALITY, _FRAME_MS = 86, 80
+_WEBP_QUALITY, _FRAME_MS = 86, 80
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Gallery
         yield GalleryPicture(script, panels, (width, height), time.perf_counter() - started, frame_ms)
 
 
-def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
+def encode_webp(panel: Panel, quality: int = _WEBP_QUALITY) -> bytes:
     """Encode a panel as a WebP file, animated if it has several frames.
 
     quality : WebP quality, 0 to 100

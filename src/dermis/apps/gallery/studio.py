@@ -17,7 +17,7 @@ from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_SCAN = "lee_perry_smith"
+_SCAN_NAME = "lee_perry_smith"
 
 
 class Studio:
@@ -32,7 +32,7 @@ class Studio:
     def __init__(
         self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
     ) -> None:
-        self.name = name or (_SCAN if is_available(_SCAN) else HUMAN)
+        self.name = name or (_SCAN_NAME if is_available(_SCAN_NAME) else HUMAN)
         self.side, self.adapter, self._settings = side, adapter, settings
         self.frames_ms: list[float] = []
         self._load = cache(load_head)

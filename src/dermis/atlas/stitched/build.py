@@ -43,10 +43,10 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     low, high = (limit * mean for limit in _DENSITY_RANGE)
     target = np.where(density < low, np.sqrt(low * density), density)
     target = np.where(density > high, np.sqrt(high * density), target)
-    return renumbered(piece), np.where(piece >= 0, target / np.maximum(density, 1e-12), 1.0)
+    return renumber_pieces(piece), np.where(piece >= 0, target / np.maximum(density, 1e-12), 1.0)
 
 
-def renumbered(piece: Index) -> Index:
+def renumber_pieces(piece: Index) -> Index:
     """Renumber piece indices (f,) from 0 without gaps; the index -1 for no piece is kept."""
     numbers, index = np.unique(piece, return_inverse=True)
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)

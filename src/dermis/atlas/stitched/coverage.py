@@ -111,10 +111,10 @@ def _drawing_order(surface: FlatSurface, piece: Index, own: Index) -> Index:
 
     own : (t,) indices of the triangles
     """
-    return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
+    return own[np.argsort(~_mirrored_triangles(surface, piece[own], own), kind="stable")]
 
 
-def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Mask:
+def _mirrored_triangles(surface: FlatSurface, piece: Index, own: Index) -> Mask:
     """Return the mask of triangles whose uv orientation is opposite to that of most of their piece.
 
     piece, own : (t,) piece and index of each triangle
@@ -186,14 +186,16 @@ def _has_gap(
     first, second : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y
     """
-    one, other = (_anchored(surface, packing, coverage, texel) for texel in (first, second))
+    one, other = (_anchored_texels(surface, packing, coverage, texel) for texel in (first, second))
     triangle, weights = coverage.triangle.ravel(), coverage.weights.reshape(-1, 2)
     points = [surface.points(triangle[texel], weights[texel]) for texel in (first, second)]
     distance_mm = np.linalg.norm(points[0] - points[1], axis=1)
     return np.asarray(anchors_diverge(one, other) & (distance_mm > gap_limit_mm(one, other, axis)))
 
 
-def _anchored(surface: FlatSurface, packing: Packing, coverage: Coverage, texel: Index) -> AnchoredTexels:
+def _anchored_texels(
+    surface: FlatSurface, packing: Packing, coverage: Coverage, texel: Index
+) -> AnchoredTexels:
     anchor, weights = coverage.anchor_triangle.ravel()[texel], coverage.anchor_weights.reshape(-1, 2)[texel]
     texels = np.column_stack(np.divmod(texel, coverage.anchor_triangle.shape[1])[::-1]).astype(np.float64)
     steps = surface.uv_metric[anchor, 0, :2] / packing.texels_per_uv[anchor, None]

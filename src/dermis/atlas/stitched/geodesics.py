@@ -87,7 +87,7 @@ def trace_geodesics(
         np.array(triangle, np.int32), np.full((len(triangle), 2), 1 / 3), np.zeros(len(triangle), bool)
     )
     rays = _leave_first_triangle(
-        adjacency, np.asarray(triangle, np.int64), _complex(start), _complex(target), ends
+        adjacency, np.asarray(triangle, np.int64), _as_complex(start), _as_complex(target), ends
     )
     for _ in range(_MAX_STEPS):
         if not len(rays.ray):
@@ -100,7 +100,7 @@ def _leave_first_triangle(
     adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
 ) -> Geodesics:
     """Return the geodesics that leave their first triangle, and store the ends of those that do not."""
-    corners = _complex(adjacency.planar_corners[triangle])
+    corners = _as_complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT * (corners @ np.array(INNER_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
@@ -112,7 +112,7 @@ def _leave_first_triangle(
     )
     leaves = np.asarray(leaves_through.any(axis=1))
     inside, (a, b, c) = rays.select(~leaves), corners[~leaves].T
-    ends.set_ends(inside, np.zeros(len(a), np.int64), *_weights(a, b, c, inside.direction), True)
+    ends.set_ends(inside, np.zeros(len(a), np.int64), *_clipped_weights(a, b, c, inside.direction), True)
     return rays.select(leaves)
 
 
@@ -140,12 +140,12 @@ def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Ge
     arrived = (inner != 0.0) & (_cross(q - p, rays.direction - p) * inner >= 0.0)
     rays = Geodesics(rays.ray, neighbour.astype(np.int64), side, p, q, rays.direction, orientation)
     done = rays.select(arrived)
-    weights = _weights(a[arrived], b[arrived], apex[arrived], done.direction)
+    weights = _clipped_weights(a[arrived], b[arrived], apex[arrived], done.direction)
     ends.set_ends(done, neighbour_side[arrived], *weights, True)
     return rays.select(~arrived)
 
 
-def _complex(points: Doubles) -> Complex:
+def _as_complex(points: Doubles) -> Complex:
     """Convert points (..., 2) to complex numbers (...)."""
     return np.ascontiguousarray(points, np.float64).view(np.complex128)[..., 0]
 
@@ -160,7 +160,7 @@ def _exit_fraction(rays: Geodesics) -> Doubles:
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
-def _weights(a: Complex, b: Complex, c: Complex, point: Complex) -> tuple[Doubles, Doubles]:
+def _clipped_weights(a: Complex, b: Complex, c: Complex, point: Complex) -> tuple[Doubles, Doubles]:
     """Return the barycentric weights of b and c at a point, clipped to the triangle a b c."""
     area = _cross(b - a, c - a)
     second = np.clip(_cross(point - a, c - a) / area, 0.0, 1.0)

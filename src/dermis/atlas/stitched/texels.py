@@ -89,8 +89,10 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
 
 def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
     """Return the mask of texel pairs whose anchors are farther apart than both texels are from them."""
-    distance2 = np.maximum(_square(one.texels - one.anchors), _square(other.texels - other.anchors))
-    return np.asarray(_square(one.anchors - other.anchors) > distance2)
+    distance2 = np.maximum(
+        _squared_length(one.texels - one.anchors), _squared_length(other.texels - other.anchors)
+    )
+    return np.asarray(_squared_length(one.anchors - other.anchors) > distance2)
 
 
 def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
@@ -101,6 +103,6 @@ def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubl
     return _GAP_STEPS * np.maximum(one.step_mm[:, axis], other.step_mm[:, axis]) + _GAP_SLACK_MM
 
 
-def _square(offset: Doubles) -> Doubles:
+def _squared_length(offset: Doubles) -> Doubles:
     """Return the squared length of (n, 2) vectors."""
     return np.asarray(offset[:, 0] ** 2 + offset[:, 1] ** 2)

@@ -119,11 +119,11 @@ def flatten_charts(mesh: ChartMesh, chart: Index) -> FlatCharts:
     """Flatten charts (f,) without faulty triangles, changing the charts where necessary."""
     flat = mesh.flatten(chart)
     while flat.faulty.any():
-        flat = mesh.flatten(_repair(mesh, flat, 0))
+        flat = mesh.flatten(_repair_charts(mesh, flat, 0))
     return flat
 
 
-def _repair(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
+def _repair_charts(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
     """Return changed charts (f,) that flatten without faulty triangles.
 
     Faulty triangles are first moved to adjacent charts; if that does not suffice, charts are split.
@@ -136,7 +136,7 @@ def _repair(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
     changed = flat.faulty | (chart != flat.chart)
     affected = np.isin(flat.chart, flat.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
-    chart[affected] = chart.max() + 1 + _repair(subset, subset.flatten(chart[affected]), depth + 1)
+    chart[affected] = chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), depth + 1)
     return chart
 
 

@@ -153,7 +153,7 @@ def unwrap(
     up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
     first = np.unique(flat.chart, return_index=True)[1]
     height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.chart])
-    uv = _packed_uv(_orient(flat, height), flat, padding)
+    uv = _packed_uv(_orient_charts(flat, height), flat, padding)
     return UvLayout(uv, flat.corners, flat.point, flat.chart)
 
 
@@ -163,7 +163,7 @@ def _check_areas(positions: Doubles, triangles: Index) -> None:
         refuse("mesh", "triangles with an area", f"{degenerate} have none", "Remove them first")
 
 
-def _orient(flat: FlatCharts, height: Doubles) -> Doubles:
+def _orient_charts(flat: FlatCharts, height: Doubles) -> Doubles:
     """Rotate each chart so that `height` increases upwards; return positions (v, 2).
 
     height : (f, 3) coordinate in space along the upright direction, at the corners [mm]

@@ -68,7 +68,10 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
 
 
 def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
-    """Return only the transform of R(r) that `solve` computes, in less time, (n, c) [-]."""
+    """Return the Hankel transform of R(r) of a layered medium, without that of T(r), (n, c) [-].
+
+    The arguments are those of `solve`.
+    """
     return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
 
 

@@ -49,13 +49,13 @@ def diffusion_profile(
 
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
-    clamp : position of the multipole's source in layers thinner than a mean free path
+    clamp : position of the multipole's source in layers thinner than a mean free path, see `Slab`
     rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels and is per
         incident power
 
     Raises DermisError when the model is not valid for the medium.
 
-    Source: see `MODEL_SOURCES`.
+    Source: the works listed in `MODEL_SOURCES`.
     """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges, radius = ring_edges(), radius_grid()
@@ -154,7 +154,7 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction of a photon's first events in the top mean free path that scatter it, (c,) [-]."""
+    """Return the fraction of scattering among a photon's events in the first mean free path, (c,) [-]."""
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
         events = np.minimum(layer.sigma_t_prime * layer.thickness_mm, 1.0 - depth)

@@ -40,7 +40,7 @@ class Slab:
 
     @property
     def z_b(self) -> tuple[Floats, Floats]:
-        """Return the distances above and below the slab of zero extrapolated fluence, (c,) each [mm]."""
+        """Return how far above and below the slab the extrapolated fluence is zero, (c,) each [mm]."""
         return 2.0 * self.A_top * self.layer.D, 2.0 * self.A_bottom * self.layer.D
 
     @property
@@ -80,7 +80,7 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance(radius_mm, slab.layer, slab.A_top)
     l, top = slab.source_mm, slab.z_b[0]
-    return _series(radius_mm, slab, lambda shift: (l + shift, shift - l - 2.0 * top), tolerance)
+    return _image_series(radius_mm, slab, lambda shift: (l + shift, shift - l - 2.0 * top), tolerance)
 
 
 def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
@@ -97,7 +97,7 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
     l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(radius_mm), len(l)))
-    return _series(radius_mm, slab, lambda shift: (d - l - shift, d + l + 2.0 * top - shift), tolerance)
+    return _image_series(radius_mm, slab, lambda shift: (d - l - shift, d + l + 2.0 * top - shift), tolerance)
 
 
 def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) -> Floats:
@@ -119,7 +119,7 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) ->
     return np.asarray(0.5 * slab.layer.alpha_prime * (images(real) - images(image)))
 
 
-def _series(
+def _image_series(
     radius_mm: ArrayLike, slab: Slab, pair: Callable[[Floats], tuple[Floats, Floats]], tolerance: float
 ) -> Floats:
     result = np.zeros((*np.shape(radius_mm), len(slab.source_mm)))
@@ -145,7 +145,7 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
 
 
 @dataclass(frozen=True)
-class Response:
+class StackResponse:
     """Hankel transforms of reflectance and transmittance of a stack of layers, (n, c) each [-].
 
     R_above, T_down : reflectance and transmittance for light from above
@@ -157,13 +157,13 @@ class Response:
     R_below: Floats
     T_up: Floats
 
-    def placed_over(self, lower: Response) -> Response:
+    def placed_over(self, lower: StackResponse) -> StackResponse:
         """Return the combined response of this stack on top of another stack.
 
         Source: [DonnerJensen2005] section 3.3, after Kubelka's addition of layers.
         """
         between = 1.0 / (1.0 - self.R_below * lower.R_above)
-        return Response(
+        return StackResponse(
             self.R_above + self.T_down * lower.R_above * between * self.T_up,
             self.T_down * between * lower.T_down,
             lower.R_below + lower.T_up * self.R_below * between * lower.T_down,
@@ -171,16 +171,16 @@ class Response:
         )
 
 
-def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> Response:
+def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> StackResponse:
     """Return the reflectance and transmittance of all layers of a medium at frequencies s [1/mm].
 
     A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
     clamp : position of the source in layers thinner than a mean free path, see `Slab`
     """
     slabs = layer_slabs(medium, A, clamp)
-    stack = _slab_response(frequency, slabs[-1])
+    stack = _single_slab_response(frequency, slabs[-1])
     for slab in reversed(slabs[:-1]):
-        stack = _slab_response(frequency, slab).placed_over(stack)
+        stack = _single_slab_response(frequency, slab).placed_over(stack)
     return stack
 
 
@@ -191,9 +191,9 @@ def layer_slabs(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
     return [Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp) for i, layer in layers]
 
 
-def _slab_response(frequency: ArrayLike, slab: Slab) -> Response:
+def _single_slab_response(frequency: ArrayLike, slab: Slab) -> StackResponse:
     R, T = reflectance_hankel(frequency, slab), transmittance_hankel(frequency, slab)
     if np.isinf(slab.layer.thickness_mm):  # no light comes from below
-        return Response(R, T, np.zeros_like(R), np.zeros_like(R))
+        return StackResponse(R, T, np.zeros_like(R), np.zeros_like(R))
     below = slab.flipped()
-    return Response(R, T, reflectance_hankel(frequency, below), transmittance_hankel(frequency, below))
+    return StackResponse(R, T, reflectance_hankel(frequency, below), transmittance_hankel(frequency, below))

@@ -12,11 +12,11 @@ import numpy as np
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_keywords
 from dermis.optics.fits.targets import PointTarget, RingTarget
-from dermis.optics.fits.variable_projection import TOLERANCE, Design, WeightedFit, minimise
+from dermis.optics.fits.variable_projection import TOLERANCE, DesignFunction, WeightedFit, minimise
 from dermis.optics.gaussians import MAX_VARIANCE_MM2, GaussianSum
 from dermis.optics.media import Floats
 
-Target = PointTarget | RingTarget
+FitTarget = PointTarget | RingTarget
 MAX_TERMS = 8
 # Fractions of the light within the standard deviations of the narrowest and the widest Gaussian of a start.
 # For all tested profiles, one of these starts leads to the smallest error found from any start.
@@ -52,7 +52,7 @@ class GaussianFit:
 
 @renamed_keywords(near="initial")
 def fit_gaussians(
-    target: Target,
+    target: FitTarget,
     terms: int,
     *,
     shared: bool = True,
@@ -92,7 +92,7 @@ def fit_gaussians(
 
 
 def _fit_group(
-    target: Target, terms: int, keep_energy: bool, initial: Floats | None
+    target: FitTarget, terms: int, keep_energy: bool, initial: Floats | None
 ) -> tuple[Floats, Floats]:
     """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
 
@@ -118,18 +118,18 @@ def _fit_group(
     return np.exp(best.log_variance[used]), weight[used]
 
 
-def _initial_variances(target: Target, terms: int) -> list[Floats]:
+def _initial_variances(target: FitTarget, terms: int) -> list[Floats]:
     ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_FRACTIONS]
     return [np.linspace(low, high, terms) for low, high in ends]
 
 
-def _log_variance_bounds(target: Target) -> tuple[float, float]:
+def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
     """Return bounds of the log variances: standard deviations from half the first to the last radius."""
     radius = target.radius_mm if isinstance(target, PointTarget) else target.edges_mm[1:]
     return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, MAX_VARIANCE_MM2)))
 
 
-def _with_energy_equation(target: Target) -> tuple[Design, Floats]:
+def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     """Return a target's design and samples with one more equation: the weights sum to the total.
 
     The weight of the equation is so large that the total is met almost exactly.

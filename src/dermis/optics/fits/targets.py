@@ -64,7 +64,7 @@ class PointTarget:
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return the radii within which given fractions of the light emerge, as mean of channels [mm].
+        """Return the radii within which given fractions of the light emerge, for the mean of channels [mm].
 
         fractions : increasing fractions of the light, 0 to 1 [-]
         """
@@ -72,7 +72,7 @@ class PointTarget:
         return _radii_at_fractions(fractions, self.radius_mm, rate)
 
     def channel(self, index: int) -> PointTarget:
-        """Return the target with one of the channels."""
+        """Return the target of one channel, which is fitted on its own."""
         channel = slice(index, index + 1)
         return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
@@ -119,14 +119,14 @@ class RingTarget:
         return ring_error(self, self.design(variance_mm2)[0] @ weight)
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return the radii within which given fractions of the light emerge, as mean of channels [mm].
+        """Return the radii within which given fractions of the light emerge, for the mean of channels [mm].
 
         fractions : increasing fractions of the light, 0 to 1 [-]
         """
         return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
 
     def channel(self, index: int) -> RingTarget:
-        """Return the target with one of the channels."""
+        """Return the target of one channel, which is fitted on its own."""
         channel = slice(index, index + 1)
         return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.optics.media import Floats
 
-Design = Callable[[Floats], tuple[Floats, Floats]]
+DesignFunction = Callable[[Floats], tuple[Floats, Floats]]
 _MAX_STEPS = 100
 _MAX_STEP = 1.0
 TOLERANCE = 1e-7
@@ -39,7 +39,7 @@ class WeightedFit(NamedTuple):
 
 
 def minimise(
-    design: Design,
+    design: DesignFunction,
     samples: Floats,
     log_variance: Floats,
     bounds: tuple[float, float],
@@ -95,7 +95,7 @@ def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_s
     return np.asarray(np.clip(extrapolated, -_MAX_STEP, _MAX_STEP))
 
 
-def _optimal_weights(design: Design, samples: Floats, log_variance: Floats) -> WeightedFit:
+def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
     """Compute optimal non-negative weights for given variances, with cost and derivatives."""
     columns, slopes = design(np.exp(log_variance))
     k = len(log_variance)

@@ -15,7 +15,7 @@ from dermis.optics.pigments.spectra import (
     DERMIS_SCATTERING_RATIO,
     WAVELENGTHS_NM,
     ScatteringLaw,
-    baseline,
+    baseline_absorption,
     blood,
     donner_jensen_2006,
     melanosome,
@@ -84,7 +84,7 @@ def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) ->
     """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
     reticular = replace(p, blood=_RETICULAR_BLOOD_RATIO * p.blood)
     return (
-        Layer(baseline(wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
+        Layer(baseline_absorption(wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
         _epidermis(p, wavelength_nm, sigma_s_prime),
         replace(
             _dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_DERMIS_MM
@@ -104,7 +104,7 @@ def _epidermis(
 def _epidermal_absorption(
     p: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, blood_fraction: float = 0.0
 ) -> Floats:
-    tissue = (1.0 - melanin - blood_fraction) * baseline(wavelength_nm)
+    tissue = (1.0 - melanin - blood_fraction) * baseline_absorption(wavelength_nm)
     pigment = melanin * melanosome(wavelength_nm, p.eumelanin)
     return np.asarray(pigment + blood_fraction * blood(wavelength_nm, p.oxygen) + tissue)
 
@@ -117,7 +117,7 @@ def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, nam
 
 def _dermal_absorption(p: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats) -> Floats:
     vessels = blood_fraction * blood(wavelength_nm, p.oxygen)
-    return np.asarray(vessels + (1.0 - blood_fraction) * baseline(wavelength_nm))
+    return np.asarray(vessels + (1.0 - blood_fraction) * baseline_absorption(wavelength_nm))
 
 
 def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:

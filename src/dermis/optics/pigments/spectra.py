@@ -118,7 +118,7 @@ def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
     return eumelanin_fraction * dark + (1.0 - eumelanin_fraction) * light
 
 
-def baseline(wavelength_nm: ArrayLike) -> Floats:
+def baseline_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of bloodless skin without melanin, measured on rats [1/mm].
 
     Some public code has -lambda - 154 instead of -(lambda - 154), which leaves little more than the constant
@@ -160,7 +160,7 @@ def water(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of water, 4 pi k / lambda [1/mm].
 
     k is the imaginary part of the index of refraction. No skin structure uses this spectrum: up to 700 nm it
-    is less than 3 % of `baseline`, which was measured on moist tissue.
+    is less than 3 % of `baseline_absorption`, which was measured on moist tissue.
 
     Source: [HaleQuerry1973].
     """

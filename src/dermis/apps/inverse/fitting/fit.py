@@ -92,14 +92,14 @@ class InitialGuess:
     def best(self, count: int) -> FitPoint:
         """Return the pigments, specular strength and `count` suns with the smallest residual."""
         grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
-        log_skin, suns = self.point.logs, self._nearest(self.point.logs, count)
+        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, count)
         for _ in range(2):
             trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
-            log_skin = trials[int(np.argmin([self._cost(one, suns) for one in trials]))]
-            suns = self._nearest(log_skin, count)
+            log_skin = trials[int(np.argmin([self._squared_residual(one, suns) for one in trials]))]
+            suns = self._select_suns(log_skin, count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
-    def _nearest(self, logs: Floats, count: int) -> list[int]:
+    def _select_suns(self, logs: Floats, count: int) -> list[int]:
         """Return the indices of the suns with the smallest residual, selected greedily.
 
         logs : (4,) logarithms of the skin unknowns
@@ -107,10 +107,10 @@ class InitialGuess:
         selected: list[int] = []
         for _ in range(count):
             remaining = [k for k in range(len(self.point.suns)) if k not in selected]
-            selected.append(min(remaining, key=lambda k: self._cost(logs, [*selected, k])))
+            selected.append(min(remaining, key=lambda k: self._squared_residual(logs, [*selected, k])))
         return selected
 
-    def _cost(self, logs: Floats, suns: list[int]) -> float:
+    def _squared_residual(self, logs: Floats, suns: list[int]) -> float:
         """Return the squared residual of the best light strengths for a skin and a set of suns.
 
         Diffuse radiance is scaled by the skin's colour, specular radiance by its specular strength.
@@ -120,7 +120,7 @@ class InitialGuess:
         """
         lights = np.array([*range(BASIS_SIZE), *(BASIS_SIZE + k for k in suns)])
         n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
-        ratio = self._colour(logs) / self._colour(self.point.logs)
+        ratio = self._skin_colour(logs) / self._skin_colour(self.point.logs)
         gram, right = np.zeros((len(lights),) * 2), np.zeros(len(lights))
         for c in range(3):
             G, r, s = self._grams[c], self._rights[c], ratio[c]
@@ -130,7 +130,7 @@ class InitialGuess:
             right += s * r[lights] + strength * r[n + lights]
         return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
-    def _colour(self, logs: Floats) -> Floats:
+    def _skin_colour(self, logs: Floats) -> Floats:
         melanin, blood = np.exp(logs[:1]), np.exp(logs[1:2])
         return np.asarray(self._table.lookup(melanin, blood)[0], np.float64)
 

@@ -178,7 +178,9 @@ class UnmixResult:
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
         third = prior_mean if fixed or self.third is None else self.third
         estimate = np.stack([self.melanin, self.blood, third], axis=-1)
-        factors, added = change.scales_and_offsets(self._median(self.melanin), self._median(self.blood))
+        factors, added = change.scales_and_offsets(
+            self._skin_median(self.melanin), self._skin_median(self.blood)
+        )
         return recolour(device, target, estimate, self.residual, factors, added)
 
     def skin_texels(self) -> NDArray[np.bool_]:
@@ -186,7 +188,7 @@ class UnmixResult:
         logs = np.log(np.maximum(self.residual, _BLACK_LEVEL))
         return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
-    def _median(self, fraction: Pixels) -> float:
+    def _skin_median(self, fraction: Pixels) -> float:
         """Return the median of a map over the skin texels."""
         skin = self.skin_texels()
         return float(np.median(fraction[skin] if skin.any() else fraction))
