@@ -174,7 +174,7 @@ def test_a_folder_that_cannot_be_used_does_no_harm(
     if blocked == "a file":
         (tmp_path / "here").write_text("")
     elif blocked == "a folder in the file's place":
-        (tmp_path / "here" / "atlas" / f"{cached._key(plane(10.0), 64)}.arrays").mkdir(parents=True)
+        (tmp_path / "here" / "atlas" / f"{cached._atlas_key(plane(10.0), 64)}.arrays").mkdir(parents=True)
     else:
         monkeypatch.setattr(Path, "mkdir", _refuse)
     assert cached_atlas(plane(10.0), 64).size == 64
