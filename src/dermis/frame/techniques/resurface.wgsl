@@ -2,7 +2,7 @@
 
 @group(0) @binding(0) var surface: texture_2d<f32>; // light that does not scatter; alpha is coverage
 @group(0) @binding(1) var subsurface: texture_2d<f32>; // light below the skin, diffused
-@group(0) @binding(2) var transmittance: texture_2d<f32>; // fraction of it that leaves towards the camera
+@group(0) @binding(2) var transmittance: texture_2d<f32>; // fraction of that light that leaves towards the camera
 @group(0) @binding(3) var picture: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)

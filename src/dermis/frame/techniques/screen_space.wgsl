@@ -7,7 +7,7 @@ const MAX_SLOPE: f32 = 4.0; // change of depth over width within one surface
 
 struct Blur {
     half: vec2f, // half size of the picture on a plane at distance 1
-    shift: vec2f, // of its centre there, in half sizes
+    shift: vec2f, // offset of the centre of the picture on that plane, in half sizes
     reach: f32, // of the kernel [mm]
 }
 
@@ -40,7 +40,7 @@ fn from_side(here: vec2i, centre: vec4f, step: vec2i) -> vec3f {
     let pixel = distance(position, position_of_pixel(here + step, centre.a));
     let reach = blur.reach / pixel;
     var sum = vec3f(0.0);
-    var total = vec3f(0.0); // of the weights
+    var total = vec3f(0.0); // sum of the weights
     var tap = centre;
     var at = 0.0; // distance of the tap
     var nearer = vec3f(0.0); // fraction of the light from distances below those that the tap covers

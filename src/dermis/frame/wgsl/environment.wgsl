@@ -1,6 +1,6 @@
 // Light of the environment: irradiance and prefiltered reflections of a panorama, reduced by occlusion.
 
-override ENVIRONMENT: bool = false; // whether the scene has one
+override ENVIRONMENT: bool = false; // whether the scene has an environment
 
 //#fill const LAYERS: f32 = {reflections}; // layers of reflections, evenly spaced in the logarithm of the roughness
 //#fill const SMOOTHEST: f32 = {smoothest_reflection}; // roughness of the first and of the last layer

@@ -29,12 +29,12 @@ struct Light {
     softness: f32, // half of the least width of the edge of a shadow [mm]
     half_width: u32, // of the tent of the shadow filter [shadow texels]
     layer: i32, // in the shadow maps, -1 without shadows
-    side: u32, // it is sampled by side x side points
+    side: u32, // an area light is sampled by side x side points
     rays: u32, // number of shadow rays
     parallel: u32, // 1 for parallel light, whose map has no perspective
     round: u32, // 1 for a disc on its map, 0 for a rectangle
     punctual: u32, // 1 if all light comes from one position or, in parallel light, from one direction
-    sheet: u32, // 1 if it is a Gaussian across half_u, whose convolutions are known
+    sheet: u32, // 1 if irradiance is a Gaussian along half_u, so that blurs of it are exact
 }
 
 struct Lights {

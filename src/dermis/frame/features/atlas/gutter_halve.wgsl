@@ -1,4 +1,4 @@
-// List of gutter texels at half the resolution: the source of each is the mean of those of its up to four texels.
+// List of gutter texels at half the resolution: each has the mean of the sources of its four or fewer finer texels.
 //#include "each.wgsl"
 
 //#fill const SAME_SOURCE: f32 = {same_source}; // distance from the first source within which the others are averaged [texels]
@@ -10,7 +10,7 @@ struct GutterTexel {
 
 struct Square {
     texel: u32, // x and y packed
-    first: u32, // range of its texels in `members`
+    first: u32, // range of its finer texels in `members`
     end: u32,
 }
 

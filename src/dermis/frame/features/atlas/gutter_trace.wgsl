@@ -9,11 +9,11 @@ const NO_TRIANGLE: u32 = 0xffffffffu;
 //#fill const INNER: vec2f = vec2f({inner_b}, {inner_c}); // weights of b and c at the inner point; off centre, as paths from there hit fewer corners
 const MAX_STEPS: u32 = 1024u;
 const EPSILON: f32 = 1e-12;
-const MIN_SINE: f32 = 0.05; // between the steps of u and v at a corner; below, those of the triangle are used
+const MIN_SINE: f32 = 0.05; // least sine between the steps of u and v at a corner; below it, the steps of the triangle are used
 
 struct Start {
     texel: u32, // x and y packed
-    triangle: u32, // of the start, which lies on one of its sides
+    triangle: u32, // triangle of the start, which lies on one of its sides
     weights: u32, // barycentric weights of the start, packed
     source: array<f32, 2>, // source of the texel if the path leaves the surface [texels]
 }

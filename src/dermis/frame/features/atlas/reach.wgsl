@@ -1,4 +1,4 @@
-// Numbers of connected texels of the same chart to the left, right, up and down; the top bit of the first marks gutters.
+// Numbers of connected texels of the same chart to the left, right, up and down; the top bit of the first component marks gutter texels.
 
 //#fill const GUTTER_BIT: u32 = {gutter_bit}u;
 

@@ -1,4 +1,4 @@
-// Stretch at half the resolution: mean of four texels, or of those among them that are in no gutter.
+// Stretch at half the resolution: mean of four texels, or of those outside gutters if there are any.
 //#include "halves.wgsl"
 //#include "reach.wgsl"
 

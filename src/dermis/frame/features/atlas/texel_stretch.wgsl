@@ -8,7 +8,7 @@ override FEATHER_MM: f32 = 0.0; // width over which blurs narrow towards the edg
 
 //#fill const MAX_SHEAR: f32 = {max_shear}; // limit of the cosine
 const MAX_PER_MM: f32 = 6e4;
-const MIN_FRACTION: f32 = 1e-3; // factor of the density at the edge itself: 0 would mark an empty texel
+const MIN_FRACTION: f32 = 1e-3; // factor of the density at the very edge of a chart; 0 would mark an empty texel
 
 @group(0) @binding(25) var<storage, read> vertex_lengths: array<vec4f>; // of dpdu and dpdv, the cosine between them
 @group(0) @binding(30) var stretch_map: texture_storage_2d<rgba16float, write>;

@@ -5,7 +5,7 @@
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 override SHEARED: bool = true; // whether u and v may be oblique to each other
-override EDGE: u32 = 0u; // what blurs read beyond the edge of a chart
+override EDGE: u32 = 0u; // filter mode at the edges of charts: REPEATED, CLEARED or SKIPPED
 
 override ROWS_PER_UNIT: f32; // rows of the kernel table per unit of variance
 override MAX_TABLE_VARIANCE: f32; // variance of the table's last row [step^2]
@@ -53,7 +53,7 @@ fn resampling_variance(density2: f32) -> f32 {
 }
 
 // Every covariance matrix is that of a blur along u and one along a sheared v [Geusebroek2003]: the latter has its lower
-// right element, and the former what remains of the upper left one.
+// right element, and the former the rest of the upper left element.
 fn along_v(stretch: vec4f) -> Axis {
     let density2 = stretch.xy * stretch.xy / (1.0 - stretch.z * stretch.z);
     var variance = spread.variance_mm2 * density2.y;

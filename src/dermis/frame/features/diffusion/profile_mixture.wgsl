@@ -1,9 +1,9 @@
-// Light that leaves skin of mixed profiles: one half by the blend weights where light leaves, one half by those where it enters.
+// Light that leaves skin of mixed profiles: the mean of blending by the weights at the exit and at the entry point.
 //#include "packed_blend_weights.wgsl"
 
 override OTHERS: u32; // profiles besides the first
 
-@group(0) @binding(0) var sums: texture_2d_array<f32>; // first profile; for each other profile, the change by the weights where light leaves and where it enters
+@group(0) @binding(0) var sums: texture_2d_array<f32>; // exitance by the first profile; for each other profile, its difference for all light and for light times its weight
 @group(0) @binding(1) var blend_weights: texture_2d<f32>; // see profile_blend_weights.wgsl
 @group(0) @binding(2) var mixed: texture_storage_2d<rgba32float, write>;
 

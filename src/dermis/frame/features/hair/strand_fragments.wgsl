@@ -24,7 +24,7 @@ struct Fragment {
 struct Depths {
     first: vec4f,
     second: vec4f,
-    weight: f32, // fraction of the pixel that a sample stands for
+    weight: f32, // fraction of the pixel that a sample represents
 }
 
 fn depth_at(triangle: u32, position: vec2f) -> f32 {

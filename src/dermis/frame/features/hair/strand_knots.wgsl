@@ -1,7 +1,7 @@
 // Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
-// come first, then the coarse ones of head and beard, of which the first ones may stand for all.
+// come first, then the coarse ones of head and beard, of which the first ones may represent all.
 
-const ROWS_BEFORE: u32 = 2u; // of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
+const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
 
 struct Hairs {
     fine: u32, // number of strands
@@ -9,12 +9,12 @@ struct Hairs {
     shadow_casters: u32, // coarse strands that cast shadows
     fine_knots: u32, // knots per strand
     coarse_knots: u32,
-    width_scale: f32, // factor of their width, so that they cast the shadows of all
+    width_scale: f32, // factor of the width of shadow casters, so that they cast the shadows of all coarse strands
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;
 
-// Strand of a knot or a segment, by their numbers per strand.
+// Strand of a knot or a segment, by the numbers of knots or segments of a fine and of a coarse strand.
 fn hair_of(index: u32, of_fine: u32, of_coarse: u32) -> u32 {
     let fines = hairs.fine * of_fine;
     if (index < fines) {

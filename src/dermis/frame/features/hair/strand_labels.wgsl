@@ -1,4 +1,4 @@
-// Labels of hair, for passes that draw strands with or without them.
+// Labels of hair, for passes that draw strands with or without labels.
 //#if HAIR_LABELS
 // Class of the strands that cover most of each pixel, where strands cover at least half of it in front of the surface.
 //#include "strand_fragments.wgsl"
@@ -81,7 +81,7 @@ fn label_fragment(one: Fragment) {
     }
 }
 
-var<workgroup> partial_labels: array<ClassSums, STRAND_TILE * STRAND_TILE>; // of a layer of the workgroup, see strand_team.wgsl
+var<workgroup> partial_labels: array<ClassSums, STRAND_TILE * STRAND_TILE>; // sums of one layer of the workgroup, see strand_team.wgsl
 
 fn store_partial_labels(lane: u32) {
     partial_labels[lane] = class_sums;

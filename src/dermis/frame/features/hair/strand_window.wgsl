@@ -15,7 +15,7 @@ const NARROWEST: f32 = 0.2; // least width of a window over its length
 const BORDER: f32 = 3.0; // empty texels around all strands
 const SIGN: u32 = 0x80000000u;
 
-// Integers that sort like the floats that they encode, for atomic minima; and back.
+// Integers that are ordered like the floats that they encode, for atomic minima, and their decoding.
 fn sortable(numbers: vec3f) -> vec3u {
     let bits = bitcast<vec3u>(numbers);
     return select(bits | vec3u(SIGN), ~bits, bits >= vec3u(SIGN));

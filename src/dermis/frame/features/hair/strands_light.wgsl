@@ -14,7 +14,7 @@ const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at 
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
 const HEAD_MM: f32 = 85.0; // radius of a head
-const HORIZON_MARGIN: f32 = 0.15; // margin, as a cosine
+const HORIZON_MARGIN: f32 = 0.15; // margin of the test whether the head hides a strand, as a cosine
 const PICTURE_MARGIN: f32 = 64.0; // distance outside the picture beyond which knots are not shaded [pixel]
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;

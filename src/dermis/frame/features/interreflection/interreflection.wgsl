@@ -5,7 +5,7 @@ override INTERREFLECTION: bool = false; // whether there is interreflection
 
 //#fill const LINKED_SIDE: i32 = {linked_side}; // cells along the side of the uv square
 
-@group(0) @binding(27) var<storage, read> from_skin: array<vec4f>; // irradiance of the cells, row by row, times their confidence; the confidence
+@group(0) @binding(27) var<storage, read> from_skin: array<vec4f>; // irradiance of the cells, row by row, times their confidence; alpha is the confidence
 
 fn from_skin_cell(at: vec2i) -> vec4f {
     let cell = clamp(at, vec2i(0), vec2i(LINKED_SIDE - 1));

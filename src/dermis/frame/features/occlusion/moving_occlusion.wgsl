@@ -1,6 +1,6 @@
 // Sky visibility of a moving head at texels and vertices: the baked map, corrected by the change at the vertices.
 
-const MAX_GAIN: f32 = 2.0; // of the change of a texel over that of its vertices, which limits noise
+const MAX_GAIN: f32 = 2.0; // largest ratio of the change at a texel to that at its vertices, which limits noise
 
 @group(0) @binding(0) var corners: texture_2d<u32>; // three vertices, packed barycentric weights
 @group(0) @binding(1) var rest_map: texture_2d<f32>; // rows of the atlas, the last row repeated, then the vertices

@@ -4,7 +4,7 @@
 const NO_VERTEX: u32 = 0xffffffffu;
 
 @group(0) @binding(31) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
-@group(0) @binding(32) var corners: texture_storage_2d<rgba32uint, write>; // as many texels as the map has for the atlas
+@group(0) @binding(32) var corners: texture_storage_2d<rgba32uint, write>; // one texel for each atlas texel of the map
 
 // Texel of the atlas at a texel of the map.
 fn atlas_texel(position: vec2u) -> vec2u {

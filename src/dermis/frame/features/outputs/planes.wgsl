@@ -1,4 +1,4 @@
-// Buffer of outputs: one after the other, each as rows of pixels with interleaved channels.
+// Buffer of outputs, one after the other; each is an image of interleaved channels.
 
 const NOT_REQUESTED: u32 = 0xffffffffu; // first channel of an output that is not requested
 

@@ -4,7 +4,7 @@
 override DIFFUSE_FIRST: u32 = NOT_REQUESTED;
 
 @group(0) @binding(0) var below: texture_2d<f32>; // diffused light below the skin
-@group(0) @binding(1) var leaving: texture_2d<f32>; // fraction of it that leaves towards the eye
+@group(0) @binding(1) var leaving: texture_2d<f32>; // fraction of that light that leaves towards the eye
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

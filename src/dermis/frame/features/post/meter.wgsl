@@ -15,7 +15,7 @@ struct MeterCamera {
 @group(0) @binding(30) var<uniform> camera: MeterCamera;
 @group(0) @binding(31) var visibility_buffer: texture_2d_array<u32>;
 @group(0) @binding(32) var image: texture_2d<f32>; // radiance
-@group(0) @binding(33) var<storage, read_write> points: array<vec2f>; // luminance of white skin, -1 without skin; largest channel of the radiance
+@group(0) @binding(33) var<storage, read_write> points: array<vec2f>; // x: luminance that white skin would have, -1 without skin; y: largest channel of the radiance
 
 fn metered_at(triangle: u32, pixel: vec2u, size: vec2f) -> vec2f {
     let t = triangle_at(triangle);

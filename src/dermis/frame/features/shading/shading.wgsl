@@ -51,7 +51,7 @@ struct ShadingPoint {
 
 struct Shaded {
     below: vec3f, // light below the skin
-    leaving: vec3f, // fraction of it that leaves towards the eye
+    leaving: vec3f, // fraction of that light that leaves towards the eye
     local: vec3f, // light from below that is not diffused: of plain materials, and scattered once
     reflected: vec3f, // specular reflection
     depth: f32, // of skin [mm], else 0

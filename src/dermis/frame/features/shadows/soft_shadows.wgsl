@@ -1,6 +1,6 @@
 // Visibility of an area light from a point: shadow rays marched through the light's shadow map.
 
-const STEPS: u32 = 8u; // of a shadow ray
+const STEPS: u32 = 8u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface
 const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
@@ -69,7 +69,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     return select(0.0, 1.0 - f32(hidden) / f32(traced), traced > 0u);
 }
 
-// FourPoints points on a light or on its map, taken together so that their loads overlap.
+// Four points on a light or on its map, processed together so that their loads overlap.
 struct FourPoints {
     x: vec4f,
     y: vec4f,

@@ -9,11 +9,11 @@ struct Skin {
     strength: f32, // rho_s, oil included, where the specular map is 1
     f0: f32, // Schlick's reflectance at normal incidence
     eta: f32, // index of refraction
-    loss: f32, // factor of the specular albedo in the transmission: 0 without this term, 1, or the published pi
+    loss: f32, // factor of the specular albedo by which transmission is reduced: 0 for none, 1, or the published pi
     returned: f32, // 1 if light that the surface reflects back inside leaves in the end, else 0
     tint: f32, // 1 multiplies the reflection by the colour map, which is wrong for skin
     mix: f32, // exponent of the colour map that is applied before scattering
-    relief_band: f32, // mip of the height map from which the normal map has the relief, -1 for none
+    relief_band: f32, // mip level of the height map that has the size of the normal map, -1 without both; see record.py
     light_count: u32,
     eta_below: f32, // index of refraction of the half-space, 1 without a surface; see direction.wgsl
     mean_single_scattering: f32, // mean of 1/(a + b) over both directions

@@ -1,4 +1,4 @@
-// Direction factor of each source: what a deep slab transmits of its light, over what it transmits of uniform light of the same
+// Direction factor of each source: transmittance of a deep slab for its light, over that for uniform light of the same
 // diffuse reflectance.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/texels_beside.wgsl"

@@ -28,7 +28,7 @@ struct PairProfile {
 const ROW: u32 = 1024u; // pairs of a row of workgroups
 const PI: f32 = 3.14159265358979;
 const FINE: f32 = 8.0; // parts of a texel
-const FAR_MM2: f32 = 1e12; // stands for infinity
+const FAR_MM2: f32 = 1e12; // squared distance that counts as infinite
 const MIN_DISC: f32 = 0.3; // least fraction of a Gaussian within the largest distance of pairs; it is divided by that fraction
 
 // Three weights with a common exponent: nine bits each and five.

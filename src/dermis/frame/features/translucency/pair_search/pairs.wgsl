@@ -1,4 +1,4 @@
-// List of the pairs that hits.wgsl found, and the sources that are part of any.
+// List of the pairs that hits.wgsl found, and marks of the sources that are in a pair.
 //#include "each.wgsl"
 //#include "search.wgsl"
 
