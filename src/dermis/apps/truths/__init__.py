@@ -1,1 +1,1 @@
-"""Reference solutions that share no assumption with the renderer: Monte Carlo, path tracing, heat flow."""
+"""Reference solutions that share no assumption with the renderer: Monte Carlo, path tracing, diffusion."""

@@ -1,4 +1,4 @@
-"""Scripts run by Blender's Python in a separate process."""
+"""Separate process in which Blender's Python runs a script."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _INSTALL_HINT = (
 class BlenderTask(NamedTuple):
     """Description of a task of Blender, for error messages.
 
-    renderer : program named in the message
-    goal : infinitive such as "to render the head"
-    advice : what to do when the task fails
+    renderer : name of the program in the message
+    goal : purpose as an infinitive, such as "to render the head"
+    advice : what the user can do when the task fails
     """
 
     renderer: str
@@ -31,7 +31,7 @@ class BlenderTask(NamedTuple):
 
 
 def blender_python(python: str | Path | None = None) -> Path:
-    """Return the path of the Python with bpy: the argument, or else the variable DERMIS_BLENDER_PYTHON.
+    """Return the path of a Python with bpy: the argument, or by default the variable DERMIS_BLENDER_PYTHON.
 
     Raises DermisError when there is no such file.
     """
@@ -46,9 +46,11 @@ def blender_python(python: str | Path | None = None) -> Path:
 def run_blender(
     python: Path, script: Path, options: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
-    """Run a script in Blender's Python, isolated from modules in its folder and from the user's.
+    """Run a script in Blender's Python, without the user's modules and those beside the script.
 
-    Raises DermisError when it cannot be run, fails, or takes longer than the timeout.
+    options : command-line arguments of the script
+
+    Raises DermisError when the script cannot be run, fails, or takes longer than the timeout.
     """
     command = [str(python), "-I", str(script), *options]
     try:

@@ -48,13 +48,13 @@ _MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
 
 @dataclass(frozen=True, eq=False)
 class CyclesPass:
-    """One rendering by Cycles, black outside the head.
+    """Rendering by Cycles with one number of paths, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
-    coverage : (h, w) fraction of the pixel that the head covers
+    coverage : (h, w) fraction of each pixel that the head covers
     samples : paths per pixel
-    seconds : elapsed time; for the first pass including the scene and its acceleration structure
-    core_seconds : CPU time of all cores
+    seconds : elapsed time; for the first pass including the scene and its acceleration structure [s]
+    core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """
 
@@ -75,11 +75,11 @@ def cycles_render(
     method: Method = "random-walk",
     python: str | Path | None = None,
 ) -> PathTraced:
-    """Return the scene rendered by Cycles on the CPU, as the mean of 4 passes.
+    """Return the scene rendered by Cycles on the CPU, as the mean of 4 passes with variance.
 
-    Parameters are those of `cycles_passes`.
+    The parameters are those of `cycles_passes`, except:
 
-    samples : least number of paths per pixel
+    samples : smallest total number of paths per pixel
     """
     _check_samples(samples)
     samples_per_pass = -(-int(samples) // _PASS_COUNT)
@@ -110,12 +110,13 @@ def cycles_passes(
 
     There is no clamping, denoising or surface reflection.
 
-    medium : of one layer; its eta is ignored, because Cycles' random walks end at an index-matched surface.
-        Its colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`,
-        `BeckmannSurface` or `PrincipledSkin`
-    samples : paths per pixel, for each pass
-    settings : only the size is used
-    seed : of the first pass; each further pass uses the next
+    medium : medium with a single layer, whose index of refraction is ignored, as Cycles' random walks end at
+        an index-matched surface; its colour in Cycles is its diffuse reflectance, its radius 4 pi mean free
+        paths. Or a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`
+    samples : paths per pixel of each pass
+    settings : settings of the frame, of which only the size is used
+    method : subsurface method of Cycles
+    seed : random seed of the first pass; each further pass uses the next number
     python : path of a Python with `bpy`; by default the variable DERMIS_BLENDER_PYTHON
 
     Raises DermisError when there is no such Python, when Cycles fails, and for more than one layer.
@@ -173,9 +174,9 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """Surface reflection alone: a black body with a boundary of index 1.4 and Beckmann's facets.
+    """Skin with surface reflection alone: a black body with a boundary of index 1.4 and Beckmann facets.
 
-    It has the head's normal map.
+    The head's normal map is applied.
 
     roughness : Beckmann's m [-]
     """
@@ -187,11 +188,11 @@ class BeckmannSurface:
 class PrincipledSkin:
     """Skin as a Blender user makes it: Principled BSDF, a random walk below a rough boundary of index 1.4.
 
-    It has the head's normal map. Cycles uses GGX facets here; light that they reflect does not enter.
+    The head's normal map is applied. Cycles uses GGX facets here; light that they reflect does not enter.
 
     colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
-    radius_mm : (3,) Cycles' radius, 4 pi mean free paths [mm]
-    roughness : m [-]
+    radius_mm : (3,) subsurface radius of Cycles, 4 pi mean free paths [mm]
+    roughness : roughness m of the boundary [-]
     """
 
     colour: NDArray[np.float32]
@@ -207,7 +208,12 @@ FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, Numbers]]:
-    """Return the contents of scene.json without the passes, and the arrays of arrays.npz."""
+    """Return the JSON description of a scene for Cycles without its passes, and its arrays by name.
+
+    They are stored in scene.json and arrays.npz.
+
+    size : width and height of the picture [pixel]
+    """
     world, panorama = cycles_world(scene.environment)
     scene_dict = {
         "materials": _materials(scene.head, medium, method),
@@ -232,7 +238,10 @@ def describe_scene(
 
 
 def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (h, w, 3) tangent-space normals as colours, from slopes (h, w, 2)."""
+    """Return a normal map for Cycles: tangent-space normals (h, w, 3) encoded as colours.
+
+    slopes : (h, w, 2) slopes of the surface along u and v
+    """
     normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * normal, np.float32)
@@ -251,13 +260,14 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
 
 
 def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
-    """Return the skin's material: diffuse reflectance as colour, 4 pi mean free paths as radius.
+    """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
-    Cycles divides radii by 4 pi, and finds the albedo of its random walk from the colour by a fit whose
-    inverse is `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and
-    leaves through a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for the
-    same two numbers. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
-    % by the profile.
+    The colour is the diffuse reflectance of the medium, the radius 4 pi mean free paths. Cycles divides radii
+    by 4 pi, and finds the albedo of its random walk from the colour by a fit whose inverse is
+    `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and leaves through
+    a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for this colour and
+    radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5 % by the
+    profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)
@@ -278,7 +288,7 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
 
 
 def cycles_camera(scene: Scene) -> SceneDict:
-    """Return the camera in Cycles' units.
+    """Return Cycles' description of the scene's camera, in Cycles' units.
 
     Raises DermisError for lenses that Cycles does not support.
     """

@@ -19,7 +19,7 @@ from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
 
 def main(folder: Path) -> None:
-    """Render the scene in a folder and write the passes there."""
+    """Render the scene described in a folder and write the passes into that folder."""
     description = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
     with np.load(folder / "arrays.npz") as stored:
         arrays = dict(stored)
@@ -39,7 +39,7 @@ def main(folder: Path) -> None:
 
 
 def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
-    """Add the head's mesh with its materials, normals and uv coordinates."""
+    """Add the head's mesh with its materials, normals and texture coordinates to the scene."""
     positions, corners = arrays["positions"], arrays["triangles"]
     mesh = bpy.data.meshes.new("head")
     mesh.vertices.add(len(positions))
@@ -61,7 +61,11 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
 
 
 def make_material(description: dict[str, Any], maps: dict[str, Any]) -> Any:
-    """Return the material of a description, with its maps as images."""
+    """Return a new material.
+
+    description : shader and parameters of the material
+    maps : image arrays by name
+    """
     material = bpy.data.materials.new(description["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -91,7 +95,7 @@ def make_material(description: dict[str, Any], maps: dict[str, Any]) -> Any:
 
 
 def principled_shader(nodes: Any, links: Any, maps: dict[str, Any], description: dict[str, Any]) -> Any:
-    """Return a Principled BSDF with random-walk subsurface scattering and a colour map."""
+    """Return a Principled BSDF node with random-walk subsurface scattering and a colour map."""
     shader = nodes.new("ShaderNodeBsdfPrincipled")
     shader.distribution = "GGX"
     shader.subsurface_method = "RANDOM_WALK"
@@ -109,7 +113,7 @@ def principled_shader(nodes: Any, links: Any, maps: dict[str, Any], description:
 
 
 def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
-    """Connect the normal map, if there is one, to a shader."""
+    """Connect the normal map, if there is one, to a shader node."""
     if "normal_map" not in maps:
         return
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
@@ -120,7 +124,10 @@ def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any
 
 
 def packed_image(name: str, rows: Any) -> Any:
-    """Return an image packed into the file, from linear numbers (h, w, 3) with the top row first."""
+    """Return a Blender image that contains an array of linear colours.
+
+    rows : (h, w, 3) colours, top row first
+    """
     height, width, _ = rows.shape
     image = bpy.data.images.new(name, width, height, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
@@ -131,7 +138,10 @@ def packed_image(name: str, rows: Any) -> Any:
 
 
 def add_light(description: dict[str, Any]) -> None:
-    """Add a light from its description."""
+    """Add a light to the scene.
+
+    description : kind and parameters of the light
+    """
     light = bpy.data.lights.new("light", description["type"])
     for name, value in description["set"].items():
         setattr(light, name, value)
@@ -141,7 +151,10 @@ def add_light(description: dict[str, Any]) -> None:
 
 
 def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
-    """Shape a distant point light into a stripe by nodes: Gaussian across, constant along its length."""
+    """Turn a distant point light into a stripe light by shader nodes.
+
+    Its irradiance is Gaussian across the stripe and constant along it.
+    """
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
 
@@ -171,7 +184,7 @@ def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
 
 
 def connected(links: Any, node: Any, inputs: Any) -> Any:
-    """Set or connect the inputs of a node and return its first output."""
+    """Set the inputs of a shader node to values, or connect them to sockets; return its first output."""
     for socket, value in zip(node.inputs, inputs, strict=False):
         if isinstance(value, float):
             socket.default_value = value
@@ -181,7 +194,7 @@ def connected(links: Any, node: Any, inputs: Any) -> Any:
 
 
 def set_world(description: dict[str, Any], panorama: Any) -> None:
-    """Set a constant environment, or a panorama with its rotation."""
+    """Set the world to a uniform environment, or to a panorama with its rotation."""
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
     world.use_nodes = True
@@ -212,7 +225,7 @@ def set_camera(description: dict[str, Any]) -> None:
 
 
 def set_render(description: dict[str, Any]) -> None:
-    """Set the size, the file format and the settings of Cycles."""
+    """Set the resolution, the file format and the settings of Cycles."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = description["size"]
@@ -233,7 +246,7 @@ def set_render(description: dict[str, Any]) -> None:
 
 
 def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
-    """Render, and return the elapsed time and the CPU time of all cores [s]."""
+    """Render a pass to a file; return the elapsed time, and the CPU time summed over all cores [s]."""
     cycles = bpy.context.scene.cycles
     cycles.samples, cycles.seed = samples, seed
     bpy.context.scene.render.filepath = str(path)
@@ -243,7 +256,7 @@ def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
 
 
 def add_object(name: str, data: Any) -> Any:
-    """Return a new object of the scene with this data."""
+    """Add an object with the given data block to the scene and return it."""
     result = bpy.data.objects.new(name, data)
     bpy.context.collection.objects.link(result)
     return result

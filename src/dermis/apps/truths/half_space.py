@@ -13,8 +13,9 @@ _ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H function at cosines to the normal, in their shape [-].
+    """Return Chandrasekhar's H function, by which a half-space's reflection is given in closed form [-].
 
+    cosine : cosines of angles to the normal, of any shape
     albedo : single-scattering albedo, below 1 [-]
 
     Source: [Chandrasekhar1960] section 38, in its form without cancellation, iterated on Gaussian nodes.
@@ -31,20 +32,30 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return the reflectance for light from one direction, by the cosine of its angle to the normal [-]."""
+    """Return the reflectance of a half-space for parallel light [-].
+
+    cosine : cosine of the angle between light and normal
+    albedo : single-scattering albedo [-]
+    """
     return np.asarray(1.0 - np.sqrt(1.0 - albedo) * h_function(cosine, albedo))
 
 
 def diffuse_albedo(albedo: float) -> float:
-    """Return the reflectance for uniform light from all directions [-]."""
+    """Return the reflectance of a half-space for uniform light from all directions [-].
+
+    albedo : single-scattering albedo [-]
+    """
     mu, weight = _gauss_legendre()
     return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Return reflected radiance over the irradiance of parallel light, by cosines of light and view [1/sr].
+    """Return the radiance that a half-space reflects over the irradiance of parallel light [1/sr].
 
-    Source: [Chandrasekhar1960] section 33: S / (4 pi cos_in cos_out).
+    cosine_in, cosine_out : cosines between light and normal, and between view and normal
+    albedo : single-scattering albedo [-]
+
+    Source: [Chandrasekhar1960] section 33: S / (4 pi cosine_in cosine_out), with his scattering function S.
     """
     mu, view = np.asarray(cosine_in, np.float64), np.asarray(cosine_out, np.float64)
     H = h_function(mu, albedo) * h_function(view, albedo)

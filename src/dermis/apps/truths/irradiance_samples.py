@@ -15,11 +15,11 @@ from dermis.mesh.mesh import Mesh
 
 @dataclass(frozen=True)
 class MeshPoints:
-    """Points on a mesh.
+    """Points on the triangles of a mesh.
 
-    positions : (n, 3) [mm]
-    face : (n,) triangle of the mesh
-    barycentric : (n, 3) weights of its corners
+    positions : (n, 3) positions [mm]
+    face : (n,) index of each point's triangle
+    barycentric : (n, 3) weights of the triangle's corners
     """
 
     positions: Floats
@@ -27,7 +27,10 @@ class MeshPoints:
     barycentric: Floats
 
     def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> Floats:
-        """Return values (v, k) at the mesh's vertices interpolated at the points, (n, k)."""
+        """Return vertex values interpolated at the points, (n, k).
+
+        values : (v, k) values at the vertices of the mesh
+        """
         return _interpolate(values[mesh.triangles[self.face]], self.barycentric)
 
 
@@ -39,8 +42,8 @@ class IrradianceSamples:
     """Irradiance on a surface of small triangles, linear within each.
 
     positions : (n, 3) sample positions [mm]
-    triangles : (m, 3) indices of samples; the triangles cover the surface once
-    irradiance : (n, 3) at each sample, 0 or more
+    triangles : (m, 3) sample indices of the corners; the triangles cover the surface once
+    irradiance : (n, 3) irradiance at each sample, 0 or more
     """
 
     positions: Floats
@@ -55,13 +58,13 @@ def sample_irradiance(
     finest_mm: float | None = None,
     contrast: float = 0.05,
 ) -> IrradianceSamples:
-    """Return irradiance samples on the skin of a mesh, whose triangles are subdivided without smoothing.
+    """Return irradiance samples on a mesh, whose triangles are subdivided without smoothing.
 
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
-    finest_mm : sides with a high contrast are halved further, down to this length; None for no such step [mm]
-    contrast : difference of light between the ends of a side that counts as high, over the brightest sample
-        [-]
+    finest_mm : length down to which sides with a high contrast are halved further; None to keep them [mm]
+    contrast : irradiance difference between the ends of a side that counts as high, over the largest
+        irradiance [-]
 
     Samples at the corners of triangles with linear interpolation have a smaller error for their number than
     random points, points of even distances [Turk1992] or centres of triangles. A sum over points without
@@ -88,11 +91,11 @@ def sample_irradiance(
 
 @dataclass(frozen=True)
 class _Subdivision:
-    """Small triangles on a mesh.
+    """Small triangles that subdivide the triangles of a mesh.
 
     corners : (m, 3) sample indices
-    face : (m,) triangle of the mesh
-    barycentric : (m, 3, 3) weights of the corners in it
+    face : (m,) index of the mesh triangle that contains each small triangle
+    barycentric : (m, 3, 3) weights of each small corner in that mesh triangle
     """
 
     mesh: Mesh
@@ -132,7 +135,14 @@ def _edge_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
 
 
 def _add_longest_sides(side: Index, length: Floats, halved: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return edges to halve with the longest sides of their triangles added, which avoids slivers."""
+    """Return a mask of edges to halve that includes the longest edge of each affected triangle.
+
+    This avoids slivers.
+
+    side : (m, 3) edge index of each side of the triangles
+    length : (e,) lengths of the edges [mm]
+    halved : (e,) mask of edges to halve
+    """
     longest = np.take_along_axis(side, length[side].argmax(axis=1)[:, None], axis=1)[:, 0]
     halved = halved.copy()
     while (missing := halved[side].any(axis=1) & ~halved[longest]).any():
@@ -141,7 +151,11 @@ def _add_longest_sides(side: Index, length: Floats, halved: NDArray[np.bool_]) -
 
 
 def _bisect(subdivision: _Subdivision, side: Index, halved: NDArray[np.bool_]) -> _Subdivision:
-    """Return the subdivision with these edges (e,) halved in both of their triangles."""
+    """Return the subdivision with selected edges halved in all triangles that share them.
+
+    side : (m, 3) edge index of each side of the triangles
+    halved : (e,) mask of edges to halve
+    """
     new_index = subdivision.count + np.cumsum(halved) - 1
     corners, source, barycentric = split_triangles(
         subdivision.corners, subdivision.barycentric, np.where(halved, new_index, -1)[side]
@@ -150,7 +164,7 @@ def _bisect(subdivision: _Subdivision, side: Index, halved: NDArray[np.bool_]) -
 
 
 def _sample_points(subdivision: _Subdivision, first: int = 0) -> MeshPoints:
-    """Return the samples from index `first` on as points of the mesh."""
+    """Return the samples from index `first` on as points on the mesh."""
     count = subdivision.count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     face[subdivision.corners] = subdivision.face[:, None]

@@ -1,4 +1,4 @@
-"""Lights of a scene as Mitsuba and Cycles describe them; positions are in mm from the head's centre."""
+"""Conversion of a scene's lights for Mitsuba and Cycles; positions are in mm from the head's centre."""
 
 from __future__ import annotations
 
@@ -44,18 +44,21 @@ _MAX_STRIPE_TEXELS = 2**23
 def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
-    mi : the module, with a variant set
+    mi : module `mitsuba` with a variant set
     number : index of the light in the scene, for messages
 
     Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
-    kind: references use no approximations.
+    kind of light: references use no approximations.
     """
     _check_shadows(light, number, "path tracing")
     return MITSUBA[light.kind](mi, light, f"light {number}")
 
 
 def cycles_lamp(light: Light, number: int) -> SceneDict:
-    """Return Cycles' description of a light, in Cycles' units."""
+    """Return Cycles' description of a light, in Cycles' units.
+
+    number : index of the light in the scene, for messages
+    """
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)
 
@@ -67,13 +70,13 @@ def _check_shadows(light: Light, number: int, renderer: str) -> None:
 
 
 def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
-    """Return Mitsuba's point light."""
+    """Return Mitsuba's description of a point light."""
     intensity = np.multiply(light.irradiance, _distance(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
 
 
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
-    """Return a projector with the smooth edge of our spot light, which Mitsuba's spot does not have."""
+    """Return a Mitsuba projector for a spot light, whose smooth edge Mitsuba's spot light does not have."""
     tangent = np.tan(np.radians(light.outer_degrees))
     along = tangent * ((np.arange(_SPOT_TEXELS) + 0.5) / _SPOT_TEXELS * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
@@ -84,7 +87,7 @@ def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
 
 
 def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDict:
-    """Return a rectangle of uniform radiance."""
+    """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
     unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
@@ -92,7 +95,7 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
 
 
 def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
-    """Return a sphere of uniform radiance."""
+    """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
     unit = np.pi * (light.radius_mm / _distance(light)) ** 2
     return mitsuba_shape(
         "sphere",
@@ -114,7 +117,7 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> Sce
 
 
 def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
-    """Return a distant slide projector with the stripe as its slide."""
+    """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_HALF_EXTENT * width, length])
     texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
@@ -136,24 +139,24 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
 
 
 def cycles_point(light: PointLight) -> SceneDict:
-    """Return a point light, whose power P gives the irradiance P / 4 pi d^2."""
+    """Return Cycles' point light; its power P gives the irradiance P / (4 pi d^2) at the distance d."""
     return _cycles_point_light("POINT", light)
 
 
 def cycles_spot(light: SpotLight) -> SceneDict:
-    """Return a spot light, whose edge falls off smoothly in the cosine, like ours."""
+    """Return Cycles' spot light; its edge falls off smoothly in the cosine, as in dermis."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
     return _cycles_point_light("SPOT", light, spot_size=size, spot_blend=blend)
 
 
 def cycles_sphere(light: SphereLight) -> SceneDict:
-    """Return a point light with a radius."""
+    """Return Cycles' description of a sphere light: a point light with a radius."""
     return _cycles_point_light("POINT", light, radius_mm=light.radius_mm)
 
 
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
-    """Return an area light, whose power P gives a surface A the radiance P / pi A."""
+    """Return Cycles' area light; its power P gives the radiance P / (pi A) on its area A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
     unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
     to_target = np.subtract(light.target, light.position)
@@ -162,13 +165,13 @@ def cycles_rectangle(light: RectangleLight) -> SceneDict:
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:
-    """Return a sun with the light's angular diameter."""
+    """Return Cycles' sun with the angular diameter of a directional light."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 
 
 def cycles_stripe(light: StripeLight) -> SceneDict:
-    """Return a distant point light, which the script shapes into a stripe by nodes."""
+    """Return a distant point light, which cycles_script.py turns into a stripe light by shader nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
     power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
     source = light.position - _FAR_MM * forward
@@ -189,7 +192,9 @@ def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0,
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance from a rectangle of radiance 1 on a parallel surface opposite its centre [-].
+    """Return the irradiance of a rectangle of radiance 1 on a parallel surface in front of its centre.
+
+    width, height, distance : size of the rectangle, and its distance from the surface, in one unit
 
     Source: view factor from a corner, [Baum1989].
     """

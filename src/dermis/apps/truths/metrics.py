@@ -1,4 +1,4 @@
-"""Difference of an image from a reference: relative error without noise, energy ratio, FLIP."""
+"""Differences between an image and a reference: relative error without noise, energy ratio, FLIP."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MID_GREY = 0.5
 
 
 class Estimate(NamedTuple):
-    """Estimate with its standard error, 0 where the reference has no noise."""
+    """Estimated value with its standard error, which is 0 where the reference has no noise."""
 
     value: float
     standard_error: float
@@ -30,11 +30,11 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Flip:
-    """Perceived difference by FLIP, 0 to 1.
+    """Perceived difference of two pictures by FLIP, from 0 to 1.
 
     mean : mean over the mask
-    error : (h, w) 0 outside the mask
-    pixels_per_degree : assumed resolution at the eye
+    error : (h, w) difference of each pixel; 0 outside the mask
+    pixels_per_degree : assumed resolution at the viewer's eye
     """
 
     mean: float
@@ -53,10 +53,11 @@ def relative_rmse(
 
     It is the root of the sum of squared differences over the sum of the reference's squares.
 
-    image, reference : (h, w) or (h, w, c) linear; the channels count together
+    image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
-    variance : of each value of `reference`, an unbiased estimate: that of its samples over their number
-    image_variance : the same for the image, whose noise is then removed too
+    variance : unbiased estimate of the variance of each value of `reference`: the variance of its samples
+        over their number
+    image_variance : variance of each value of `image`, whose noise is then removed too
 
     With reference T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is
     that of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of
@@ -87,10 +88,10 @@ def relative_rmse(
 def energy_ratio(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Return the sum of the image over the sum of the reference [-]; parameters as in `relative_rmse`.
+    """Return the sum of the image over the sum of the reference [-].
 
-    The ratio's relative error is that of the reference's sum, whose variance is the sum of the variances;
-    channels may share paths, so their deviations are added.
+    The parameters are those of `relative_rmse`. The ratio's relative error is that of the reference's sum,
+    whose variance is the sum of the variances; channels may share paths, so their deviations are added.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())
@@ -101,14 +102,17 @@ def energy_ratio(
 
 
 def _sum_standard_error(variance: Floats) -> float:
-    """Return an upper bound of the standard error of a sum of pixels (n, c) with correlated channels."""
+    """Return an upper bound of the standard error of a sum over pixels with correlated channels.
+
+    variance : (n, c) variance of each pixel and channel
+    """
     return float(np.sqrt(np.maximum(variance.sum(axis=0), 0)).sum())
 
 
 def _masked_pixels(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None, variance: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return image, reference and variance of the pixels in the mask, each (n, c)."""
+    """Return image, reference and variance as (n, c) arrays of the pixels in the mask."""
     I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     s2 = np.zeros_like(T) if variance is None else np.asarray(variance, np.float64)
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
@@ -177,7 +181,7 @@ def signed_difference(image: ArrayLike, reference: ArrayLike, gain: float = 4.0)
     """Return an sRGB picture (h, w, 3) of image minus reference, mid-grey where they are equal.
 
     image, reference : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
-    gain : factor of the difference of sRGB values, whose steps look about even
+    gain : factor of the difference, which is taken between sRGB values as these are perceptually even
     """
     I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     if I.shape != T.shape or I.ndim != 3 or I.shape[2] != 3:

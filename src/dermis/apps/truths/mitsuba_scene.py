@@ -1,4 +1,4 @@
-"""Mitsuba scenes with the same head, lights, camera and pixels as ours, and a medium inside the skin."""
+"""Mitsuba scenes with a dermis scene's head, lights and camera, and with a medium inside the skin."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ _REPORTED_FOLD = 1e-3
 
 @dataclass(frozen=True)
 class Lambertian:
-    """Lambertian skin, lit by the lights alone and not by itself, as a render without scattering.
+    """Lambertian skin without scattering or interreflection, in place of a medium.
 
-    albedo : linear Rec. 709 [-]
+    albedo : diffuse reflectance, linear Rec. 709 [-]
     """
 
     albedo: tuple[float, float, float]
 
 
 def load_mitsuba() -> Mitsuba:
-    """Return the module `mitsuba` with no variant set.
+    """Return the module `mitsuba`, without a variant set.
 
     Raises DermisError when it is not installed.
     """
@@ -61,7 +61,7 @@ def load_mitsuba() -> Mitsuba:
 
 @contextmanager
 def mitsuba_variant(mi: Mitsuba, name: str) -> Iterator[None]:
-    """Set a variant of Mitsuba for a context, and restore the caller's own afterwards."""
+    """Set a variant of Mitsuba during a context, and restore the previous variant afterwards."""
     before = mi.variant()
     mi.set_variant(name)
     try:
@@ -72,7 +72,10 @@ def mitsuba_variant(mi: Mitsuba, name: str) -> Iterator[None]:
 
 
 def check_traceable(medium: Medium | Lambertian) -> None:
-    """Raise DermisError for a refracting surface, through which no path connects to a point light."""
+    """Raise DermisError for a refracting surface, and for media with other than three channels.
+
+    No path connects to a point light through a refracting surface.
+    """
     if isinstance(medium, Medium) and medium.eta != 1.0:
         actual = f"its index is {medium.eta:g}"
         refuse(medium.name, "an index-matched medium, for path tracing", actual, "Trace medium.with_eta(1.0)")
@@ -84,7 +87,7 @@ def check_traceable(medium: Medium | Lambertian) -> None:
 def radiance_scene(
     mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Return Mitsuba's scene for the radiance image, and notes on changes to the head."""
+    """Return the Mitsuba scene of the radiance image, and notes on changes made to the head."""
     shapes, notes = _head_shapes(mi, scene.head, medium)
     depth_limit = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS, because sampling by the extinction of one channel makes the others noisy.
@@ -95,7 +98,7 @@ def radiance_scene(
 def mitsuba_scene(
     mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, size: tuple[int, int]
 ) -> MitsubaObject:
-    """Return Mitsuba's scene of shapes with the lights, environment and camera of ours."""
+    """Return a Mitsuba scene of given shapes with the lights, environment and camera of a dermis scene."""
     lights = {f"light_{k}": mitsuba_emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = mitsuba_environment(mi, scene.environment)
@@ -104,7 +107,10 @@ def mitsuba_scene(
 
 
 def coverage_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: SceneDict) -> MitsubaObject:
-    """Return Mitsuba's scene whose image is the fraction of each pixel that shapes of radiance 1 cover."""
+    """Return a Mitsuba scene whose image is the fraction of each pixel that the skin covers.
+
+    shapes : head whose skin emits radiance 1, see `emissive_skin`
+    """
     sensor = mitsuba_sensor(mi, camera, size, sampler="multijitter")
     integrator = {"type": "path", "max_depth": 1}
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes})
@@ -131,7 +137,10 @@ def mitsuba_sensor(
 
 
 def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return shapes of skin and opaque materials, relative to the head's centre, and notes on them."""
+    """Return the shapes of skin and opaque materials, and notes on changes made to the head.
+
+    Positions are relative to the head's centre.
+    """
     opaque = {}
     for k in _materials_of_kind(head, "opaque"):
         colour = rgb(head.mesh.materials[k].colour)
@@ -146,7 +155,7 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
 
 
 def emissive_skin(mi: Mitsuba, head: Head) -> SceneDict:
-    """Return shapes of the head with skin that emits radiance 1 and all other materials black."""
+    """Return shapes of the head whose skin emits radiance 1, with all other materials black."""
     shapes = {}
     for k, material in enumerate(head.mesh.materials):
         attributes = {"bsdf": _diffuse_bsdf(mi, 0.0)}
@@ -167,7 +176,11 @@ def _diffuse_bsdf(mi: Mitsuba, reflectance: SceneDict | float) -> MitsubaObject:
 
 
 def _material_mesh(mi: Mitsuba, head: Head, index: int, **attributes: MitsubaObject) -> MitsubaObject:
-    """Return the triangles of a material with the head's own normals."""
+    """Return the triangles of a material as a Mitsuba mesh with the head's normals.
+
+    index : index of the material
+    attributes : BSDF, emitter and media
+    """
     mesh = head.mesh
     used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
     vertices = mesh.positions[used] - np.array(head.centre_mm)
@@ -175,7 +188,7 @@ def _material_mesh(mi: Mitsuba, head: Head, index: int, **attributes: MitsubaObj
 
 
 def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return surfaces around the skin and at each interface between layers, and notes on them."""
+    """Return closed surfaces around the skin and between its layers, and notes on changes to the head."""
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings closed, {skin.cap_area:.0f} mm2"] if skin.caps else []
@@ -198,7 +211,10 @@ def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDic
 
 
 def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
-    """Return the (p,) distance between the two surfaces of an interface of a centred solid [mm]."""
+    """Return the distance (p,) between the two surfaces that form an interface between media [mm].
+
+    skin : closed skin surface relative to the head's centre
+    """
     return np.asarray(_GAP_STEPS * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
@@ -215,7 +231,10 @@ def _homogeneous_medium(layer: Layer) -> SceneDict:
 
 
 def interface_mesh(mi: Mitsuba, solid: ClosedSurface, media: SceneDict) -> MitsubaObject:
-    """Return an invisible surface between two media: exterior and interior, None for vacuum."""
+    """Return a closed surface as an invisible Mitsuba mesh between two media.
+
+    media : exterior and interior medium; None for vacuum
+    """
     non_vacuum = {side: medium for side, medium in media.items() if medium is not None}
     invisible = mi.load_dict({"type": "null"})
     return mesh_shape(mi, solid.positions, solid.triangles, None, bsdf=invisible, **non_vacuum)
@@ -229,9 +248,10 @@ def mesh_shape(
     uv: Numbers | None = None,
     **attributes: MitsubaObject,
 ) -> MitsubaObject:
-    """Return triangles as a mesh of Mitsuba.
+    """Return triangles as a Mitsuba mesh.
 
-    vertices, normals, uv : (v, 3), (v, 3), (v, 2); None for flat shading, and for no textures
+    vertices, normals, uv : (v, 3), (v, 3), (v, 2); normals are None for flat shading, uv without textures
+    triangles : (f, 3) vertex indices
     attributes : BSDF, emitter and media
     """
     properties = mi.Properties()

@@ -20,11 +20,11 @@ _MAX_FOLDED = 0.02
 
 @dataclass(frozen=True)
 class ClosedSurface:
-    """Closed surface of triangles.
+    """Closed triangle surface that bounds a medium.
 
-    positions : (p, 3) [mm]
+    positions : (p, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
-    caps, cap_area : number of openings that were closed, and the area that this added [mm2]
+    caps, cap_area : number of openings that were closed, and the area of their caps [mm2]
     """
 
     positions: Floats
@@ -34,11 +34,11 @@ class ClosedSurface:
 
 
 def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
-    """Return the welded skin of a mesh, each opening closed by a triangle fan around its centroid.
+    """Return the skin with welded uv seams, and each opening closed by a triangle fan around its centroid.
 
-    name : of the head, for messages
+    name : name of the head, for messages
 
-    Raises DermisError when it encloses no volume: a single sheet, or a surface turned inside out.
+    Raises DermisError when the skin encloses no volume: a single sheet, or a surface turned inside out.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
@@ -57,7 +57,8 @@ def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
 def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[ClosedSurface, float]:
     """Return a surface offset inwards by a depth at each point, and the fraction of it that folds over.
 
-    depth_mm : (p,) negative for outwards
+    depth_mm : (p,) depth of each point; negative for an offset outwards [mm]
+    name : name of the head, for messages
 
     Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
     thin parts whose two sides pass through one another: none may be thinner than twice the depth.
@@ -76,7 +77,10 @@ def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[
 
 
 def _mitre_vectors(solid: ClosedSurface) -> Doubles:
-    """Return (p, 3) outward vectors that move the faces around a point by 1; at most 2 long."""
+    """Return the outward vector (p, 3) of each point that moves all faces around it by a distance of 1.
+
+    At sharp edges it is longer than 1, but at most 2.
+    """
     points = np.arange(len(solid.positions), dtype=np.int32)
     normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
     face = _area_vectors(solid.positions[solid.triangles])
@@ -104,7 +108,10 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return (n, 2) directed edges without an opposite edge, each as often as it lacks one."""
+    """Return the directed edges (n, 2) that lack an opposite edge, once for each missing one.
+
+    count : number of points
+    """
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
     edge, edge_of_side = np.unique(low * count + high, return_inverse=True)
@@ -115,7 +122,10 @@ def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
 
 
 def _edge_components(sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the index of the connected component of each edge, (n,)."""
+    """Return the index (n,) of the connected component, here an opening, to which each edge belongs.
+
+    sides : (n, 2) point indices of the edges
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -127,12 +137,18 @@ def _edge_components(sides: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _area_vectors(corners: Floats) -> Doubles:
-    """Return normals of triangles (f, 3, 3), as long as twice their area."""
+    """Return the normals of triangles (f, 3), with twice the triangle's area as their length.
+
+    corners : (f, 3, 3) corner positions
+    """
     vertices = corners.astype(np.float64)
     return np.cross(vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0])
 
 
 def _enclosed_volume(corners: Doubles) -> float:
-    """Return the enclosed volume [mm3]; negative for a surface turned inside out."""
+    """Return the volume enclosed by triangles [mm3]; negative for a surface turned inside out.
+
+    corners : (f, 3, 3) corner positions [mm]
+    """
     centred = corners - corners.mean(axis=(0, 1))
     return float((centred[:, 0] * np.cross(centred[:, 1], centred[:, 2])).sum() / 6.0)

@@ -1,4 +1,4 @@
-"""Octree over irradiance samples, with the light of each node approximated by three points."""
+"""Octree over irradiance samples, with the flux of each node approximated by three points."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ class Octree(NamedTuple):
     first, end : (n,) range of the node's triangles
     next_node : (n,) next node that is not inside this one
     centre : (n, 3) centroid of the light inside, weighted by irradiance and area [mm]
-    radius : (n,) of a ball around the centre that contains the node's triangles and its three points [mm]
-    points, flux : (n, 3, 3) the three points, and their flux by channel, which may be below 0 [mm, mm²]
+    radius : (n,) radius of a ball around the centre that contains the node's triangles and its three points
+        [mm]
+    points, flux : (n, 3, 3) three points that replace the node's light [mm], and their flux by channel, which
+        may be below 0 [mm²]
     second_moment, moment_error, centroid_error : (n,) error bounds of the three points, for the worst
         channel: sum of the mean square distances of the light and of the points from the centre [mm²],
         difference of their second moments [mm²], distance between their centroids [mm]
@@ -49,9 +51,10 @@ class Octree(NamedTuple):
 
 
 def build_octree(samples: IrradianceSamples) -> Octree:
-    """Return the octree of the triangles of irradiance samples.
+    """Return the octree over the triangles of irradiance samples.
 
-    Source: [JensenBuhler2002], with three points for each node and error bounds that decide when to open it.
+    Source: [JensenBuhler2002], with three points for each node and error bounds that decide when to descend
+    into its children.
     """
     middle = np.mean(samples.positions, axis=0)  # moments about a distant origin would lose precision
     corners = (np.asarray(samples.positions, np.float64) - middle)[samples.triangles]
@@ -83,7 +86,12 @@ def build_octree(samples: IrradianceSamples) -> Octree:
 
 
 def _morton_keys(points: Floats) -> Index:
-    """Return (m,) Morton keys of points: bits of their cells along z, y and x, interleaved by level."""
+    """Return the Morton key (m,) of each point, by which points are sorted into octree cells.
+
+    A key interleaves the bits of the cell's indices along z, y and x, level by level.
+
+    points : (m, 3) positions
+    """
     low = points.min(axis=0)
     size = max(float((points.max(axis=0) - low).max()), 1e-9)
     cell = np.minimum((points - low) / size * 2**_MAX_DEPTH, 2**_MAX_DEPTH - 1).astype(np.int64)
@@ -95,7 +103,10 @@ def _morton_keys(points: Floats) -> Index:
 
 
 def _nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
-    """Return the first triangle, the end and the next node of each node, from sorted Morton keys."""
+    """Return for each octree node its first triangle, the end of its triangles, and the next node.
+
+    morton_keys : (m,) sorted keys of the triangles
+    """
     starts, ends = [np.array([0])], [np.array([len(morton_keys)])]
     for level in range(_MAX_DEPTH - 1, -1, -1):
         bounds = np.flatnonzero(np.diff(morton_keys >> (3 * level), prepend=-1, append=-1))
@@ -112,7 +123,11 @@ def _nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
 
 
 def _bounding_radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats:
-    """Return the distance from each node's centre to the farthest corner of its bounding box [mm]."""
+    """Return the distance (n,) from each node's centre to the farthest corner of its bounding box [mm].
+
+    corners : (m, 3, 3) corners of the triangles [mm]
+    first, end : (n,) range of each node's triangles
+    """
     low = _reduce_nodes(np.minimum, corners.min(axis=1), first, end)
     high = _reduce_nodes(np.maximum, corners.max(axis=1), first, end)
     return np.asarray(np.linalg.norm(np.maximum(centre - low, high - centre), axis=1))
@@ -175,7 +190,11 @@ def _central_moments(
 
 
 def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return integrals over triangles of light (m, 3), of light times position, and times its outer product.
+    """Return integrals over triangles: of irradiance E, of E times position x, and of E times x xᵀ.
+
+    corners : (m, 3, 3) corner positions
+    irradiance : (m, 3) irradiance of one channel at the corners
+    area : (m,) areas of the triangles
 
     The integral of a product of three barycentric weights is 1/10, 1/30 or 1/60 of the area when three, two
     or none of them are the same; of two weights, 1/6 or 1/12.
@@ -191,7 +210,10 @@ def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tupl
 
 
 def _point_flux(flux: Floats, first_moments: list[Floats], axis_lengths: Floats, axes: Floats) -> Floats:
-    """Return (n, 3, 3) flux of each point and channel that preserves each channel's centroid in the plane."""
+    """Return the flux (n, 3, 3) of each node's points by channel.
+
+    It preserves each channel's flux, and its centroid in the plane of the points.
+    """
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), axes)
     lengths = axis_lengths[:, None]
     ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
@@ -199,7 +221,11 @@ def _point_flux(flux: Floats, first_moments: list[Floats], axis_lengths: Floats,
 
 
 def _reduce_nodes(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
-    """Return the reduction of the rows `first` to `end` - 1 of each node by a NumPy ufunc."""
+    """Return the values of each node's triangles reduced by a NumPy ufunc, such as np.add.
+
+    values : (m, ...) values of the triangles
+    first, end : (n,) range of each node's triangles
+    """
     # `reduceat` reduces between consecutive indices, so every other result belongs to a node; it also needs a
     # row after the last one.
     padded = np.concatenate((values, values[-1:]))

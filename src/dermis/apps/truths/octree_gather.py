@@ -24,7 +24,10 @@ _MAX_SUBDIVISIONS = 20
 
 
 class TriangleStack(NamedTuple):
-    """Stack of parts of a triangle: corners (p, 3, 3) [mm], irradiance at them (p, 3, 3), area (p,) [mm²]."""
+    """Stack of triangle pieces that are still to be gathered.
+
+    It has their corners (p, 3, 3) [mm], irradiance at the corners (p, 3, 3), and areas (p,) [mm²].
+    """
 
     corners: Floats
     irradiance: Floats
@@ -33,8 +36,9 @@ class TriangleStack(NamedTuple):
 
 @compiled
 def gather_exitance(points: Floats, tree: Octree, table: ProfileTable, bound: float, exitance: Floats) -> int:
-    """Add the light that leaves at each point (n, 3) to `exitance` (n, 3) and count the visited parts.
+    """Add the exitance at each point to `exitance` (n, 3), and return the number of visited nodes and pieces.
 
+    points : (n, 3) positions [mm]
     bound : upper bound of the sum of all errors, over the profile's energy times the irradiance nearby [-]
     """
     size = 3 * _MAX_SUBDIVISIONS + 4
@@ -81,7 +85,7 @@ def _gather_triangle(
     stack: TriangleStack,
     exitance: Floats,
 ) -> int:
-    """Add the light of a triangle, split in four until its parts are far enough, and count the parts."""
+    """Add the light of triangle t, split in four until its pieces are far enough, and count the pieces."""
     stack.corners[0], stack.irradiance[0], stack.area[0] = (tree.corners[t], tree.irradiance[t], tree.area[t])
     count, visit_count = 1, 0
     while count > 0:
@@ -115,7 +119,10 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
 def _add_midpoints(
     point: Floats, i: int, stack: TriangleStack, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add a part's light by the midpoints of its sides, exact to second order in light times profile."""
+    """Add the light of a triangle piece by the midpoints of its sides.
+
+    This quadrature is exact to second order in the product of irradiance and profile.
+    """
     corners, irradiance, scale = stack.corners[i], stack.irradiance[i], stack.area[i] / 6.0
     for a in range(3):
         b = (a + 1) % 3
@@ -130,7 +137,7 @@ def _add_midpoints(
 
 @compiled
 def _split_triangle(i: int, stack: TriangleStack) -> None:
-    """Replace part i of the stack by its four quarters, i to i + 3."""
+    """Replace piece i of the stack by its four quarters, pieces i to i + 3."""
     stack.area[i : i + 4] = 0.25 * stack.area[i]
     for values in (stack.corners, stack.irradiance):
         for axis in range(3):
@@ -149,7 +156,11 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 @compiled
 def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[int, int]:
-    """Return the table rows at or before the nearest, and at or after the farthest point of a ball."""
+    """Return the rows of the profile's table that bracket all radii to points of a ball.
+
+    distance : distance of the ball's centre [mm]
+    radius : radius of the ball [mm]
+    """
     last = len(table.error_density) - 1
     near = int(math.sqrt(max(distance - radius, 0.0)) * table.rows_per_root)
     far = int(math.sqrt(distance + radius) * table.rows_per_root) + 1
@@ -160,7 +171,7 @@ def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[in
 def _add_flux(
     distance: float, red: float, green: float, blue: float, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add flux times the profile at a distance, interpolated in the table."""
+    """Add flux by channel times the profile at a distance, interpolated in its table, to `exitance`."""
     row_position = math.sqrt(distance) * table.rows_per_root
     row = int(row_position)
     if row < len(table.R) - 1:

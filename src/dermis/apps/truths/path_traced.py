@@ -48,9 +48,9 @@ class PathTraced:
 
     image : (h, w, 3) radiance, linear Rec. 709
     variance : (h, w, 3) variance of each value of the image
-    mask : (h, w) fraction of the pixel that visible skin covers
+    mask : (h, w) fraction of each pixel that visible skin covers
     samples : paths per pixel
-    seconds : time of all paths
+    seconds : duration of tracing all paths [s]
     notes : changes that were made to the head
     """
 
@@ -78,16 +78,16 @@ def path_trace(
     paths connect to point lights from inside the medium; compare with profiles for eta 1. Lights are
     invisible and do not shadow one another.
 
-    medium : index-matched (eta 1), isotropic, with three channels; layers become nested bodies, each
-        interface the skin offset inwards by its depth. Or a `Lambertian`, for directly lit skin without
-        scattering
-    samples : least number of paths per pixel, in passes of 4. Passes are cached on disk by the scene's
+    medium : index-matched (eta 1), isotropic medium with three channels; layers become nested bodies, whose
+        interfaces are the skin offset inwards by their depths. Or a `Lambertian`, for directly lit skin
+        without scattering
+    samples : smallest number of paths per pixel, in passes of 4. Passes are cached on disk by the scene's
         content, so a later call with more samples adds to them
-    settings : only the size is used
-    variant : of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM (14 and
-        15 end the process), "cuda_ad_rgb" needs an NVIDIA GPU
+    settings : settings of the frame, of which only the size is used
+    variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
+        (14 and 15 end the process), "cuda_ad_rgb" needs an NVIDIA GPU
     use_cache : whether to read and write passes on disk; without it `seconds` is the time of this call
-    progress : called with the number of finished passes and the number of all passes
+    progress : function called with the number of finished passes and the number of all passes
 
     Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
     under a refracting surface, lights without shadows.
@@ -121,7 +121,7 @@ def render_passes(
     build_coverage: Callable[[], MitsubaObject],
     progress: ProgressCallback | None,
 ) -> PathTraced:
-    """Return the mean of at least `target_count` passes, including cached ones.
+    """Return the mean of at least `target_count` passes of Mitsuba, including cached ones.
 
     key : name of the cached passes; None for no cache
     build_radiance, build_coverage : functions that build Mitsuba's scenes of the radiance, with notes, and of
@@ -146,9 +146,9 @@ def render_passes(
 
 
 def pass_count(samples: int) -> int:
-    """Return the number of passes with at least this many samples per pixel.
+    """Return the number of passes that have at least `samples` paths per pixel in total.
 
-    Raises DermisError for none and for too many.
+    Raises DermisError for a number below 1 or too large.
     """
     if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES):
         refuse("samples", f"a whole number from 1 to {_MAX_SAMPLES}", f"got {samples}", "Correct it")
@@ -163,7 +163,10 @@ def add_passes(
     key: str | None,
     progress: ProgressCallback | None,
 ) -> None:
-    """Render passes of Mitsuba's scene until there are `target_count`; with a key, cache them in any case."""
+    """Render passes of a Mitsuba scene until there are `target_count`, and cache them.
+
+    key : name of the cached passes; None for no cache
+    """
     last_save = time.perf_counter()
     try:
         while passes.count < target_count:
@@ -188,12 +191,14 @@ _CACHE_VERSION = 1  # increase when the result for the same scene changes
 
 @dataclass
 class Passes:
-    """Running mean and squared deviation of passes with equal settings.
+    """Running mean and variance of passes with equal settings.
 
     mean : (h, w, 3) mean of all passes
-    spread : (h, w, 3) sum of their squared deviations from the mean
+    spread : (h, w, 3) sum of the passes' squared deviations from the mean
     mask : (h, w) fraction of each pixel that skin covers
-    seconds : time of all passes
+    notes : changes that were made to the head
+    count : number of passes
+    seconds : duration of all passes [s]
     """
 
     mean: Doubles
@@ -205,17 +210,20 @@ class Passes:
 
     @classmethod
     def empty(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
-        """Return the state before the first pass of an image (width, height)."""
+        """Return the state before the first pass.
+
+        size : width and height of the image [pixel]
+        """
         shape = (size[1], size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
 
     @property
     def variance(self) -> Doubles:
-        """Return the variance of the mean, (h, w, 3)."""
+        """Return the variance (h, w, 3) of the mean of all passes."""
         return self.spread / (self.count * (self.count - 1))
 
     def add(self, image: Doubles, seconds: float) -> None:
-        """Add a pass (h, w, 3). Source: [Welford1962]."""
+        """Update mean and squared deviations with a pass (h, w, 3), by [Welford1962]."""
         self.count += 1
         self.seconds += seconds
         delta = image - self.mean
@@ -224,7 +232,7 @@ class Passes:
 
 
 def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
-    """Add camera, lights and environment of a scene to a hash."""
+    """Update a hash with the camera, lights and environment of a scene."""
     for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
         digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
     if scene.environment is not None:  # the content of the file may change
@@ -232,7 +240,7 @@ def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
 
 
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
-    """Return a hash of everything that the image depends on.
+    """Return a hash of all inputs of a path-traced image, which names its cached passes.
 
     trace_settings : versions and settings of the path tracer
     """
@@ -252,7 +260,7 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
 
 
 def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
-    """Return cached passes, or None when there are none of this key and size."""
+    """Return cached passes, or None if none have this key and size."""
     found = load_arrays(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (size[1], size[0], 3):
         return None
@@ -262,5 +270,5 @@ def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
 
 
 def save_passes(key: str, passes: Passes) -> None:
-    """Write passes to the cache; a full or broken disk does no harm."""
+    """Write passes to the cache, ignoring errors of the disk."""
     try_save_arrays(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

@@ -23,7 +23,10 @@ MAX_EVENTS = 100_000
 
 
 class LayerStack(NamedTuple):
-    """Optical properties of layers with air on both sides (layers + 2,), and face depths (layers + 1,)."""
+    """Optical properties of each layer and of the air on both sides, and the depths of the faces.
+
+    The properties have shape (layers + 2,), the depths (layers + 1,).
+    """
 
     eta: Floats
     sigma_t: Floats
@@ -33,10 +36,11 @@ class LayerStack(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Numbers of photons by where they ended. The last ring is everything beyond the last edge.
+    """Numbers of photons by how their walk ended.
 
-    reflected, transmitted : (rings + 1,) left the stack above or below after scattering
-    unscattered : (2,) left the stack above and below without scattering
+    reflected, transmitted : (rings + 1,) left above or below after scattering, by ring of the exit point; the
+        last entry is beyond the last ring
+    unscattered : (2,) left above and below without scattering
     absorbed : (layers,) absorbed in each layer
     unfinished : (1,) dropped after `MAX_EVENTS` events
     """
@@ -68,7 +72,7 @@ def next_uint64(rng: RandomState) -> np.uint64:
 
 @compiled
 def uniform(rng: RandomState) -> float:
-    """Return a random number strictly between 0 and 1, so that its logarithm is finite and not 0."""
+    """Return a random number strictly between 0 and 1, whose logarithm is finite and not 0."""
     return ((next_uint64(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
@@ -122,7 +126,10 @@ def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[f
 
 @compiled
 def _ring_index(x: float, y: float, edges2: Floats) -> int:
-    """Return the index of the ring that contains a point, from squared edges (n + 1,); n beyond the last."""
+    """Return the index of the ring around the axis that contains a point (x, y); n beyond the last ring.
+
+    edges2 : (n + 1,) squared radii of the ring edges
+    """
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
@@ -138,7 +145,10 @@ def _tally_exit(x: float, y: float, upward: bool, scatterings: int, edges2: Floa
 
 @compiled
 def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
-    """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed."""
+    """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed.
+
+    edges2 : (n + 1,) squared radii of the ring edges
+    """
     x = y = z = ux = uy = 0.0
     uz = 1.0
     layer, bottom = 1, len(stack.eta) - 2
@@ -176,7 +186,9 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ta
 
 @compiled
 def trace_photons(photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
-    """Trace this number of photons and add their ends to the tally.
+    """Trace a number of photons and add them to the tally by how their walks end.
+
+    edges2 : (n + 1,) squared radii of the ring edges
 
     Source: [Wang1995], except that absorption removes a photon completely or not at all.
     """

@@ -1,4 +1,4 @@
-"""Diffusion profiles as fine tables with bounds of their derivatives, for surface integrals."""
+"""Diffusion profiles as dense tables with bounds of their derivatives, for surface integrals."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _FAR_ERROR_FRACTION = 0.2
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v), independent of the renderer's own class.
+    """Diffusion profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v), apart from the renderer's own class.
 
     weight : (k, 3) energy of each Gaussian, by channel [-]
-    variance_mm2 : (k,) v [mm²]
+    variance_mm2 : (k,) variance v of each Gaussian [mm²]
     """
 
     weight: Floats
@@ -37,7 +37,7 @@ class GaussianSum:
         return float(np.sqrt(-2 * np.log(_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
         r, v = radius_mm[:, None], np.asarray(self.variance_mm2)
         gaussian = np.exp(-(r**2) / (2 * v)) / (2 * np.pi * v)
         weight = np.asarray(self.weight)
@@ -46,10 +46,12 @@ class GaussianSum:
 
 @dataclass(frozen=True)
 class RadialTable:
-    """Profile R(r) by monotone cubic interpolation: constant below the first radius, 0 beyond the last.
+    """Diffusion profile R(r) by monotone cubic interpolation of a table.
 
-    radius_mm : (n,) increasing, 0 or more [mm]
-    reflectance : (n, 3) R [mm^-2]
+    It is constant below the first radius and 0 beyond the last.
+
+    radius_mm : (n,) increasing radii, 0 or more [mm]
+    reflectance : (n, 3) R(r) at these radii [mm^-2]
     """
 
     radius_mm: Floats
@@ -61,7 +63,7 @@ class RadialTable:
         return float(self.radius_mm[-1])
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R, dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
         from scipy.interpolate import PchipInterpolator
 
         r, R = np.asarray(self.radius_mm, np.float64), np.asarray(self.reflectance, np.float64)
@@ -76,7 +78,9 @@ Profile = GaussianSum | RadialTable
 
 
 class ProfileTable(NamedTuple):
-    """Profile tabulated by the square root of the radius, with `rows_per_root` rows per mm^(1/2).
+    """Diffusion profile tabulated by the square root of the radius, with bounds of its derivatives.
+
+    There are `rows_per_root` rows per mm^(1/2).
 
     R : (rows, 3) profile [mm^-2], 0 in the last row
     slope : (rows,) upper bound of |dR/dr| from this radius on, over the profile's energy [mm^-3]
@@ -92,7 +96,7 @@ class ProfileTable(NamedTuple):
 
 
 def tabulate_profile(profile: Profile) -> ProfileTable:
-    """Return the table of a profile.
+    """Return the table of a profile, with the permitted error distributed over the radii.
 
     A patch of second moment m about its centre, replaced by a point there, causes an error of up to m times
     the curvature. The fewest patches for a given sum of such errors have m proportional to 1 /
@@ -122,7 +126,12 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
 
 
 def _upper_bound(values: Floats, energy: Floats, nonzero: NDArray[np.bool_]) -> Floats:
-    """Return (rows,) the largest value of any channel from each radius on; 0 in the last row."""
+    """Return the largest value (rows,) of any channel from each radius on, over the energy.
+
+    values : (rows, 3) function of the radius by channel
+    energy : (3,) energy of the profile
+    nonzero : (3,) mask of channels with energy
+    """
     largest = np.max(values[:, nonzero] / energy[nonzero], axis=1)
     bound: Floats = np.maximum.accumulate(largest[::-1])[::-1].copy()
     bound[-1] = 0.0
@@ -138,6 +147,9 @@ def _error_density(curvature: Floats, r: Floats) -> Floats:
 
 
 def _plane_integral(values: Floats, r: Floats) -> Floats:
-    """Return the integral of 2 pi r values dr, for each column of values (rows, k)."""
+    """Return the integral of radial functions over the plane: of 2 pi r f(r) dr, for each column.
+
+    values : (rows, k) functions f at the radii r
+    """
     rings = np.pi * np.diff(r**2)[:, None]
     return np.asarray((0.5 * (values[1:] + values[:-1]) * rings).sum(axis=0))

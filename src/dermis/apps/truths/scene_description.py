@@ -1,4 +1,4 @@
-"""Positions, colours, shapes and environments in the conventions of Mitsuba and Cycles."""
+"""Conversion of positions, colours, shapes and environments to the conventions of Mitsuba and Cycles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ _TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def check_camera(camera: Camera, renderer: str) -> None:
-    """Raise DermisError for a shifted principal point or non-square pixels."""
+    """Raise DermisError for a shifted principal point or non-square pixels, which references lack.
+
+    renderer : name of the renderer in the message
+    """
     if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
         expected = f"a principal point in the middle and square pixels, for {renderer}"
         actual = f"got principal_point {camera.principal_point} and pixel_aspect {camera.pixel_aspect:g}"
@@ -42,7 +45,7 @@ def rgb(components: Iterable[float]) -> SceneDict:
 
 
 def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _Y_AXIS) -> MitsubaObject:
-    """Return the transform to world space with +Z from the origin to the target and Y upwards."""
+    """Return Mitsuba's transform of an object at `origin` that looks along +Z towards `target`, Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
         up = (1.0, 0.0, 0.0)
@@ -50,7 +53,11 @@ def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _Y
 
 
 def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneDict:
-    """Return a shape that emits light and neither casts shadows nor reflects."""
+    """Return Mitsuba's description of an emitting shape that neither casts shadows nor reflects.
+
+    kind : Mitsuba's name of the shape
+    shape : further properties of the shape
+    """
     emitter = {"type": "area", "radiance": rgb(radiance)}
     return {"type": kind, **shape, "bsdf": {"type": "null"}, "emitter": emitter}
 
@@ -58,9 +65,10 @@ def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneD
 def mitsuba_projector(
     mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_tangent: float
 ) -> SceneDict:
-    """Return a projector with an intensity (h, w, 3) per texel of its slide [irradiance mm2].
+    """Return Mitsuba's projector with a given intensity for each texel of its slide.
 
-    cosine : (h, w) cosine of the angle from the axis
+    intensity : (h, w, 3) radiant intensity [irradiance mm2]
+    cosine : (h, w) cosine of the angle between texel and axis
     half_tangent : tangent of half the horizontal field of view
     """
     # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, over pi.
@@ -81,7 +89,7 @@ def mitsuba_projector(
 
 
 def cycles_look_at(position: Vector, forward: Vector, up: Vector = _Y_AXIS) -> list[list[float]]:
-    """Return the matrix to world space, in Cycles' units, of an object that looks along -Z with Y upwards."""
+    """Return the world matrix, in Cycles' units, of an object that looks along -Z with Y upwards."""
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, UNIT_MM)])
@@ -89,7 +97,7 @@ def cycles_look_at(position: Vector, forward: Vector, up: Vector = _Y_AXIS) -> l
 
 
 def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
-    """Return unit vectors to the right, upwards and forward."""
+    """Return the unit vectors of a camera to the right, upwards and forward."""
     view_direction = np.asarray(forward, np.float64) / np.linalg.norm(forward)
     right = np.cross(view_direction, up)
     if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):
@@ -101,7 +109,13 @@ def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
 def cycles_light(
     kind: str, irradiance: Vector, factor: float, position: Vector, forward: Vector, **given: float | str
 ) -> SceneDict:
-    """Return a light of Cycles whose energy is the irradiance times a factor."""
+    """Return Cycles' description of a light.
+
+    kind : Cycles' type of the light
+    irradiance : (3,) irradiance of the light in dermis
+    factor : factor from irradiance to Cycles' energy of the light
+    given : further properties of the light
+    """
     brightest = float(max(irradiance))
     colour = [float(component) / brightest if brightest > 0.0 else 0.0 for component in irradiance]
     fields: SceneDict = {"color": colour, "energy": brightest * float(factor), **given}
@@ -126,7 +140,7 @@ def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
 
 
 def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, NDArray[np.float32]]]:
-    """Return Cycles' description of an environment and the panorama as an array."""
+    """Return Cycles' description of an environment, and its panorama as an array by name."""
     if environment is None:
         return {"strength": 0.0}, {}
     world: SceneDict = {"strength": environment.exposure}
@@ -144,6 +158,9 @@ def _rotation(environment: Environment) -> Floats:
 
 
 def _with_poles(panorama: Floats) -> Floats:
-    """Return (h + 1, w, 3) values at the edges of rows: Mitsuba's first and last rows are at the poles."""
+    """Return a panorama resampled so that its first and last rows are at the poles, as in Mitsuba.
+
+    panorama : (h, w, 3) radiance at the centres of rows; the result has h + 1 rows
+    """
     between_rows = 0.5 * (panorama[1:] + panorama[:-1])
     return np.concatenate((panorama[:1], between_rows, panorama[-1:]))

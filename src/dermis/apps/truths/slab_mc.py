@@ -34,7 +34,7 @@ _REPORTED_LOSS = 1e-3
 
 
 def default_ring_edges() -> Floats:
-    """Return the edges of a disc of 0.001 mm and of 92 rings, each 12 % wider than the last [mm]."""
+    """Return the default radii of ring edges: a disc of 0.001 mm and 92 rings, each 12 % wider [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -47,11 +47,11 @@ def trace_slab(
 ) -> SlabResult:
     """Trace a pencil beam at normal incidence through a stack of layers in air.
 
-    layers : topmost first; interfaces between unequal indices of refraction reflect and refract
+    layers : layers, topmost first; interfaces between unequal indices of refraction reflect and refract
     photons : number of photons; standard errors fall with its square root
-    seed : the same seed gives the same result on any number of processors
+    seed : random seed, which gives equal results on any number of processors
     edges_mm : (n + 1,) radii of the ring edges, from 0; None for `default_ring_edges` [mm]
-    progress : called with the number of finished batches and the number of all batches
+    progress : function called with the number of finished batches and the number of all batches
 
     Source: [Wang1995].
     """
@@ -71,8 +71,8 @@ def trace_medium(
 ) -> list[SlabResult]:
     """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
-    g : mean cosine of the scattering angle in all layers; scattering is the reduced coefficient over 1 - g
-        [-]
+    g : mean cosine of the scattering angle in all layers, whose scattering coefficient is the reduced one
+        over 1 - g [-]
     """
     check_anisotropy(g)
     results: list[SlabResult] = []
@@ -95,11 +95,11 @@ def monte_carlo_profile(
     g: float = 0.0,
     progress: Callable[[int, int], None] | None = None,
 ) -> RadialProfile:
-    """Return R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
+    """Return the diffusion profile of a medium by Monte Carlo, averaged over rings, with standard errors.
 
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; R is then per incident power
-    photons : number per channel or wavelength
-    g : mean cosine of the scattering angle; the reduced scattering coefficient stays the same [-]
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; the profile is then per incident power
+    photons : number of photons per channel or wavelength
+    g : mean cosine of the scattering angle; the reduced scattering coefficient is kept [-]
 
     Source: [Wang1995].
     """
@@ -251,10 +251,10 @@ def check_anisotropy(g: float) -> None:
 
 @dataclass(frozen=True)
 class ScatteringLayer:
-    """One homogeneous layer at one wavelength, with the phase function of Henyey and Greenstein.
+    """Homogeneous layer at one wavelength, with the phase function of Henyey and Greenstein.
 
-    sigma_a, sigma_s : coefficients of absorption and (not reduced) scattering, 0 or more [1/mm]
-    thickness_mm : infinite for a half-space [mm]
+    sigma_a, sigma_s : absorption and (not reduced) scattering coefficient, 0 or more [1/mm]
+    thickness_mm : thickness; infinite for a half-space [mm]
     g : mean cosine of the scattering angle [-]
     eta : index of refraction relative to air [-]
     """
@@ -266,7 +266,7 @@ class ScatteringLayer:
     eta: float = SKIN_ETA
 
     def __post_init__(self) -> None:
-        """Raise DermisError for values outside their range."""
+        """Raise DermisError for properties outside their range."""
         culprit = "scattering layer"
         if not (0.0 <= self.sigma_a < np.inf and 0.0 <= self.sigma_s < np.inf):
             actual = f"got absorption {self.sigma_a:g} and scattering {self.sigma_s:g}"
@@ -330,7 +330,7 @@ class SlabResult:
 
     @property
     def per_entering(self) -> SlabResult:
-        """Return the result relative to the power that enters the stack, as in diffusion profiles."""
+        """Return all fractions relative to the power that enters the stack, as in diffusion profiles."""
         names = [field.name for field in fields(self)][3:]
         entering_fraction = 1.0 - self.specular
         scaled = {name: getattr(self, name) / entering_fraction for name in names}

@@ -1,4 +1,4 @@
-"""Diffusion of light along a surface as heat: the result that a blur should have on any uv map.
+"""Diffusion of light along a surface by the heat equation: the exact result of a blur on any uv map.
 
 A Gaussian of variance v on a surface is heat diffused for the time v/2. The heat equation is solved on the
 triangles themselves, so no uv map, seam or stretch plays a part. Open borders are insulated (Neumann).
@@ -43,11 +43,11 @@ def diffuse_on_surface(
     Each level starts from the one before. Time steps are by TR-BDF2, which is of second order and, unlike the
     Crank-Nicolson scheme, does not oscillate around points of light.
 
-    positions : (n, 3) without duplicates, see `welded_surface` [mm]
-    triangles : (f, 3)
-    values : (n, c) at the vertices, linear in between
-    variances_mm2 : (k,) increasing, above 0 [mm2]
-    steps : time steps per level
+    positions : (n, 3) vertex positions without duplicates, see `welded_surface` [mm]
+    triangles : (f, 3) vertex indices
+    values : (n, c) values at the vertices, linear in between
+    variances_mm2 : (k,) increasing variances above 0 [mm2]
+    steps : number of time steps per level
 
     Raises DermisError when edges are longer than half the standard deviation that a level adds;
     `refine_patch` makes them shorter.
@@ -66,21 +66,23 @@ def diffuse_on_surface(
 
 
 def welded_surface(mesh: Mesh) -> tuple[Floats, Index]:
-    """Return the positions (p, 3) [mm] without the duplicates of uv seams, and the triangles (f, 3)."""
+    """Return a mesh without duplicate vertices at uv seams: positions (p, 3) [mm] and triangles (f, 3)."""
     return mesh.points_mm, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
-    """Return the length of the longest edge [mm]."""
+    """Return the length of the longest edge of a triangle mesh [mm]."""
     vertices, corners = _checked_surface(positions, triangles)
     return float(triangle_edges(vertices, corners)[2].max())
 
 
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
-    """Return the mask (k,) of levels that edges resolve: each adds a sigma of at least two edges to the last.
+    """Return the mask (k,) of blur levels that edges of a given length resolve.
 
-    variances_mm2 : (k,) increasing, above 0 [mm2]
-    edge_mm : longest edge, see `longest_edge_mm`
+    A level is resolved if the standard deviation that it adds is at least two edges.
+
+    variances_mm2 : (k,) increasing variances above 0 [mm2]
+    edge_mm : length of the longest edge, see `longest_edge_mm` [mm]
     """
     min_variance, last_variance, allowed = (EDGES_PER_SIGMA * edge_mm) ** 2, 0.0, []
     for variance in _checked_variances(variances_mm2):
@@ -90,18 +92,30 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 
 
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
-    """Return the longest edge that resolves all levels, half the smallest sigma that a level adds [mm]."""
+    """Return the longest edge that resolves all blur levels [mm].
+
+    It is half the smallest standard deviation that a level adds.
+
+    variances_mm2 : (k,) increasing variances above 0 [mm2]
+    """
     min_variance = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(min_variance)) / EDGES_PER_SIGMA
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return the margin of a patch beyond its radius, four standard deviations of the widest level [mm]."""
+    """Return how far a patch must extend beyond its radius: four deviations of the widest level [mm].
+
+    variances_mm2 : (k,) increasing variances [mm2]
+    """
     return MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
 
 def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
-    """Return values after diffusion for the time variance/2."""
+    """Return vertex values after diffusion by the heat equation for the time variance/2.
+
+    mass, stiffness : matrices from `mass_and_stiffness`
+    steps : number of time steps
+    """
     step = variance / 2 / steps
     solve = _factorised((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
     explicit = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
@@ -114,7 +128,10 @@ def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: fl
 
 
 def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Return a solver for a symmetric, positive definite matrix, by sparse LU without pivoting."""
+    """Return a function that solves a linear system, by sparse LU factorisation without pivoting.
+
+    matrix : symmetric, positive definite matrix
+    """
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
@@ -167,11 +184,11 @@ _MAX_SWEEPS = 1000
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Triangles known by their edge lengths; their places in space do not matter.
+    """Triangulation given by its edge lengths alone, without positions in space.
 
-    corners : (f, 3) vertices; side k runs from corner k to corner k + 1
-    side : (f, 3) edge of each side
-    length : (e,) of each edge [mm]
+    corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1
+    side : (f, 3) edge index of each side
+    length : (e,) length of each edge [mm]
     """
 
     corners: Index
@@ -179,23 +196,25 @@ class Triangulation:
     length: Floats
 
     def areas(self) -> Floats:
-        """Return areas (f,) [mm2] by Kahan's form of Heron's formula, which is safe for slivers."""
+        """Return the areas (f,) by Kahan's form of Heron's formula, which is accurate for slivers [mm2]."""
         c, b, a = np.sort(self.length[self.side], axis=1).T
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
         return np.asarray(np.sqrt(np.maximum(product, 0)) / 4)
 
     def cotangents(self) -> Floats:
-        """Return the cotangent of the angle opposite each side (f, 3)."""
+        """Return the cotangent (f, 3) of the angle opposite each side."""
         square = self.length[self.side] ** 2
         law_of_cosines = square.sum(axis=1, keepdims=True) - 2 * square
         return np.asarray(law_of_cosines / (4 * self.areas()[:, None]))
 
 
 def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulation:
-    """Return triangles by edge lengths; a tiny length is added to all edges if a triangle is degenerate.
+    """Return the edge lengths of a triangle mesh as a triangulation.
 
-    positions : (n, 3) [mm]
-    triangles : (f, 3)
+    A tiny length is added to all edges if a triangle is degenerate.
+
+    positions : (n, 3) vertex positions [mm]
+    triangles : (f, 3) vertex indices
 
     Source: [SharpCrane2020], intrinsic mollification.
     """
@@ -206,9 +225,9 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulatio
 
 
 def delaunay(surface: Triangulation) -> Triangulation:
-    """Return the intrinsic Delaunay triangulation of the same surface, by edge flips.
+    """Return the intrinsic Delaunay triangulation of a surface, by edge flips.
 
-    Then the two angles opposite each edge sum to at most pi, and heat flows from hot to cold along every
+    The two angles opposite each edge then sum to at most pi, so that heat flows from hot to cold along every
     edge, however obtuse the mesh's angles. Borders are not flipped, nor edges where more than two triangles
     meet or two have opposite orientations.
 
@@ -228,7 +247,11 @@ def delaunay(surface: Triangulation) -> Triangulation:
 
 
 def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
-    """Return the mask (e,) of edges shared by exactly two triangles of the same orientation."""
+    """Return the mask (e,) of edges shared by exactly two triangles of equal orientation.
+
+    corners, side : vertex and edge indices of the triangles' sides, as in `Triangulation`
+    count : number of edges
+    """
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
     along = np.bincount(side.ravel()[forward], minlength=count)
@@ -236,10 +259,14 @@ def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_
 
 
 def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) -> Index:
-    """Return non-Delaunay edges of which no two share a triangle, as (2, m) indices of sides.
+    """Return non-Delaunay edges that can be flipped together, as no two share a triangle.
 
-    The indices are those in `side.ravel()`. Each triangle votes for its worst edge; edges with both votes are
-    taken. The worst of all edges is among them.
+    The result (2, m) has the indices of their two sides in `side.ravel()`. Each triangle votes for its worst
+    edge; edges with both votes are taken. The worst of all edges is among them.
+
+    side : (f, 3) edge index of each side
+    illegal : (e,) mask of non-Delaunay edges
+    weight : (e,) cotangent weight of each edge; the smallest is worst
     """
     worst_first = np.flatnonzero(illegal)[np.argsort(weight[illegal], kind="stable")]
     rank = np.full(len(illegal), len(illegal), dtype=np.int64)
@@ -254,7 +281,10 @@ def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) 
 
 
 def _flip_edges(flipped: Triangulation, pairs: Index) -> None:
-    """Flip each edge ab between triangles abc and bad to cd, in place."""
+    """Replace each edge ab, between triangles abc and bad, by the edge cd, in place.
+
+    pairs : (2, m) indices of the sides of these edges
+    """
     (left, i), (right, j) = (np.divmod(side_index, 3) for side_index in pairs)
     a, b, c = (flipped.corners[left, (i + k) % 3] for k in range(3))
     d = flipped.corners[right, (j + 2) % 3]
@@ -268,22 +298,23 @@ def _flip_edges(flipped: Triangulation, pairs: Index) -> None:
 
 
 def _apex_coordinates(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Return the apex of triangles as its position along the base and its height [mm].
+    """Return the apex of triangles as its position along the base and its height above it [mm].
 
-    first : length of the side from the base's start to the apex
+    base, first, second : lengths of the base, and of the sides from its start and its end to the apex [mm]
     """
     along = (base**2 + first**2 - second**2) / (2 * base)
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))
 
 
 def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, csc_array]:
-    """Return mass M [mm2] and stiffness K [-] (n, n) of linear elements: M du/dt = -K u for heat.
+    """Return mass matrix M [mm2] and stiffness matrix K [-] of linear finite elements, each (n, n).
 
-    M is the mean of the lumped and the consistent mass matrix. Their errors in the speed of heat are opposite
-    and, on regular triangles, cancel to fourth order in the edge length. The rows of M sum to the vertices'
-    areas, those of K to 0. A vertex without triangles keeps its value.
+    The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent
+    mass matrix. Their errors in the speed of heat are opposite and, on regular triangles, cancel to fourth
+    order in the edge length. The rows of M sum to the vertices' areas, those of K to 0. A vertex without
+    triangles keeps its value.
 
-    count : n, number of vertices
+    count : number n of vertices
 
     Source: [PinkallPolthier1993] for the cotangents.
     """
@@ -295,7 +326,11 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
     corner_area = np.repeat(surface.areas()[:, None], 3, axis=1)
 
     def assemble(off_diagonal: Floats, diagonal: Floats) -> csc_array:
-        """Return entries `off_diagonal` start and end of each side and `diagonal` at its start."""
+        """Return a sparse symmetric matrix (n, n), summed over the sides of all triangles.
+
+        off_diagonal : (f, 3) entry between start and end of each side
+        diagonal : (f, 3) entry of the vertex at its start
+        """
         rows = np.concatenate([index.ravel() for index in (start, end, start)])
         columns = np.concatenate([index.ravel() for index in (end, start, start)])
         values = np.concatenate([entry.ravel() for entry in (off_diagonal, off_diagonal, diagonal)])

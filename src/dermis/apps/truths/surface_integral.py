@@ -1,4 +1,4 @@
-"""Surface integral of a diffusion profile over irradiance: the reference for light below the surface."""
+"""Surface integral of a diffusion profile over irradiance: the reference for subsurface scattering."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _UNCANCELLED_FACTOR = 50.0
 def integrate_exitance(
     points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3
 ) -> Floats:
-    """Return radiant exitance (n, 3), the integral of R(|x - y|) E(y) dA over the surface.
+    """Return the radiant exitance (n, 3) at points x: the integral of R(|x - y|) E(y) dA over the surface.
 
     points : (n, 3) positions x on the surface [mm]
-    samples : irradiance E, linear on small triangles; the caller chooses them fine enough for the light
-    profile : R, by Euclidean distance, through thin parts too
+    samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
+    profile : profile R, by Euclidean distance, through thin parts too
     error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a part of one is replaced by three points if Taylor's remainder is
+    A node of the octree, a triangle or a piece of one is replaced by three points if Taylor's remainder is
     below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
     integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
     relation between the bound and `error` is measured.
@@ -68,6 +68,9 @@ def integrate_exitance(
 
 
 def _weighted_bounds(tree: Octree, factor: float) -> Octree:
-    """Return the octree with the errors that do not cancel multiplied by a factor."""
+    """Return the octree with a larger weight of those error bounds whose errors do not cancel.
+
+    factor : factor of these bounds
+    """
     second_moment = tree.second_moment + factor * tree.moment_error
     return tree._replace(second_moment=second_moment, centroid_error=factor * tree.centroid_error)

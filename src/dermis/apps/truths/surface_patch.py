@@ -1,4 +1,4 @@
-"""Patch of a surface, subdivided until its edges are short, without a change of its shape."""
+"""Patch of a surface, subdivided until its edges are short enough for diffusion, with its shape kept."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _BARYCENTRIC_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Patch:
-    """Fine triangles of a patch, with their coarse parents.
+    """Small triangles of a patch, and the mesh triangles that they subdivide.
 
-    positions : (n, 3) vertices [mm]
+    positions : (n, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
-    parent : (f,) index of the coarse triangle that each fine triangle lies on
+    parent : (f,) index of the mesh triangle that contains each small triangle
     weights : (f, 3, 3) barycentric weights of each corner in the parent
     centre_mm, radius_mm : ball inside which results are valid; the patch extends beyond it [mm]
     """
@@ -36,11 +36,11 @@ class Patch:
     radius_mm: float
 
     def contains(self, positions: Floats) -> NDArray[np.bool_]:
-        """Return the mask (m,) of positions (m, 3) [mm] within the radius around the centre."""
+        """Return the mask (m,) of positions (m, 3) inside the ball where results are valid [mm]."""
         return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:
-        """Return a coarse triangle (n,) for each vertex and its barycentric weights there (n, 3)."""
+        """Return a mesh triangle (n,) that contains each vertex, and its barycentric weights there (n, 3)."""
         triangle, weights = np.zeros(len(self.positions), np.int64), np.zeros((len(self.positions), 3))
         triangle[self.triangles] = self.parent[:, None]
         # A vertex shared by several parents gets its weights in the parent that it was assigned to.
@@ -49,10 +49,10 @@ class Patch:
         return triangle, weights
 
     def locate(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """Return the fine triangle (m,) at each point, -1 outside the patch, and its weights there (m, 3).
+        """Return the small triangle (m,) at each point, -1 outside the patch, and its weights there (m, 3).
 
-        triangle : (m,) coarse triangles of the points
-        barycentric : (m, 3) weights in them
+        triangle : (m,) mesh triangles of the points
+        barycentric : (m, 3) weights in the mesh triangles
         """
         order = np.argsort(self.parent, kind="stable")
         first = np.searchsorted(self.parent[order], triangle, "left")
@@ -73,17 +73,21 @@ class Patch:
         return fine_triangle, weights
 
     def interpolate(self, values: Floats, fine: Index, weights: Floats) -> Floats:
-        """Return vertex values (..., n, c) interpolated at points from `locate`, (..., m, c)."""
+        """Return vertex values interpolated at points from `locate`, (..., m, c).
+
+        values : (..., n, c) vertex values
+        fine, weights : (m,) small triangles and (m, 3) weights of the points
+        """
         corners = self.triangles[fine]
         return sum((weights[:, k, None] * values[..., corners[:, k], :] for k in range(3)), np.zeros(()))
 
 
 def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: ArrayLike) -> Patch:
-    """Return the patch of a mesh, with welded uv seams, on which light of these variances can be diffused.
+    """Return a patch of a mesh, with welded uv seams, on which light can be blurred by given variances.
 
     centre_mm, radius_mm : ball inside which results are valid; an infinite radius takes the whole mesh [mm]
-    variances_mm2 : (k,) increasing; the smallest step sets the edge length, the largest variance the margin
-        [mm2]
+    variances_mm2 : (k,) increasing variances; the smallest step sets the edge length, the largest variance
+        the margin [mm2]
 
     Short edges over a wide margin are costly: use separate patches for narrow and wide levels.
     """
@@ -104,10 +108,10 @@ def refine_patch(
     Edges that are too long are halved in both of their triangles, so no crack opens. New vertices lie on the
     old flat triangles, so the surface keeps its shape.
 
-    positions, triangles : (n, 3) and (f, 3) of the coarse surface, welded [mm]
-    centre_mm : (3,) centre of the ball; Euclidean distances never exceed those along the surface
-    radius_mm : radius of the ball inside which results are valid; infinite for the whole surface
-    edge_mm, margin_mm : from `max_edge_mm` and `patch_margin_mm` of the variances to be diffused
+    positions, triangles : (n, 3) positions [mm] and (f, 3) vertex indices of the surface, with welded seams
+    centre_mm : (3,) centre of the ball; Euclidean distances never exceed those along the surface [mm]
+    radius_mm : radius of the ball inside which results are valid; infinite for the whole surface [mm]
+    edge_mm, margin_mm : edge length and margin, from `max_edge_mm` and `patch_margin_mm` [mm]
 
     Raises DermisError when there is no surface in reach, or when there would be more than 8 million
     triangles.
@@ -140,6 +144,9 @@ def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: 
 
     Raises DermisError when there is none, or when those entirely within reach will become too many: a
     triangle with edges of at most `edge_mm` has at most the area of the equilateral one.
+
+    corners : (f, 3, 3) corner positions [mm]
+    reach : distance from the centre [mm]
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)

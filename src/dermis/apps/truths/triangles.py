@@ -1,4 +1,4 @@
-"""Edge lengths of triangles, and triangles split at halved edges."""
+"""Edges of triangle meshes, and subdivision of triangles at halved edges."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ Two halved sides leave a quadrilateral; the last entry splits it along the other
 
 
 def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
-    """Return ends (e, 2) of the edges, the edge of each triangle's side (f, 3), and lengths (e,) [mm].
+    """Return the edges' ends (e, 2), each triangle side's edge (f, 3), and the edges' lengths (e,) [mm].
 
-    positions : (n, 3) [mm]
-    corners : (f, 3) triangles; side k runs from corner k to corner k + 1
+    positions : (n, 3) vertex positions [mm]
+    corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1
     """
     ends, edge_of_side, _ = edges(corners)
     length = np.linalg.norm(positions[ends[:, 0]] - positions[ends[:, 1]], axis=1)
@@ -37,12 +37,15 @@ def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Flo
 def split_triangles(
     corners: Index, weights: Floats, midpoint: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
-    """Return triangles (m, 3) split at halved sides, their parents (m,) and barycentric weights (m, 3, 3).
+    """Split triangles at halved sides; return new triangles (m, 3), their parents (m,) and weights.
 
-    corners : (f, 3) triangles
+    The weights (m, 3, 3) are barycentric weights of the new corners in the coarse triangle.
+
+    corners : (f, 3) vertex indices
     weights : (f, 3, 3) barycentric weights of the corners in a coarse triangle
-    midpoint : (f, 3) vertex at the middle of each side, -1 for sides that are not halved
-    positions : (n, 3) of all vertices; quadrilaterals are then split along the shorter diagonal [mm]
+    midpoint : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
+    positions : (n, 3) positions of all vertices; quadrilaterals are then split along the shorter diagonal
+        [mm]
     """
     halved = midpoint >= 0
     count = halved.sum(axis=1)

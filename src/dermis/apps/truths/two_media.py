@@ -1,4 +1,4 @@
-"""Monte Carlo simulation of light across the border of two half-spaces side by side, compiled by numba.
+"""Monte Carlo simulation of light across the border of two adjacent half-spaces, compiled by numba.
 
 The left medium fills x < 0, the right one x > 0, both z > 0; both scatter isotropically.
 """
@@ -19,7 +19,11 @@ Counts = NDArray[np.int64]
 
 @compiled
 def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: RandomState) -> float:
-    """Return the exit x of a photon that enters at normal incidence at x [mm]; NaN if it is absorbed."""
+    """Return where a photon leaves that enters at normal incidence at x [mm]; NaN if it is absorbed.
+
+    sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
+    eta : index of refraction of both media
+    """
     z = ux = uy = 0.0
     uz = 1.0
     medium = 0 if x < 0.0 else 1
@@ -57,10 +61,11 @@ def tally_exits(
     rng: RandomState,
     tally: Counts,
 ) -> None:
-    """Add photons to a tally (n, n) by the strips where they enter and leave.
+    """Trace photons and count them by the strips where they enter and leave, in `tally` (n, n).
 
-    photons : number that enters each strip
-    edges_mm : (n + 1,) edges of the strips, evenly spaced
+    photons : number of photons that enter each strip
+    sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
+    edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
     """
     bins = len(edges_mm) - 1
     width = (edges_mm[-1] - edges_mm[0]) / bins
@@ -74,13 +79,13 @@ def tally_exits(
 def strip_transfer(
     sigma_a: Floats, sigma_s_prime: Floats, edges_mm: Floats, photons: int, seed: int = 0, eta: float = 1.4
 ) -> Floats:
-    """Return (n, n) fractions of light that enters strip i at normal incidence and leaves from strip j [-].
+    """Return the fraction (n, n) of light entering strip i at normal incidence that leaves from strip j [-].
 
     The border between the media runs along x = 0; light that leaves beyond the outer edges is not counted.
 
-    sigma_a, sigma_s_prime : (2,) coefficients of the left and the right medium [1/mm]
-    edges_mm : (n + 1,) edges of the strips, evenly spaced [mm]
-    photons : number that enters each strip
+    sigma_a, sigma_s_prime : (2,) absorption and reduced scattering coefficient of the two media [1/mm]
+    edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
+    photons : number of photons that enter each strip
 
     Source: [Wang1995], with a second medium.
     """

@@ -1,4 +1,4 @@
-"""Scattering medium below painted skin, with a mean free path and an albedo grid."""
+"""Scattering medium below a person's painted skin: mean free path and a grid of albedos."""
 
 from __future__ import annotations
 
@@ -34,22 +34,28 @@ _PHOTONS = 40_000
 
 @cache
 def _albedo_table() -> tuple[Doubles, Doubles]:
-    """Return diffuse albedos of half-spaces and the roots of their single-scattering absorption."""
+    """Return diffuse albedos of half-spaces, and the square root of 1 minus their scattering albedo."""
     absorption_root = np.linspace(1.0, _MIN_ROOT, 32)
     return np.array([diffuse_albedo(float(1.0 - one**2)) for one in absorption_root]), absorption_root
 
 
 def single_scattering_albedo(colour: ArrayLike) -> Doubles:
-    """Return the single-scattering albedo of half-spaces with a given diffuse albedo below the coat [-]."""
+    """Return the single-scattering albedo of half-spaces with a given diffuse albedo [-].
+
+    colour : diffuse albedo below the coat
+    """
     diffuse_albedos, absorption_root = _albedo_table()
     clipped = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
     return np.asarray(1.0 - np.interp(clipped, diffuse_albedos, absorption_root) ** 2)
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """Return mean free paths (3,) of media of a colour (3,) and a mean lateral offset of exits (3,) [mm].
+    """Return the mean free paths (3,) with which light leaves at a given mean distance from its entry [mm].
 
     The offsets of media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
+
+    colour : (3,) diffuse albedo of the medium
+    distance_mm : (3,) mean lateral offset of exit points [mm]
     """
     pairs = zip(single_scattering_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
     return np.array([distance / _mean_offset(round(float(albedo), 4)) for albedo, distance in pairs])
@@ -57,7 +63,10 @@ def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
 
 @cache
 def _mean_offset(albedo: float) -> float:
-    """Return the mean lateral offset of exit points, in mean free paths."""
+    """Return the mean lateral distance between entry and exit in a half-space, in mean free paths.
+
+    albedo : single-scattering albedo [-]
+    """
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
     layer = ScatteringLayer(1.0 - albedo, albedo, eta=1.0)
     energy = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
@@ -65,7 +74,7 @@ def _mean_offset(albedo: float) -> float:
 
 
 def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
-    """Return Mitsuba's medium below the skin, with an albedo grid around the camera's target."""
+    """Return Mitsuba's medium below the skin, with a grid of albedos around the camera's target."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _grid_box(person, camera)
     grid = single_scattering_albedo(colour_grid(person, low, high, VOXELS)).astype(np.float32)
@@ -87,7 +96,10 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
 
 
 def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Return two corners of the part of the head in the picture; outside it colours are constant."""
+    """Return the low and high corner (3,) of the visible part of the head, in which albedos vary [mm].
+
+    Outside this box the albedo is constant.
+    """
     half_side = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
@@ -97,14 +109,16 @@ def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
 
 
 def _skin_triangles(person: Person) -> NDArray[np.int32]:
-    """Return the triangles of skin, (f, 3)."""
+    """Return the vertex indices (f, 3) of the triangles of skin."""
     mesh = person.mesh
     kinds = np.array([one.kind == "skin" for one in mesh.materials])
     return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
 def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
-    """Return (z, y, x, 3) skin colours in the cells of a box: of the nearest skin, or the mean deeper inside.
+    """Return the skin colour (z, y, x, 3) in each cell of a box, by the nearest skin.
+
+    Cells deeper inside have the mean colour.
 
     low, high : (3,) corners of the box [mm]
     voxels : number of cells along the longest side
@@ -130,7 +144,13 @@ def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Dou
 
 
 def _skin_samples(person: Person, low: Doubles, high: Doubles, cell_mm: float) -> tuple[Doubles, Doubles]:
-    """Return random points on the skin in a box (n, 3) and their colours (n, 3), with a fixed seed."""
+    """Return random positions (n, 3) on the skin in a box, and the skin's colours (n, 3) there.
+
+    The random seed is fixed.
+
+    low, high : (3,) corners of the box [mm]
+    cell_mm : size of a cell, which determines the number of samples [mm]
+    """
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)
     inside = (

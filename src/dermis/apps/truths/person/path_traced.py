@@ -54,9 +54,10 @@ def path_trace_person(
     The cornea refracts, and the iris is a painted disc behind it, so lights must have a size. The skin's
     profile and surface lobe are ignored.
 
-    textures : of skin, eyes and teeth
-    distance_mm : (3,) mean lateral offset of exit points in skin of the mean colour
-    colour : (3,) that mean colour
+    textures : textures of skin, eyes and teeth
+    distance_mm : (3,) mean lateral offset of exit points in skin of the mean colour [mm]
+    colour : (3,) mean colour of the skin, linear Rec. 709 [-]
+    size : width and height of the image [pixel]
     samples, variant, use_cache, progress : as in `path_trace`
 
     Raises DermisError when Mitsuba is missing, and for heads without modelled eyes.
@@ -83,7 +84,10 @@ def path_trace_person(
 def person_scene(
     mi: Mitsuba, scene: Scene, person: Person, mean_free_path_mm: Doubles, size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Return Mitsuba's scene for the radiance image, and notes on changes to the head."""
+    """Return the Mitsuba scene of a person's radiance image, and notes on changes made to the head.
+
+    mean_free_path_mm : (3,) mean free paths in the skin [mm]
+    """
     medium = skin_medium(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
     shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
@@ -94,7 +98,10 @@ def person_scene(
 
 
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return shapes other than skin and eyes: teeth and tongue under saliva, all others diffuse."""
+    """Return the Mitsuba shapes of materials other than skin and eyes.
+
+    Teeth and tongue are under saliva, all others diffuse.
+    """
     shapes = {}
     mesh = person.mesh
     for k, material in enumerate(mesh.materials):
@@ -125,13 +132,13 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the head with radiance 1 and without hair."""
+    """Return shapes of the head without hair whose skin emits radiance 1, for the image of the coverage."""
     emitter, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
 def person_key(scene: Scene, person: Person, mean_free_path_mm: Doubles, trace_settings: str) -> str:
-    """Return a hash of everything that the image depends on.
+    """Return a hash of all inputs of a path-traced person, which names the cached passes.
 
     trace_settings : versions and settings of the path tracer
     """

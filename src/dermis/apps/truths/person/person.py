@@ -1,4 +1,4 @@
-"""A posed head with eyes, hair fibres and textures, as input of a path tracer."""
+"""Posed head with eyes, hair fibres and textures, as input of a path tracer."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Doubles = NDArray[np.float64]
 class SkinTextures:
     """Textures of skin, eyes and teeth of a person, linear Rec. 709, row 0 at v = 0.
 
-    colour, roughness : (n, n, 3), (n, n) of the skin by its uv [-]
-    height_mm : (n, n) relief of the skin
+    colour, roughness : (n, n, 3) and (n, n) maps of the skin by its uv [-]
+    height_mm : (n, n) relief of the skin [mm]
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
-    reach_mm : half the side of that texture
+    reach_mm : half the side of the iris texture [mm]
     white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: half a turn from the axis
         is 0.49 of the side from the middle
     teeth : (k, k, 3) textures of the upper and of the lower teeth by their uv
@@ -38,7 +38,7 @@ class SkinTextures:
     teeth: tuple[Floats, Floats]
 
     def arrays(self) -> Iterator[Floats]:
-        """Yield all textures."""
+        """Yield all texture arrays, for hashing."""
         yield from (self.colour, self.roughness, self.height_mm, self.iris, self.white, *self.teeth)
 
 
@@ -46,8 +46,8 @@ class SkinTextures:
 class HairFibres:
     """Hair fibres as polylines with round cross sections.
 
-    knots_mm : (n, k, 3) from root to tip, relative to the head's centre
-    radius_mm : (n, k) radius at the knots
+    knots_mm : (n, k, 3) positions from root to tip, relative to the head's centre [mm]
+    radius_mm : (n, k) radius at the knots [mm]
     absorption : (n, 3) absorption coefficient of the fibres [1/mm]
     """
 
@@ -58,11 +58,11 @@ class HairFibres:
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """Posed head with its textures; positions are relative to its centre [mm].
+    """Posed head with its textures; positions are relative to the head's centre [mm].
 
-    eyes : (m, 4, 4) transforms from head space to the space of each eye, in mm of an average eye, z along its
-        axis
-    eye_materials : (m,) materials of the mesh whose triangles are replaced by refracting eyes
+    eyes : (m, 4, 4) transforms from head space to the space of each eye, in mm of an average eye, with z
+        along its axis
+    eye_materials : (m,) material indices of the eyes, whose triangles are replaced by refracting eyeballs
     """
 
     name: str
@@ -73,7 +73,7 @@ class Person:
     textures: SkinTextures
 
     def arrays(self) -> Iterator[NDArray[np.generic]]:
-        """Yield all arrays of the person."""
+        """Yield all arrays of the person, for hashing."""
         mesh = self.mesh
         yield from (mesh.positions, mesh.normals, mesh.uv, mesh.point, mesh.triangles, mesh.material)
         yield self.eyes
@@ -83,7 +83,7 @@ class Person:
 
 
 def posed_person(scene: Scene, textures: SkinTextures) -> Person:
-    """Return the head of a scene in its pose, with textures.
+    """Return the posed head of a scene with textures, as input of the path tracer.
 
     Raises DermisError for a head without modelled eyes.
     """

@@ -1,4 +1,4 @@
-"""Mitsuba shapes of a person: coated skin above a medium, refracting eyes and hair fibres."""
+"""Mitsuba shapes of a person: coated skin around a medium, refracting eyes and hair fibres."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm,
 
 
 def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
-    """Return a texture of Mitsuba from linear values (h, w) or (h, w, 3)."""
+    """Return Mitsuba's description of a texture from linear texels (h, w) or (h, w, 3)."""
     bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
 
 
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return a BSDF that reflects like rough skin and transmits without refraction.
+    """Return the BSDF of skin that reflects like a rough dielectric and transmits without refraction.
 
     No path to a point light crosses a refracting surface. So light passes this surface straight on, except
     for a small fraction of it that meets a rough dielectric, whose reflectance is scaled up by that fraction.
@@ -43,9 +43,9 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def skin_shapes(mi: Mitsuba, person: Person, medium: MitsubaObject) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return two surfaces around the medium, the upper one coated, and notes on them.
+    """Return two closed surfaces around the medium, the upper one coated, and notes on changes to the head.
 
-    The two surfaces are those of `mitsuba_scene`.
+    The two surfaces form an interface as in `mitsuba_scene`.
     """
     solid = closed_skin(person.mesh, person.name)
     notes = (f"{solid.caps} openings closed, {solid.cap_area:.0f} mm2",) if solid.caps else ()
@@ -68,7 +68,7 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
 
 
 def _coated_mesh(mi: Mitsuba, person: Person, upper: ClosedSurface, medium: MitsubaObject) -> MitsubaObject:
-    """Return the coated upper surface with the mesh's own normals and uv."""
+    """Return the coated upper surface as a Mitsuba mesh, with the head's normals and uv."""
     mesh, triangles = person.mesh, person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     points = np.unique(mesh.point[triangles])
@@ -96,7 +96,7 @@ _IRIS_GAP_MM = 0.02  # between the edge of the disc and the eyeball [mm]
 
 
 def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
-    """Return positions of an eyeball in its own space [mm], triangles, normals and polar uv."""
+    """Return an eyeball's positions [mm], triangles, normals and polar uv, in the space of the eye."""
     limbus = np.arctan2(LIMBUS_MM + 2 * LIMBUS_BLUR_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
     angle = np.concatenate(
         [np.linspace(0.0, limbus, _CORNEA_STEPS, endpoint=False), np.linspace(limbus, np.pi, _SCLERA_STEPS)]
@@ -115,23 +115,27 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
 
 
 def _grid_triangles(rows: int, columns: int) -> Index:
-    """Return the triangles of a grid of points with rows in angle from the axis and columns in azimuth."""
+    """Return the triangles of a grid of points on a surface of revolution.
+
+    rows : number of angles from the axis
+    columns : number of azimuths
+    """
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     a, b, c, d = first, first + columns, first + columns + 1, first + 1
     return np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
 
 
 def cornea_weight(axis_distance_mm: Doubles, z_mm: Doubles) -> Doubles:
-    """Return the weight of the clear cornea against the white of the eye, smooth around the limbus [-].
+    """Return the weight of the clear cornea against the white sclera, smooth around the limbus [-].
 
-    axis_distance_mm, z_mm : distance from the axis, and position along it
+    axis_distance_mm, z_mm : distance from the eye's axis, and position along it [mm]
     """
     t = np.clip((axis_distance_mm - LIMBUS_MM + LIMBUS_BLUR_MM) / (2 * LIMBUS_BLUR_MM), 0.0, 1.0)
     return np.where(z_mm > 0.0, 1.0 - t * t * (3.0 - 2.0 * t), 0.0)
 
 
 def cornea_weight_map() -> Doubles:
-    """Return (n, n) values of `cornea_weight` by the polar uv of the eyeball."""
+    """Return `cornea_weight` as a texture (n, n) by the polar uv of the eyeball."""
     u = (np.arange(_TEXTURE_SIDE) + 0.5) / _TEXTURE_SIDE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / UV_RADIUS, 1.0) * np.pi
     radius = profile_mm(angle)
@@ -139,7 +143,7 @@ def cornea_weight_map() -> Doubles:
 
 
 def iris_disc() -> tuple[Doubles, Index, float]:
-    """Return positions of a disc in the iris plane up to the eyeball, its triangles and radius [mm]."""
+    """Return the iris as a disc in its plane: positions, triangles and radius, up to the eyeball [mm]."""
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     rim = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_AROUND, iris_mm())], axis=-1)
@@ -149,7 +153,7 @@ def iris_disc() -> tuple[Doubles, Index, float]:
 
 
 def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, MitsubaObject]:
-    """Return the BSDFs of the eyeball and of the iris."""
+    """Return the Mitsuba BSDFs of the eyeball and of the iris."""
     white = {
         "type": "roughplastic",
         "distribution": "beckmann",
@@ -165,7 +169,7 @@ def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, Mitsu
 
 
 def eye_shapes(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return shapes of all eyes of a person, relative to the head's centre."""
+    """Return the Mitsuba shapes of a person's eyes, relative to the head's centre."""
     eyeball_bsdf, iris_bsdf = eye_bsdfs(mi, person.textures)
     positions, triangles, normals, uv = eyeball_mesh()
     disc, fan, _ = iris_disc()
@@ -196,7 +200,10 @@ _MIN_RADIUS_MM = 1e-3
 
 
 def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDict:
-    """Return hair fibres as one shape per group of similar absorption, named `name` and a number."""
+    """Return hair fibres as Mitsuba shapes, one for each group of fibres with similar absorption.
+
+    name : prefix of the shapes' names, before their numbers
+    """
     shapes = {}
     # Mitsuba's unit of length is the radius.
     depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
@@ -218,13 +225,20 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
 
 
 def absorption_groups(depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
-    """Return indices of rows (n, 3) in at most `MAX_HAIR_GROUPS` groups by the sum of each row."""
+    """Return the fibre indices of at most `MAX_HAIR_GROUPS` groups with similar absorption.
+
+    depth : (n, 3) absorption of each fibre; fibres are grouped by its sum over the channels
+    """
     order = np.argsort(depth.sum(axis=1), kind="stable")
     return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
 
 
 def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> None:
-    """Write curves to a file for Mitsuba: one line per control point, an empty line after each curve."""
+    """Write B-spline curves to a file for Mitsuba: a line per control point, an empty line after each curve.
+
+    knots_mm : (n, k, 3) points through which the curves pass [mm]
+    radius_mm : (n, k) radius at these points [mm]
+    """
     rows = np.concatenate([knots_mm, radius_mm[..., None].astype(np.float64)], axis=-1)
     points = bspline_control_points(rows)
     points[..., 3] = np.maximum(points[..., 3], _MIN_RADIUS_MM)
@@ -235,9 +249,9 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:
-    """Return (n, k + 2, c) control points of uniform cubic B-splines through knots, straight at the ends.
+    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, straight at the ends.
 
-    knots : (n, k, c)
+    knots : (n, k, c) points through which the curves pass
     """
     count = knots.shape[1]
     matrix = np.eye(count)
