@@ -50,7 +50,7 @@ class Observation(ShortRepr):
     outputs : mapping
         Outputs by name, (h, w) or (h, w, c) with row 0 at the top, see `dermis.scene.outputs`.
     camera : OpenCvCamera
-        K, R and t for positions relative to the centre of the head [mm].
+        Intrinsic matrix K and pose R, t as in OpenCV; positions are relative to the head's centre [mm].
     landmarks : mapping
         Landmarks by the name of their set.
     head_pose : ndarray

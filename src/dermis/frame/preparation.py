@@ -79,7 +79,9 @@ class Preparation:
         previous: Scene | None = None,
         landmarks: tuple[str, ...] = (),
     ) -> FrameInputs:
-        """Return the inputs of a frame; cached resources that are no longer used are released.
+        """Return the inputs of a frame, from cached resources where nothing has changed.
+
+        Cached resources that are no longer used are released.
 
         view : name of the scene, for callers that draw several scenes in turn
         outputs : names of outputs besides the picture

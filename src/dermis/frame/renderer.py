@@ -303,12 +303,16 @@ class Renderer:
         return self.reopening_device.run(run)
 
     def draw_warm(self, scene: Scene, settings: Settings | None = None) -> RenderedFrame:
-        """Render one frame with times of a busy device; an idle GPU runs at a fraction of its clock rate.
+        """Render a scene after warm-up frames that bring a GPU to its full clock rate, to measure times.
+
+        Software adapters render without warm-up frames.
 
         Parameters
         ----------
-        scene, settings
-            As for `draw`.
+        scene : Scene
+            Scene to render.
+        settings : Settings, optional
+            Size, technique and other settings.
         """
         rendered = self.draw(scene, settings, force=True)
         if self.device.adapter.kind == "CPU":
@@ -324,7 +328,7 @@ class Renderer:
         Parameters
         ----------
         scene : Scene or Head
-            As for `draw`.
+            Scene, or a head alone with default light and camera.
         **settings
             Fields of `Settings`.
 
@@ -353,11 +357,11 @@ class Renderer:
         Parameters
         ----------
         scenes : iterable of Scene
-            Heads and textures that scenes share are loaded once.
+            Scenes to render; heads and textures that they share are loaded once.
         linear : bool
             True yields float32 linear Rec. 709 instead of sRGB bytes.
         alpha : bool
-            True adds alpha, as `RenderedFrame.rgba8` and `RenderedFrame.linear_rgba` do.
+            True adds the coverage by the head as alpha; floats are multiplied by it, bytes are not.
         **settings
             Fields of `Settings`, for all scenes.
 
@@ -369,7 +373,7 @@ class Renderer:
         Raises
         ------
         DermisError
-            As `draw` does.
+            For sizes over the limits of the device, and when the device fails.
         """
         submit = partial(self._submit_readback, settings=Settings(**settings), linear=linear, alpha=alpha)
         frames = ((partial(submit, Scene.coerce(scene)), Readback.image) for scene in scenes)
@@ -391,13 +395,15 @@ class Renderer:
         Parameters
         ----------
         scenes : iterable of Scene
-            As for `render_many`.
+            Scenes to render; heads and textures that they share are loaded once.
         settings : Settings or iterable of Settings, optional
             Settings of all scenes, or of each scene.
         outputs : iterable of str
             Names of outputs besides the picture.
-        alpha, linear : bool
-            As for `render_many`.
+        alpha : bool
+            True adds the coverage by the head as alpha; floats are multiplied by it, bytes are not.
+        linear : bool
+            True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
             Scene before the first one, for motion vectors between consecutive scenes of the same head; or the
             previous scene of each scene.
@@ -412,7 +418,7 @@ class Renderer:
         Raises
         ------
         DermisError
-            As `draw` does.
+            For sizes over the limits of the device, and when the device fails.
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))

@@ -112,7 +112,7 @@ class FrameRequest:
 
     @cached_property
     def seam_method(self) -> SeamMethod:
-        """Return the treatment of seams."""
+        """Return the treatment of seams that the settings and the technique select."""
         return seam_method(self.settings.seams, self.technique.stitches_seams)
 
     @property

@@ -41,7 +41,10 @@ class Controls:
         self._pinch: tuple[float, float, float] | None = None
 
     def handle(self, event: Event, size: Point) -> None:
-        """Process an event over a picture of the given logical size."""
+        """Process an event over the picture.
+
+        size : logical size of the picture
+        """
         kind = event["event_type"]
         if kind == "pointer_down":
             self._press(event)
@@ -166,7 +169,10 @@ class SplitView:
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, width: float) -> bool:
-        """Process a pointer event over a picture of the given width; return whether the divider used it."""
+        """Process a pointer event; return whether it drags the divider.
+
+        width : logical width of the picture
+        """
         kind = event["event_type"]
         if kind == "pointer_down" and self.frozen_state:
             self.is_dragged = abs(event["x"] - self.divider_position * width) <= _GRAB_RADIUS_PX

@@ -164,7 +164,7 @@ class Session:
 
     @property
     def state(self) -> ViewerState:
-        """Return the current state."""
+        """Return the current state of the undo history."""
         return self.history.state
 
     @property

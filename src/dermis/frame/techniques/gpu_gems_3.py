@@ -94,7 +94,10 @@ class GpuGems3(AtlasTechnique):
             source, before = stretch, float(variance)
 
     def blur_program(self, device: Device, constants: Constants) -> ComputeProgram | RenderProgram:
-        """Return the program that blurs along one axis."""
+        """Return the program that blurs light and the stretch map along one axis.
+
+        constants : pipeline constants of the axis and of the treatment of empty texels
+        """
         return program(device, Path(__file__).with_name("gpu_gems_3.wgsl"), constants)
 
     def draw_blur(

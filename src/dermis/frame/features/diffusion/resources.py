@@ -59,7 +59,11 @@ def make(
     scheme: BlurScheme,
     atlases: Sequence[AtlasTextures],
 ) -> Resources:
-    """Return the resources of the diffusion for all atlas layouts."""
+    """Return the pyramid, the blurs and the mixture of profiles for all atlas layouts.
+
+    scheme : technique that chooses the formats and resolutions of the blurs
+    atlases : textures of the atlas in each layout
+    """
     blurs = tuple(_make_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
     args = device, scheme, side, halvings, request.light_key

@@ -79,12 +79,12 @@ def start_readback(
     alpha: Settings | None = None,
     outputs: Resources | None = None,
 ) -> Readback:
-    """Pack the picture and start its readback.
+    """Pack the picture and its outputs, and start their readback.
 
     linear : whether to read linear floats instead of sRGB bytes
     alpha : settings of the picture, to read its coverage as alpha: floats are premultiplied, bytes are not;
         None for three channels
-    outputs : outputs to read back too
+    outputs : resources of the outputs to read back too, None for the picture alone
 
     Raises DermisError if the data do not fit in one buffer of the device.
     """

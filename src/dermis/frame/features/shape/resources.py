@@ -27,7 +27,7 @@ class Resources:
 
 
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
-    """Return the shape of the requested head."""
+    """Return the buffers from which the shape of the requested head is computed."""
     cached, mesh = memo.get, request.topology.mesh
     tables = cached(shape_tables, device, request.topology, owner="shared" if request.is_shared else "")
     return Resources(

@@ -297,7 +297,7 @@ def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArr
 
 
 def rest_motion(rig: Rig) -> MotionBytes:
-    """Return the rest pose of a rig."""
+    """Return the rest pose of a rig as bytes for the shaders."""
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
     if rig.template is None or not rig.targets.names:
         return MotionBytes(positions, weights, matrices)
