@@ -47,13 +47,13 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
 
 
 def renumber_pieces(piece: Index) -> Index:
-    """Renumber piece indices (f,) from 0 without gaps; the index -1 for no piece is kept."""
+    """Renumber piece indices (f,) of triangles from 0 without gaps; -1 for triangles in no piece is kept."""
     numbers, index = np.unique(piece, return_inverse=True)
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
 def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
-    """Merge pieces of less than 1 mm2 into the largest piece of their chart."""
+    """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart."""
     area = np.bincount(piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[piece], kind="stable")
     largest = np.zeros(int(chart.max()) + 1, np.int64)
@@ -64,7 +64,7 @@ def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
 def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
     """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
 
-    The density is the square root of uv area over surface area, the length in uv of 1 mm on the surface.
+    The density is the square root of uv area over surface area: the length in uv of 1 mm on the surface.
     """
     inside, index = piece >= 0, np.maximum(piece, 0)
     uv = np.bincount(index, np.abs(surface.area_uv) * inside)

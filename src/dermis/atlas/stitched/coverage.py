@@ -1,4 +1,4 @@
-"""Surface points at the texels of pieces and gutters, with texel stretch and the distance to chart edges."""
+"""Surface points at the texels of chart pieces and gutters, with texel stretch and edge distances."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def compute_coverage(
 
 
 def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
-    """Enter rim and gutter texels into the coverage of rasterised pieces."""
+    """Add the rim and gutter texels around pieces of charts to the coverage of the pieces alone."""
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
     coverage.anchor_triangle[y, x] = texels.anchor_triangle
@@ -145,7 +145,7 @@ def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Ind
 def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Floats:
     """Return texels per mm along u and v, and the cosine of the angle between them, (h, w, 3).
 
-    A gutter texel has the metric of its anchor.
+    A gutter texel has the metric of its anchor, the nearest point of its chart.
     """
     covered = coverage.anchor_triangle >= 0
     anchor, weights = coverage.anchor_triangle[covered], coverage.anchor_weights[covered]
@@ -158,7 +158,7 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return the number of texels (h, w, 4) of one piece to the left, right, up and down before a gap.
+    """Return how many texels of one piece follow to the left, right, up and down before a gap, (h, w, 4).
 
     There is a gap between two texels if their surface points are farther apart than `gap_limit_mm` and their
     anchors are farther apart than either texel is from its anchor.
@@ -181,7 +181,7 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
 def _has_gap(
     surface: FlatSurface, packing: Packing, coverage: Coverage, first: Index, second: Index, axis: int
 ) -> Mask:
-    """Return the mask of pairs of adjacent texels with a gap on the surface between them.
+    """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
 
     first, second : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y

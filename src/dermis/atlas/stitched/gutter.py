@@ -1,4 +1,8 @@
-"""Borders of packed pieces, and gutter texels around them that continue the surface."""
+"""Borders of packed chart pieces, and gutter texels around them that continue the surface.
+
+A piece is a chart, or a part of a chart that is mirrored or was cut off. The rim of a piece consists of the
+texels outside it that bilinear interpolation within the piece reads.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ _MAX_STRETCH = 2.0  # largest texels per mm at a border over the mean of its pie
 
 
 class Border(NamedTuple):
-    """Triangle sides that form the borders of pieces.
+    """Triangle sides that form the borders of chart pieces.
 
     triangle : (k,) index of the triangle
     side : (k,) side of the triangle: 0 for corners 01, 1 for 12, 2 for 20
@@ -50,7 +54,7 @@ class GutterWidth(NamedTuple):
 
 
 def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
-    """Return the triangle sides beyond which there is no triangle of the same piece.
+    """Return the triangle sides at which pieces of charts end.
 
     piece : (f,) piece of each triangle, -1 for none
     own : (t,) indices of the triangles whose sides are examined, each in a piece

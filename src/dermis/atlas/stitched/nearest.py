@@ -1,4 +1,4 @@
-"""Search for the nearest border point of each texel around a piece."""
+"""Search for the nearest border point of each texel around a chart piece."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TEXEL = 1.001  # a texel, with a margin for rounding
 
 
 class BorderSides(NamedTuple):
-    """Border sides (k,) on the texel grid, with surface metric and gutter width.
+    """Border sides (k,) of chart pieces on the texel grid, with surface metric and gutter width.
 
     ends : (k, 2, 2) positions of both end points [texel]
     steps : (k, 2, 2, 2) surface vectors of a texel step to the right and down, at both end points [mm]
@@ -28,13 +28,13 @@ class BorderSides(NamedTuple):
 
 
 class NearestPoints(NamedTuple):
-    """Nearest border points of n texels that are outside pieces.
+    """Nearest border points of n texels that are outside chart pieces.
 
     texel : flat index of the texel
     side : index of the border side
     fraction : position of the point along the side, 0 to 1 [-]
     distance_mm : distance from texel to point by the surface metric at the side [mm]
-    rim : mask of texels that bilinear interpolation reads at some point of the border
+    rim : mask of texels that bilinear interpolation at some point of the border reads
     """
 
     texel: Index
@@ -60,11 +60,11 @@ class _SideMetric(NamedTuple):
 
 
 def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
-    """Return the nearest border point of each texel that is in a gutter or at a rim.
+    """Return the nearest border point of each texel in a gutter, or read by interpolation at a border.
 
-    Distances are measured by the surface metric at each side.
+    Distances are measured by the surface metric at each border side.
 
-    inside : (h, w) mask of texels that pieces cover
+    inside : (h, w) mask of texels that chart pieces cover
     """
     metric = _side_metric(sides)
     k, x, y = _candidate_texels(sides, metric, inside.shape)
@@ -106,7 +106,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return candidate gutter texels as border side (n,), x and y: all texels around the sides."""
+    """Return all pairs of a border side and a texel that may be in its gutter: side, x and y, (n,) each."""
     height, width = shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)

@@ -1,4 +1,4 @@
-"""Cuts through pieces whose gutters would otherwise overlap each other."""
+"""Cuts through charts whose gutters would otherwise overlap each other."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _MAX_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along 
 
 
 class Conflicts(NamedTuple):
-    """Pairs of border points of one piece whose gutters meet, although the points are apart on the surface.
+    """Pairs of border points of a chart piece whose gutters meet, although they are apart on the surface.
 
     one, other : (n, 2) both border points of each pair, at the scale of the grid [texel]
     inside : (m, 2) texels of the piece
@@ -88,7 +88,7 @@ class _PieceGrid(NamedTuple):
 
 
 def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Conflicts:
-    """Find where gutters of one piece meet, by drawing the piece on a texel grid of its own.
+    """Find where gutters of one chart piece meet, by drawing the piece on a texel grid of its own.
 
     mapped : (f,) mask of triangles that belong to any piece
     own : (t,) indices of the triangles of this piece
@@ -133,7 +133,7 @@ def _draw_grid(
 
 
 def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
-    """Return pairs of adjacent texels, (n,) each, whose surface points are apart."""
+    """Return pairs of adjacent texels whose surface points are not adjacent on the surface, (n,) each."""
     found = []
     for axis in (0, 1):
         a, b = (grid.row.ravel()[texel] for texel in unconnected_pairs(surface, grid.owner, axis))
@@ -166,8 +166,9 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: 
 
 
 def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
-    """Cut pieces along straight lines until few of their gutters overlap; return piece indices (f,).
+    """Cut charts along straight lines until few of their gutters overlap; return piece indices (f,).
 
+    piece : (f,) piece of each triangle before the cuts, -1 for none
     gutter_mm : width of the gutters [mm]
     """
     done, count = np.full(len(piece), -1, np.int64), 0
@@ -189,7 +190,7 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
 
 
 def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
-    """Return the length of all triangle sides between different parts of a piece [mm].
+    """Return the length of all triangle sides along which a chart piece is cut into parts [mm].
 
     own, part : (t,) indices of the piece's triangles, and the part of each
     """
@@ -201,7 +202,10 @@ def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
 
 
 def _cut_piece(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Index | None:
-    """Cut one piece to separate conflicts; return the part of each triangle (t,), or None without a cut."""
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None.
+
+    own : (t,) indices of the piece's triangles
+    """
     found = find_conflicts(surface, mapped, own, gutter_mm)
     reach = gutter_mm / found.texel_mm
     part = np.zeros(len(own), np.int64)
@@ -222,7 +226,7 @@ def _cut_piece(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float)
 
 
 def _conflict_clusters(found: Conflicts, reach: float) -> list[Index]:
-    """Group conflicts that are close to each other; return the indices of each group.
+    """Group neighbouring conflicts between gutters; return the indices of the conflicts in each group.
 
     reach : gutter width [texel]
     """
@@ -249,9 +253,7 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 
 
 def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
-    """Return the mask (t,) of triangles near an overlap that are on one side of the cutting line.
-
-    Of both sides the one is chosen on which such triangles have less area.
+    """Return the mask (t,) of triangles near meeting gutters, on the side of a line with less such area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
@@ -264,7 +266,7 @@ def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: 
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return normal and offset of the line that separates most conflicts for its length, and their number."""
+    """Return the line that separates most conflicts for its length: normal, offset and their number."""
     close = overlap.inside[_within_reach(overlap.inside, np.concatenate((overlap.one, overlap.other)), reach)]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
@@ -283,9 +285,9 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
 
 
 def _connected_parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> Index | None:
-    """Divide parts into connected ones and merge small ones; return the part of each triangle (t,).
+    """Divide the parts of a cut chart into connected ones, and merge small ones into their largest neighbour.
 
-    A small part is merged into the largest adjacent part. The result is None if only one part remains.
+    Returns the part of each triangle (t,), or None if only one part remains.
     """
     index = np.full(len(surface.uv), -1, np.int64)
     index[own] = np.arange(len(own))

@@ -1,4 +1,4 @@
-"""Packing of pieces with their gutters into a square map."""
+"""Packing of chart pieces with their gutters into a square map."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class _Layout(NamedTuple):
 def pack_pieces(
     surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
 ) -> Packing | None:
-    """Pack pieces with their gutters at the largest common scale; return None if they do not fit.
+    """Pack chart pieces with their gutters at the largest common scale; return None if they do not fit.
 
     piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
     scale : (f,) factor of each triangle's uv that evens out texel density

@@ -53,7 +53,7 @@ def centre_weights(corners: Doubles, owner: Ints) -> Floats:
 
 
 class AnchoredTexels(NamedTuple):
-    """Texels (n,) of a piece and its gutter with their anchors, the nearest points of the piece.
+    """Texels (n,) of a chart and its gutter with their anchors, the nearest points of the chart.
 
     texels : (n, 2) x and y of the texel
     anchors : (n, 2) x and y of the anchor [texel]
@@ -88,7 +88,10 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
 
 
 def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
-    """Return the mask of texel pairs whose anchors are farther apart than both texels are from them."""
+    """Return the mask of texel pairs whose anchors are farther apart than both texels are from them.
+
+    The anchor of a texel is the nearest point of its chart.
+    """
     distance2 = np.maximum(
         _squared_length(one.texels - one.anchors), _squared_length(other.texels - other.anchors)
     )
@@ -96,7 +99,7 @@ def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
 
 
 def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance (n,) of the surface points of adjacent texels above which they have a gap [mm].
+    """Return the distance of surface points above which there is a gap between adjacent texels, (n,) [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """
