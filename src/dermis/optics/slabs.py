@@ -139,9 +139,9 @@ def solve_doubled_slabs(
 def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
     """Return discrete directions, their fractions of uniform light, and emerging radiance of a half-space.
 
-    The directions are cosines (m,) below the surface. The fractions (m,) are those of the light that enters
-    from a uniform sky. The radiance (m, m), by exit and entry direction, is per light that enters: its mean
-    over exit directions, weighted by the fractions, is the reflectance.
+    The directions are cosines (m,) below the surface. A fraction (m,) tells how much of the light that enters
+    from a uniform sky has this direction. The radiance (m, m), by exit and entry direction, is per light that
+    enters: its mean over exit directions, weighted by the fractions, is the reflectance.
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
@@ -248,7 +248,7 @@ def _doubling_steps(
 def _add_faces(
     up: Floats, down: Floats, unscattered: Floats, internal: Floats, R: Floats, T: Floats
 ) -> tuple[Floats, Floats]:
-    """Add internal reflection at both faces to a slab lit by one unit of power per direction.
+    """Add internal reflection at the upper and the lower face to a slab, for unit power in each direction.
 
     R, T : (n, m, m) reflection and transmission of the slab without faces, radiance over pi
     up, down : (n, m, m) R and T as operators, multiplied by the flux of the directions
@@ -275,15 +275,16 @@ def _add_faces(
 def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    Their reduced coefficients are those of isotropic half-spaces with the reflectances `total`.
+    Their reduced absorption and scattering coefficients are equal to those of isotropically scattering
+    half-spaces with the reflectances `total`.
 
     total : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The single-scattering factor is fitted to the emerging radiance of all pairs of directions by least
-    squares, with g and with isotropic scattering; the difference of both fits is added to the factor of
-    `angular_response`.
+    The single-scattering factor of isotropic scattering, from `angular_response`, is corrected by the change
+    of a fit: the kernel 1/(a + b) is fitted to the emerging radiance by least squares for both values of the
+    mean cosine, g and 0.
     """
     isotropic = angular_response(total, eta)
     if g == 0.0:

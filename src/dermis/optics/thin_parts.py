@@ -90,12 +90,13 @@ def solve_thin_parts(
 def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
     """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
 
-    It is the transmittance over that for uniform light, divided by the reflectance of the half-space over
-    that for uniform light. The square roots of the incident cosines in air are evenly spaced from 0 to 1.
+    The transmittance for a direction is divided by the transmittance for uniform light, and by the
+    half-space's reflectance for the direction, which is also relative to uniform light. The square roots of
+    the incident cosines in air are evenly spaced from 0 to 1.
 
     total : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the profile comes from photon counts, as in `GaussianSum`
+    from_photons : whether the diffusion profile comes from photon counts instead of diffusion
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total)
@@ -116,7 +117,10 @@ def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tupl
 
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
-    """Return transmittance over reflectance of a half-space, both relative to uniform light, (n, m) [-]."""
+    """Return the directional transmittance of slabs, divided by the directional reflectance, (n, m) [-].
+
+    The transmittance is relative to that for uniform light, as is the reflectance of the half-space.
+    """
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
     return np.asarray(slabs.transmitted / transmitted / reflected)
@@ -126,9 +130,9 @@ class _SlabTotals(NamedTuple):
     """Transmittance and lost reflectance of n slabs in one channel under uniform light, (n,) each.
 
     transmittance : transmitted over incident power [-]
-    relative_transmittance : transmittance over the reflectance of the half-space [-]
-    lost : difference of the reflectances of half-space and slab, over that of the half-space [-]
-    directionality : strength of the dependence on incident direction, as in `ThinParts` [-]
+    relative_transmittance : transmittance divided by the reflectance of the half-space [-]
+    lost : reflectance lost by the finite thickness, divided by the reflectance of the half-space [-]
+    directionality : strength of the dependence on incident direction, 1 in deep slabs, 0 for none [-]
     """
 
     transmittance: Floats

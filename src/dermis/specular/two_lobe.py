@@ -26,7 +26,8 @@ MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF of a mixture of a narrow and a wide Beckmann slope distribution [1/sr].
 
-    m : roughness, broadcast against the angles; its products with both factors are clamped to 0.05 to 1 [-]
+    m : roughness, broadcast against the angles; NARROW_FACTOR m and WIDE_FACTOR m are clamped to 0.05 to 1
+        [-]
     fresnel : function from the cosine v.h to the Fresnel reflectance
 
     Source: [EpicGames2025] for the two lobes; [Walter2007] section 5 for the BRDF.
@@ -36,18 +37,22 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
 
 
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
-    """Return the masking G1 of both lobes together, the fraction of facets visible from a direction [-].
+    """Return the masking G1 of the two-lobe mixture, the fraction of facets visible from a direction [-].
 
     Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
 
     cos_theta : cosine of the direction from the normal
-    m : roughness before it is multiplied by the factors of both lobes [-]
+    m : roughness of the model, from which those of the narrow and the wide lobe are computed [-]
     """
     return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
 def _mix_lobes(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
-    """Return the mean of a function of roughness over both lobes, by their weights."""
+    """Return the mean of a quantity over the narrow and the wide lobe, with the weights of the lobes.
+
+    quantity : function of the roughness of a lobe
+    m : roughness of the model [-]
+    """
     factors = NARROW_FACTOR, WIDE_FACTOR
     narrow, wide = (np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors)
     return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))

@@ -72,8 +72,10 @@ def diffuse_reflectance(eta: float, kind: DiffuseIntegral = "polynomial") -> flo
 def boundary_mismatch(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
     """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr); 1 at an index-matched surface [-].
 
-    Diffusion extrapolates the fluence to zero at the distance 2 A D above the surface. F_dr is the internal
-    `diffuse_reflectance`, computed as `kind` says.
+    Diffusion extrapolates the fluence to zero at the distance 2 A D above the surface. F_dr is the
+    `diffuse_reflectance` from inside.
+
+    kind : "polynomial" or "exact" computation of F_dr
 
     Source: [Jensen2001] section 2.3.
     """

@@ -68,9 +68,13 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
 
 
 def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
-    """Return the Hankel transform of R(r) of a layered medium, without that of T(r), (n, c) [-].
+    """Return the Hankel transform of R(r) of a layered medium, (n, c) [-].
 
-    The arguments are those of `solve`.
+    R(r) is per power that enters. This is faster than `solve`, which also returns that of T(r).
+
+    frequency : (n,) frequencies s > 0 [1/mm]
+    A : boundary mismatch with air [-]
+    source : "beam" or "point", the distribution of first scattering, see `solve`
     """
     return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
 

@@ -86,7 +86,7 @@ class BurleyFit:
 
     profile : fitted profile
     error : (c,) relative root-mean-square error of the ring energies [-]
-    energy_error : (c,) total reflectance of the profile over that of the target, minus 1 [-]
+    energy_error : (c,) relative error of the total reflectance [-]
     """
 
     profile: BurleyProfile

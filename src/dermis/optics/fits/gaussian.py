@@ -38,7 +38,7 @@ class GaussianFit:
 
     profile : fitted sum of Gaussians
     error : (c,) relative root-mean-square error of R(r) at points, or of the ring energies [-]
-    energy_error : (c,) total reflectance of the sum over that of the target, minus 1 [-]
+    energy_error : (c,) relative error of the total reflectance [-]
     kind : "pointwise" or "annulus", whether `error` is over points or rings
     shared : whether all channels use the same variances
     """

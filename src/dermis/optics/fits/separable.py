@@ -58,7 +58,7 @@ class SeparableFit:
 
     kernel : fitted or evaluated kernel
     error : (c,) relative root-mean-square error of the light through sectors of rings [-]
-    energy_error : (c,) total reflectance of the kernel over that of the profile, minus 1 [-]
+    energy_error : (c,) relative error of the total reflectance [-]
     """
 
     kernel: SeparableKernel

@@ -35,7 +35,7 @@ class FitState:
     point : skin, directions of the suns, and colour of the light
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     basis : (9 + k, p, 3) radiance of the masked pixels under each light alone
-    residual : (p, 3) radiance of the photograph minus that of the model
+    residual : (p, 3) difference of the photograph's and the model's radiance
     weight : (p, 3) inverse standard deviation of each pixel, reduced for outliers
     cost : sum of squared weighted residuals and of squared deviations from the priors
     """

@@ -60,7 +60,7 @@ class Unmixer:
         """Unmix a picture; return pigments (h, w, 3), standard deviations (h, w, 2) and residual (h, w, 3).
 
         The pigments are melanin, blood and the third unknown of the model; the standard deviations are those
-        of melanin and blood. The residual is the colour over that of the model.
+        of melanin and blood. The residual is the colour divided by the model's colour.
 
         colours : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
         progress : called with the number of finished rows and the number of all rows
@@ -104,7 +104,7 @@ def recolour(
     """Return the model's colours (h, w, 3) for changed pigments, times the residual of the original colours.
 
     estimate : (h, w, 3) melanin, blood and the third unknown
-    residual : (h, w, 3) original colour over that of the model
+    residual : (h, w, 3) original colour divided by the model's colour
     factors, added : (3,) factor of melanin, blood and the third unknown, and constant that is then added to
         each
     """

@@ -140,7 +140,7 @@ class PigmentEstimate:
     third : (t,) third unknown of the model
     melanin_sd, blood_sd : (t,) lower bounds of the standard deviations due to noise, by the Cramér-Rao bound
         with the priors of blood and of the third unknown [-]
-    residual : (t, 3) colour over that of the model [-]
+    residual : (t, 3) colour divided by the model's colour [-]
     """
 
     melanin: Floats

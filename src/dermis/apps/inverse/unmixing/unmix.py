@@ -110,8 +110,8 @@ class UnmixResult:
 
     melanin, blood : volume fractions of melanosomes in the epidermis and of blood in the dermis [-]
     melanin_sd, blood_sd : lower bounds of their standard deviations due to noise, by the Cramér-Rao bound [-]
-    residual : (h, w, 3) colour over that of the model, which contains paint, hair and all else that is not
-        skin [-]
+    residual : (h, w, 3) colour divided by the model's colour; it contains paint, hair and all else that is
+        not skin [-]
     third : oxygenated fraction of haemoglobin, None if it was not requested [-]
     shading : shading by which the colours were divided, None if it was not requested [-]
     skin : parameters of the model's skins
