@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from dermis.apps.inverse.fitting.fit import fit
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.truths.half_space import diffuse_albedo, reflected_radiance
-from dermis.apps.truths.path_traced import PathTraced, Variant
+from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
 from dermis.apps.validation.comparisons.person import path_trace_view
 from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.apps.validation.pages import JsonObject, write_results
@@ -116,7 +116,7 @@ def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
 
 
 def photograph(
-    renderer: Renderer, one: Case, side: int, samples: int, variant: Variant = "scalar_rgb"
+    renderer: Renderer, one: Case, side: int, samples: int, variant: MitsubaVariant = "scalar_rgb"
 ) -> PathTraced:
     """Return the path-traced picture of a case; the surface is a dielectric of index 1.4.
 
@@ -150,7 +150,7 @@ def main(
     side: int = 256,
     samples: int = 8,
     scenes: int = SCENES,
-    variant: Variant = "scalar_rgb",
+    variant: MitsubaVariant = "scalar_rgb",
     own: int = 3,
     trace_only: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:

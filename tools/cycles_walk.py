@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import RandomState, deflect, uniform
+from dermis.apps.truths.photon import RandomState, random_uniform, scatter_direction
 from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
 
@@ -43,10 +43,10 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
     """Return the initial direction of a walk, with z downwards."""
     if not skin:
         return 0.0, 0.0, 1.0
-    facing = math.sqrt(uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
-    turn = 2.0 * math.pi * uniform(rng)
+    facing = math.sqrt(random_uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
+    turn = 2.0 * math.pi * random_uniform(rng)
     angle = math.acos(facing)
-    if uniform(rng) >= 0.5:
+    if random_uniform(rng) >= 0.5:
         angle -= math.asin(math.sin(angle) / ETA)
     return math.sin(angle) * math.cos(turn), math.sin(angle) * math.sin(turn), math.cos(angle)
 
@@ -61,14 +61,14 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomS
         x = y = z = 0.0
         ux, uy, uz = _entering(skin, rng)
         for step in range(MOST):
-            path = -math.log(uniform(rng))
+            path = -math.log(random_uniform(rng))
             if z + path * uz < 0.0:
                 path = -z / uz
                 ring = np.searchsorted(radii, math.hypot(x + path * ux, y + path * uy))
                 found[:, ring] += powers[:, step]
                 break
             x, y, z = x + path * ux, y + path * uy, z + path * uz
-            ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
+            ux, uy, uz = scatter_direction(ux, uy, uz, 0.0, rng)
 
 
 def main(photons: int = 4_000_000) -> None:

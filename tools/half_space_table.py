@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import deflect, refract, uniform
+from dermis.apps.truths.photon import random_uniform, refract, scatter_direction
 from dermis.base.atomic_write import atomic_file
 from dermis.base.command_line import run_script
 from dermis.base.compiled import compiled
@@ -84,21 +84,21 @@ def _walk(
 ) -> None:
     for _ in range(photons):
         x = y = z = ux = uy = 0.0
-        uz = math.sqrt(uniform(rng)) if diffuse else 1.0
+        uz = math.sqrt(random_uniform(rng)) if diffuse else 1.0
         ux = math.sqrt(1.0 - uz * uz)  # rings are round: one azimuth stands for all
         scatterings = 0
-        path = -math.log(uniform(rng))
+        path = -math.log(random_uniform(rng))
         for _event in range(events):
             to_face = -z / uz if uz < 0.0 else path
             if path <= to_face:
                 x, y, z = x + path * ux, y + path * uy, z + path * uz
-                ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
+                ux, uy, uz = scatter_direction(ux, uy, uz, 0.0, rng)
                 scatterings += 1
-                path = -math.log(uniform(rng))
+                path = -math.log(random_uniform(rng))
                 continue
             x, y, z = x + to_face * ux, y + to_face * uy, 0.0
             path -= to_face
-            if eta == 1.0 or uniform(rng) >= refract(-uz, eta)[0]:
+            if eta == 1.0 or random_uniform(rng) >= refract(-uz, eta)[0]:
                 ring = int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
                 for k in range(len(log_albedo)):
                     left[ring, k] += math.exp(scatterings * log_albedo[k])

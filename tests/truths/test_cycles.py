@@ -12,8 +12,8 @@ from lit_balls import BALL, LIGHTS, ball_scene
 
 from dermis.apps.truths.cycles import (
     PYTHON_VARIABLE,
-    Method,
     PrincipledSkin,
+    SubsurfaceMethod,
     cycles_passes,
     cycles_render,
     describe_scene,
@@ -92,7 +92,7 @@ def test_environment_is_that_of_mitsuba() -> None:
 
 @blender
 @pytest.mark.parametrize(("method", "tolerance"), [("random-walk", 0.03), ("burley", 0.01)])
-def test_ball_returns_its_colour(method: Method, tolerance: float) -> None:
+def test_ball_returns_its_colour(method: SubsurfaceMethod, tolerance: float) -> None:
     scene = ball_scene(environment=Environment(name="uniform"))
     lit = cycles_render(scene, SKIN1, 64, Settings(size=(32, 32)), method=method)
     colour = [diffuse_albedo(float(a)) for a in SKIN1.layers[0].alpha_prime]

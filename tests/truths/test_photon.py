@@ -37,7 +37,7 @@ def test_random_words_are_those_of_the_published_generator() -> None:
 @pytest.mark.parametrize(("word", "expected"), [(0, 2.0**-53), (2**64 - 1, 1.0 - 2.0**-53)])
 def test_uniform_number_is_never_0_or_1(word: int, expected: float) -> None:
     rng = np.array([word, 0, 0, 0], np.uint64)  # the state before the smallest or largest word
-    assert photon.uniform(rng) == expected
+    assert photon.random_uniform(rng) == expected
 
 
 @pytest.mark.parametrize("eta", [0.7, 1.0 / 1.4, 1.0, 1.05, 1.5])
@@ -56,7 +56,7 @@ def test_deflections_have_the_moments_of_henyey_and_greenstein(
 ) -> None:
     """The Legendre moments of the cosine are g and g^2, the mean sideways is 0, and lengths stay 1."""
     rng = generator()
-    after = np.array([photon.deflect(*direction, g, rng) for _ in range(DEFLECTIONS)])
+    after = np.array([photon.scatter_direction(*direction, g, rng) for _ in range(DEFLECTIONS)])
     assert np.allclose(np.linalg.norm(after, axis=1), 1.0, atol=1e-12)
     cosine = after @ direction
     for moment, expected in ((cosine, g), (1.5 * cosine**2 - 0.5, g**2)):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from surface_areas import vertex_areas
 
 from dermis.apps.truths.surface_diffusion import (
-    delaunay,
+    intrinsic_delaunay,
     intrinsic_triangulation,
     mass_and_stiffness,
     welded_surface,
@@ -37,7 +37,7 @@ def test_flips_make_the_best_of_obtuse_triangles() -> None:
     """The sheared triangles become halves of the grid's squares, except at the sheared borders."""
     positions, triangles = skewed_plane(30)
     skewed = intrinsic_triangulation(positions, triangles)
-    flipped = delaunay(skewed)
+    flipped = intrinsic_delaunay(skewed)
     assert flipped.areas().sum() == pytest.approx(skewed.areas().sum(), rel=1e-9)
     assert (skewed.cotangents().min(axis=1) < -1.99).all()
     assert np.mean(flipped.length[flipped.side].max(axis=1) < 1.5) > 0.9
@@ -49,7 +49,7 @@ def test_flips_make_the_best_of_obtuse_triangles() -> None:
 def test_flips_on_a_curved_surface_keep_its_area_and_its_borders() -> None:
     (x, y, _), triangles = skewed_plane(30)[0].T, skewed_plane(30)[1]
     given = intrinsic_triangulation(np.column_stack((6 * np.sin(x / 6), y, 6 * np.cos(x / 6))), triangles)
-    flipped = delaunay(given)
+    flipped = intrinsic_delaunay(given)
     assert np.mean(flipped.corners == given.corners) < 0.5
     assert flipped.areas().sum() == pytest.approx(given.areas().sum(), rel=1e-9)
     uses = np.bincount(flipped.side.ravel())
@@ -63,7 +63,7 @@ def test_operators_have_the_areas_and_linear_functions_have_no_curvature() -> No
     off = np.random.default_rng(5).uniform(-0.12, 0.12, (len(positions), 2))
     positions[:, :2] += np.where(inside[:, None], off, 0)
     mass, stiffness = mass_and_stiffness(
-        delaunay(intrinsic_triangulation(positions, triangles)), len(positions)
+        intrinsic_delaunay(intrinsic_triangulation(positions, triangles)), len(positions)
     )
     assert mass.sum() == pytest.approx(25.0)
     assert np.allclose(mass.sum(axis=1), vertex_areas(positions, triangles))

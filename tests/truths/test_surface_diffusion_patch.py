@@ -14,7 +14,7 @@ from dermis.apps.truths.surface_diffusion import (
     patch_margin_mm,
     welded_surface,
 )
-from dermis.apps.truths.surface_patch import Patch, refine_patch
+from dermis.apps.truths.surface_patch import SurfacePatch, refine_patch
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.primitives import plane, uv_sphere
@@ -35,7 +35,7 @@ def uses(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 @pytest.mark.parametrize("patch", [SMALL, WHOLE])
-def test_edges_are_short_and_the_surface_is_the_same(patch: Patch) -> None:
+def test_edges_are_short_and_the_surface_is_the_same(patch: SurfacePatch) -> None:
     assert longest_edge_mm(patch.positions, patch.triangles) <= max_edge_mm(VARIANCES)
     corners = COARSE[0][COARSE[1]][patch.parent]
     assert np.allclose(patch.weights @ corners, patch.positions[patch.triangles], atol=1e-12)
@@ -86,7 +86,7 @@ def test_vertices_have_barycentrics_on_the_coarse_surface() -> None:
     assert np.allclose(placed, SMALL.positions, atol=1e-12)
 
 
-def heat(patch: Patch) -> tuple[Floats, Floats]:
+def heat(patch: SurfacePatch) -> tuple[Floats, Floats]:
     """Return positions and levels inside the valid region of the small patch, for uneven light."""
     values = 1 + np.cos(patch.positions @ np.array([[1.1, 0.2], [0.4, -0.9], [0.3, 0.7]]))
     levels = diffuse_on_surface(patch.positions, patch.triangles, values, VARIANCES)

@@ -37,8 +37,8 @@ from dermis.scene.settings import Settings
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
-Numbers = NDArray[np.generic]
-Method = Literal["random-walk", "burley"]
+NumericArray = NDArray[np.generic]
+SubsurfaceMethod = Literal["random-walk", "burley"]
 _PASS_COUNT = 4
 _SCRIPT = Path(__file__).with_name("cycles_script.py")
 _TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
@@ -72,7 +72,7 @@ def cycles_render(
     samples: int = 64,
     settings: Settings | None = None,
     *,
-    method: Method = "random-walk",
+    method: SubsurfaceMethod = "random-walk",
     python: str | Path | None = None,
 ) -> PathTraced:
     """Return the scene rendered by Cycles on the CPU, as the mean of 4 passes with variance.
@@ -102,7 +102,7 @@ def cycles_passes(
     samples: Sequence[int],
     settings: Settings | None = None,
     *,
-    method: Method = "random-walk",
+    method: SubsurfaceMethod = "random-walk",
     seed: int = 0,
     python: str | Path | None = None,
 ) -> list[CyclesPass]:
@@ -142,7 +142,7 @@ def _check_samples(samples: int) -> None:
         refuse("samples", "a whole number from 1", f"got {samples}", "Correct it")
 
 
-def _write_scene(folder: Path, scene_dict: SceneDict, arrays: Mapping[str, Numbers]) -> None:
+def _write_scene(folder: Path, scene_dict: SceneDict, arrays: Mapping[str, NumericArray]) -> None:
     (folder / "scene.json").write_text(json.dumps(scene_dict), encoding="utf-8")
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its parameter allow_pickle is no array
 
@@ -207,7 +207,7 @@ FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 
 def describe_scene(
     scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
-) -> tuple[SceneDict, dict[str, Numbers]]:
+) -> tuple[SceneDict, dict[str, NumericArray]]:
     """Return the JSON description of a scene for Cycles without its passes, and its arrays by name.
 
     They are stored in scene.json and arrays.npz.
@@ -224,7 +224,7 @@ def describe_scene(
         "direct": isinstance(medium, Lambertian | BeckmannSurface),
     }
     mesh = scene.head.mesh
-    arrays: dict[str, Numbers] = {
+    arrays: dict[str, NumericArray] = {
         "positions": ((mesh.positions - np.array(scene.head.centre_mm)) / UNIT_MM).astype(np.float32),
         "normals": mesh.normals,
         "triangles": mesh.triangles,

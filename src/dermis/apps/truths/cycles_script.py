@@ -33,7 +33,7 @@ def main(folder: Path) -> None:
     set_world(description["world"], arrays.get("panorama"))
     set_camera(description["camera"])
     set_render(description)
-    times = [render(folder / f"pass_{k}.exr", **one) for k, one in enumerate(description["passes"])]
+    times = [render_pass(folder / f"pass_{k}.exr", **one) for k, one in enumerate(description["passes"])]
     done = {"version": bpy.app.version_string, "times": times}
     (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
 
@@ -107,7 +107,7 @@ def principled_shader(nodes: Any, links: Any, maps: dict[str, Any], description:
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeUVMap")
     node.uv_map = "uv"
     links.new(node.outputs["UV"], texture.inputs["Vector"])
-    texture.image = packed_image("colours", maps["colour_map"])
+    texture.image = pack_image("colours", maps["colour_map"])
     links.new(texture.outputs["Color"], shader.inputs["Base Color"])
     return shader
 
@@ -117,13 +117,13 @@ def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any
     if "normal_map" not in maps:
         return
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
-    texture.image = packed_image("normals", maps["normal_map"])
+    texture.image = pack_image("normals", maps["normal_map"])
     links.new(texture.outputs["Color"], node.inputs["Color"])
     node.uv_map = "uv"
     links.new(node.outputs["Normal"], shader.inputs["Normal"])
 
 
-def packed_image(name: str, rows: Any) -> Any:
+def pack_image(name: str, rows: Any) -> Any:
     """Return a Blender image that contains an array of linear colours.
 
     rows : (h, w, 3) colours, top row first
@@ -161,7 +161,7 @@ def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     def math(operation: str, *inputs: Any) -> Any:
         node = nodes.new("ShaderNodeMath")
         node.operation = operation
-        return connected(links, node, inputs)
+        return set_inputs(links, node, inputs)
 
     def dot(vector: list[float]) -> Any:
         node = nodes.new("ShaderNodeVectorMath")
@@ -183,7 +183,7 @@ def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     links.new(math("MULTIPLY", gaussian, fade.outputs["Result"]), emission.inputs["Strength"])
 
 
-def connected(links: Any, node: Any, inputs: Any) -> Any:
+def set_inputs(links: Any, node: Any, inputs: Any) -> Any:
     """Set the inputs of a shader node to values, or connect them to sockets; return its first output."""
     for socket, value in zip(node.inputs, inputs, strict=False):
         if isinstance(value, float):
@@ -205,7 +205,7 @@ def set_world(description: dict[str, Any], panorama: Any) -> None:
     if panorama is None:
         return
     texture, mapping = nodes.new("ShaderNodeTexEnvironment"), nodes.new("ShaderNodeMapping")
-    texture.image = packed_image("panorama", panorama)
+    texture.image = pack_image("panorama", panorama)
     mapping.inputs["Rotation"].default_value = Matrix(description["turn"]).to_euler()
     links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
     links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
@@ -245,7 +245,7 @@ def set_render(description: dict[str, Any]) -> None:
         cycles.max_bounces = 0
 
 
-def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
+def render_pass(path: Path, samples: int, seed: int) -> tuple[float, float]:
     """Render a pass to a file; return the elapsed time, and the CPU time summed over all cores [s]."""
     cycles = bpy.context.scene.cycles
     cycles.samples, cycles.seed = samples, seed

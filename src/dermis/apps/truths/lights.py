@@ -16,8 +16,8 @@ from dermis.apps.truths.scene_description import (
     cycles_light,
     mitsuba_look_at,
     mitsuba_projector,
+    mitsuba_rgb,
     mitsuba_shape,
-    rgb,
 )
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
@@ -71,8 +71,8 @@ def _check_shadows(light: Light, number: int, renderer: str) -> None:
 
 def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
     """Return Mitsuba's description of a point light."""
-    intensity = np.multiply(light.irradiance, _distance(light) ** 2)
-    return {"type": "point", "position": list(light.position), "intensity": rgb(intensity)}
+    intensity = np.multiply(light.irradiance, _target_distance_mm(light) ** 2)
+    return {"type": "point", "position": list(light.position), "intensity": mitsuba_rgb(intensity)}
 
 
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
@@ -82,7 +82,7 @@ def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
     outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
     falloff = _smoothstep((cosine - outer) / (inner - outer))
-    slide = falloff[..., None] * np.multiply(light.irradiance, _distance(light) ** 2)
+    slide = falloff[..., None] * np.multiply(light.irradiance, _target_distance_mm(light) ** 2)
     return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), tangent)
 
 
@@ -90,13 +90,13 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
     """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
-    unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light))
     return mitsuba_shape("rectangle", np.divide(light.irradiance, unit), to_world=to_world)
 
 
 def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
     """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
-    unit = np.pi * (light.radius_mm / _distance(light)) ** 2
+    unit = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
     return mitsuba_shape(
         "sphere",
         np.divide(light.irradiance, unit),
@@ -108,7 +108,7 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
 def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> SceneDict:
     """Return Mitsuba's directional light, or a distant disc for a light with an angular diameter."""
     if light.angle_degrees == 0:
-        irradiance = rgb(light.irradiance)
+        irradiance = mitsuba_rgb(light.irradiance)
         return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
@@ -158,7 +158,9 @@ def cycles_sphere(light: SphereLight) -> SceneDict:
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return Cycles' area light; its power P gives the radiance P / (pi A) on its area A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
-    unit = facing_irradiance(light.width_mm, light.height_mm, _distance(light)) / (np.pi * width * height)
+    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
+        np.pi * width * height
+    )
     to_target = np.subtract(light.target, light.position)
     shape: dict[str, float | str] = {"shape": "RECTANGLE", "size": width, "size_y": height}
     return cycles_light("AREA", light.irradiance, 1.0 / unit, light.position, to_target, **shape)
@@ -185,7 +187,7 @@ def cycles_stripe(light: StripeLight) -> SceneDict:
 
 
 def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **unit: float) -> SceneDict:
-    power = 4.0 * np.pi * (_distance(light) / UNIT_MM) ** 2
+    power = 4.0 * np.pi * (_target_distance_mm(light) / UNIT_MM) ** 2
     to_target = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
     return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **unit)
@@ -203,7 +205,7 @@ def facing_irradiance(width: float, height: float, distance: float) -> float:
     return float(2.0 * (a / across * np.arctan(b / across) + b / along * np.arctan(a / along)))
 
 
-def _distance(light: PointLight) -> float:
+def _target_distance_mm(light: PointLight) -> float:
     return float(np.linalg.norm(np.subtract(light.target, light.position)))
 
 

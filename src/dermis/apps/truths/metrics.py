@@ -29,7 +29,7 @@ class Estimate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Flip:
+class FlipDifference:
     """Perceived difference of two pictures by FLIP, from 0 to 1.
 
     mean : mean over the mask
@@ -139,7 +139,7 @@ def flip(
     mask: Mask | None = None,
     pixels_per_degree: float = PIXELS_PER_DEGREE,
     high_dynamic_range: bool = False,
-) -> Flip:
+) -> FlipDifference:
     """Return the FLIP error of a picture (h, w, 3) against a reference.
 
     image, reference : sRGB in 0..1 as displayed, after exposure and tone curve; with `high_dynamic_range`
@@ -160,7 +160,7 @@ def flip(
     arrays = (np.ascontiguousarray(T), np.ascontiguousarray(I))
     error, _, _ = evaluator.evaluate(*arrays, mode, not high_dynamic_range, False, False, viewing)
     error = np.where(is_counted, error[..., 0], np.float32(0))
-    return Flip(float(error[is_counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
+    return FlipDifference(float(error[is_counted].mean(dtype=np.float64)), error, float(pixels_per_degree))
 
 
 def _checked_picture(

@@ -18,7 +18,7 @@ from dermis.apps.truths.scene_description import (
     SceneDict,
     check_camera,
     mitsuba_environment,
-    rgb,
+    mitsuba_rgb,
 )
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
@@ -28,7 +28,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
 Doubles = NDArray[np.float64]
-Numbers = NDArray[np.generic]
+NumericArray = NDArray[np.generic]
 ROULETTE_DEPTH = 100
 """Scattering events before Russian roulette. Earlier roulette leaves few paths of high weight: red on skin2
 then has nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
@@ -143,10 +143,10 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
     """
     opaque = {}
     for k in _materials_of_kind(head, "opaque"):
-        colour = rgb(head.mesh.materials[k].colour)
+        colour = mitsuba_rgb(head.mesh.materials[k].colour)
         opaque[f"material_{k}"] = _material_mesh(mi, head, k, bsdf=_diffuse_bsdf(mi, colour))
     if isinstance(medium, Lambertian):
-        diffuse = _diffuse_bsdf(mi, rgb(medium.albedo))
+        diffuse = _diffuse_bsdf(mi, mitsuba_rgb(medium.albedo))
         skin_materials = _materials_of_kind(head, "skin")
         skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in skin_materials}
         return {**skin, **opaque}, ()
@@ -223,8 +223,8 @@ def _homogeneous_medium(layer: Layer) -> SceneDict:
     # Textures are limited to 1, so the scale is the largest extinction.
     return {
         "type": "homogeneous",
-        "albedo": rgb(layer.alpha_prime),
-        "sigma_t": rgb(extinction / extinction.max()),
+        "albedo": mitsuba_rgb(layer.alpha_prime),
+        "sigma_t": mitsuba_rgb(extinction / extinction.max()),
         "scale": float(extinction.max()),
         "phase": {"type": "isotropic"},
     }
@@ -242,10 +242,10 @@ def interface_mesh(mi: Mitsuba, solid: ClosedSurface, media: SceneDict) -> Mitsu
 
 def mesh_shape(
     mi: Mitsuba,
-    vertices: Numbers,
-    triangles: Numbers,
-    normals: Numbers | None = None,
-    uv: Numbers | None = None,
+    vertices: NumericArray,
+    triangles: NumericArray,
+    normals: NumericArray | None = None,
+    uv: NumericArray | None = None,
     **attributes: MitsubaObject,
 ) -> MitsubaObject:
     """Return triangles as a Mitsuba mesh.
@@ -263,11 +263,11 @@ def mesh_shape(
     arrays = {"vertex_positions": vertices, "vertex_normals": normals, "vertex_texcoords": uv}
     for name, values in arrays.items():
         if values is not None:
-            parameters[name] = _flattened(values, np.float32)
-    parameters["faces"] = _flattened(triangles, np.uint32)
+            parameters[name] = _flatten_array(values, np.float32)
+    parameters["faces"] = _flatten_array(triangles, np.uint32)
     parameters.update()
     return mesh
 
 
-def _flattened(values: Numbers, number_type: type[np.generic]) -> Numbers:
+def _flatten_array(values: NumericArray, number_type: type[np.generic]) -> NumericArray:
     return np.ascontiguousarray(values, dtype=number_type).ravel()

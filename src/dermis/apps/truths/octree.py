@@ -63,7 +63,7 @@ def build_octree(samples: IrradianceSamples) -> Octree:
     corners = corners[order]
     irradiance = np.asarray(samples.irradiance, np.float64)[samples.triangles[order]]
     area = triangle_areas(corners)
-    first, end, next_node = _nodes(morton_keys[order])
+    first, end, next_node = _octree_nodes(morton_keys[order])
     centre, points, flux, second_moment, moment_error, centroid_error = _point_approximation(
         corners, irradiance, area, first, end
     )
@@ -102,7 +102,7 @@ def _morton_keys(points: Floats) -> Index:
     return morton_keys
 
 
-def _nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
+def _octree_nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
     """Return for each octree node its first triangle, the end of its triangles, and the next node.
 
     morton_keys : (m,) sorted keys of the triangles

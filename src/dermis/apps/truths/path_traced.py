@@ -33,7 +33,7 @@ __all__ = ["Lambertian", "PathTraced", "path_trace"]
 
 Floats = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
-Variant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
+MitsubaVariant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
 
 SAMPLES_PER_PASS = 4
 _MIN_PASSES = 2
@@ -68,7 +68,7 @@ def path_trace(
     samples: int = 64,
     settings: Settings | None = None,
     *,
-    variant: Variant = "scalar_rgb",
+    variant: MitsubaVariant = "scalar_rgb",
     use_cache: bool = True,
     progress: ProgressCallback | None = None,
 ) -> PathTraced:
@@ -113,7 +113,7 @@ def path_trace(
 
 def render_passes(
     mi: Mitsuba,
-    variant: Variant,
+    variant: MitsubaVariant,
     target_count: int,
     size: tuple[int, int],
     key: str | None,
@@ -133,7 +133,7 @@ def render_passes(
             built_scene, notes = build_radiance()
             if passes is None:
                 mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES), np.float32)[..., 0]
-                passes = Passes.empty(size, np.clip(mask, 0.0, 1.0), notes)
+                passes = PassStatistics.empty(size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built_scene, passes, target_count, key, progress)
     return PathTraced(
         passes.mean.astype(np.float32),
@@ -158,7 +158,7 @@ def pass_count(samples: int) -> int:
 def add_passes(
     mi: Mitsuba,
     built_scene: MitsubaObject,
-    passes: Passes,
+    passes: PassStatistics,
     target_count: int,
     key: str | None,
     progress: ProgressCallback | None,
@@ -190,7 +190,7 @@ _CACHE_VERSION = 1  # increase when the result for the same scene changes
 
 
 @dataclass
-class Passes:
+class PassStatistics:
     """Running mean and variance of passes with equal settings.
 
     mean : (h, w, 3) mean of all passes
@@ -209,7 +209,9 @@ class Passes:
     seconds: float = 0.0
 
     @classmethod
-    def empty(cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]) -> Passes:
+    def empty(
+        cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
+    ) -> PassStatistics:
         """Return the state before the first pass.
 
         size : width and height of the image [pixel]
@@ -259,16 +261,16 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
     return digest.hexdigest()[:40]
 
 
-def load_passes(key: str, size: tuple[int, int]) -> Passes | None:
+def load_passes(key: str, size: tuple[int, int]) -> PassStatistics | None:
     """Return cached passes, or None if none have this key and size."""
     found = load_arrays(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (size[1], size[0], 3):
         return None
     notes = tuple(str(note) for note in found["notes"])
     moments = found["mean"], found["spread"], found["mask"]
-    return Passes(*moments, notes, int(found["count"]), float(found["seconds"]))
+    return PassStatistics(*moments, notes, int(found["count"]), float(found["seconds"]))
 
 
-def save_passes(key: str, passes: Passes) -> None:
+def save_passes(key: str, passes: PassStatistics) -> None:
     """Write passes to the cache, ignoring errors of the disk."""
     try_save_arrays(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

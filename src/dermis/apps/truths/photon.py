@@ -35,7 +35,7 @@ class LayerStack(NamedTuple):
     face_mm: Floats
 
 
-class Tally(NamedTuple):
+class PhotonTally(NamedTuple):
     """Numbers of photons by how their walk ended.
 
     reflected, transmitted : (rings + 1,) left above or below after scattering, by ring of the exit point; the
@@ -71,7 +71,7 @@ def next_uint64(rng: RandomState) -> np.uint64:
 
 
 @compiled
-def uniform(rng: RandomState) -> float:
+def random_uniform(rng: RandomState) -> float:
     """Return a random number strictly between 0 and 1, whose logarithm is finite and not 0."""
     return ((next_uint64(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
@@ -98,7 +98,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
 
 @compiled
-def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[float, float, float]:
+def scatter_direction(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[float, float, float]:
     """Return a direction sampled from Henyey and Greenstein's phase function about the unit vector (x, y, z).
 
     g : mean cosine of the scattering angle [-]
@@ -106,7 +106,7 @@ def deflect(x: float, y: float, z: float, g: float, rng: RandomState) -> tuple[f
     Source: [HenyeyGreenstein1941]; [Marsaglia1972] for the azimuth, [Duff2017] for the frame.
     """
     while True:
-        a, b = 2.0 * uniform(rng) - 1.0, 2.0 * uniform(rng) - 1.0
+        a, b = 2.0 * random_uniform(rng) - 1.0, 2.0 * random_uniform(rng) - 1.0
         s = a * a + b * b
         if 0.0 < s < 1.0:
             break
@@ -134,7 +134,9 @@ def _ring_index(x: float, y: float, edges2: Floats) -> int:
 
 
 @compiled
-def _tally_exit(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: Tally) -> None:
+def _tally_exit(
+    x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: PhotonTally
+) -> None:
     if scatterings == 0:
         tally.unscattered[0 if upward else 1] += 1
     elif upward:
@@ -144,7 +146,7 @@ def _tally_exit(x: float, y: float, upward: bool, scatterings: int, edges2: Floa
 
 
 @compiled
-def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
+def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: PhotonTally) -> None:
     """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed.
 
     edges2 : (n + 1,) squared radii of the ring edges
@@ -153,18 +155,18 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ta
     uz = 1.0
     layer, bottom = 1, len(stack.eta) - 2
     scatterings = 0
-    depth = -math.log(uniform(rng))  # optical depth to the next scattering
+    depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_EVENTS):
         upward = uz < 0.0
         path = depth / stack.sigma_t[layer]
         to_face = (stack.face_mm[layer - 1 if upward else layer] - z) / uz
         if path < to_face:
             x, y, z = x + path * ux, y + path * uy, z + path * uz
-            if uniform(rng) > stack.albedo[layer]:
+            if random_uniform(rng) > stack.albedo[layer]:
                 tally.absorbed[layer - 1] += 1
                 return
-            ux, uy, uz = deflect(ux, uy, uz, stack.g[layer], rng)
-            depth = -math.log(uniform(rng))
+            ux, uy, uz = scatter_direction(ux, uy, uz, stack.g[layer], rng)
+            depth = -math.log(random_uniform(rng))
             scatterings += 1
             continue
         x, y = x + to_face * ux, y + to_face * uy
@@ -173,7 +175,7 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ta
         beyond = layer - 1 if upward else layer + 1
         eta = stack.eta[layer] / stack.eta[beyond]
         F, cosine = refract(abs(uz), eta)
-        if F > 0.0 and uniform(rng) < F:
+        if F > 0.0 and random_uniform(rng) < F:
             uz = -uz
             continue
         if beyond == 0 or beyond > bottom:
@@ -185,7 +187,9 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ta
 
 
 @compiled
-def trace_photons(photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: Tally) -> None:
+def trace_photons(
+    photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: PhotonTally
+) -> None:
     """Trace a number of photons and add them to the tally by how their walks end.
 
     edges2 : (n + 1,) squared radii of the ring edges

@@ -39,7 +39,7 @@ def check_camera(camera: Camera, renderer: str) -> None:
         refuse("camera", expected, actual, "Render with such a camera, and crop or resample the picture")
 
 
-def rgb(components: Iterable[float]) -> SceneDict:
+def mitsuba_rgb(components: Iterable[float]) -> SceneDict:
     """Return Mitsuba's description of a linear Rec. 709 colour."""
     return {"type": "rgb", "value": [float(value) for value in components]}
 
@@ -58,7 +58,7 @@ def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneD
     kind : Mitsuba's name of the shape
     shape : further properties of the shape
     """
-    emitter = {"type": "area", "radiance": rgb(radiance)}
+    emitter = {"type": "area", "radiance": mitsuba_rgb(radiance)}
     return {"type": kind, **shape, "bsdf": {"type": "null"}, "emitter": emitter}
 
 
@@ -127,14 +127,14 @@ def cycles_light(
 def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
     """Return Mitsuba's description of an environment light."""
     if environment.name == UNIFORM:
-        return {"type": "constant", "radiance": rgb(np.full(3, environment.exposure))}
+        return {"type": "constant", "radiance": mitsuba_rgb(np.full(3, environment.exposure))}
     panorama = environment.exposure * load_panorama(environment.name)
     # Mitsuba's panoramas begin at the middle column of ours.
     to_world = np.eye(4)
     to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _rotation(environment)).T
     return {
         "type": "envmap",
-        "bitmap": mi.Bitmap(_with_poles(panorama).astype(np.float32)),
+        "bitmap": mi.Bitmap(_move_rows_to_poles(panorama).astype(np.float32)),
         "to_world": mi.ScalarTransform4f(to_world),
     }
 
@@ -157,7 +157,7 @@ def _rotation(environment: Environment) -> Floats:
     return np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])
 
 
-def _with_poles(panorama: Floats) -> Floats:
+def _move_rows_to_poles(panorama: Floats) -> Floats:
     """Return a panorama resampled so that its first and last rows are at the poles, as in Mitsuba.
 
     panorama : (h, w, 3) radiance at the centres of rows; the result has h + 1 rows

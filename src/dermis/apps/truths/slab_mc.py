@@ -18,7 +18,7 @@ from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.radial import RadialProfile, missing_light_warnings, ring_edges
 
 if TYPE_CHECKING:
-    from dermis.apps.truths.photon import Counts, LayerStack, Tally
+    from dermis.apps.truths.photon import Counts, LayerStack, PhotonTally
 
 
 ProgressCallback = Callable[[int, int], None]
@@ -176,16 +176,16 @@ def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
 
 def _trace_batches(
     stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
-) -> Tally:
+) -> PhotonTally:
     from numba import config
 
-    from dermis.apps.truths.photon import Tally, trace_photons
+    from dermis.apps.truths.photon import PhotonTally, trace_photons
 
     stop = Event()
 
-    def trace_batch(size: int, seeds: np.random.SeedSequence) -> Tally:
+    def trace_batch(size: int, seeds: np.random.SeedSequence) -> PhotonTally:
         lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
-        tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
+        tally = PhotonTally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
         for done in range(0, size, _PHOTONS_PER_CALL):
             if stop.is_set():
@@ -204,10 +204,10 @@ def _trace_batches(
                     progress(len(tallies), BATCH_COUNT)
         finally:
             stop.set()  # otherwise the pool would wait for the remaining batches
-    return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
+    return PhotonTally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 
-def _slab_result(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
+def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) -> SlabResult:
     from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]

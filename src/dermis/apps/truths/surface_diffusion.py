@@ -58,7 +58,9 @@ def diffuse_on_surface(
     vertex_values = _checked_values(values, len(vertices))
     added_variances = np.diff(_checked_variances(variances_mm2), prepend=0.0)
     _check_resolution(vertices, corners, variances_mm2, steps)
-    mass, stiffness = mass_and_stiffness(delaunay(intrinsic_triangulation(vertices, corners)), len(vertices))
+    mass, stiffness = mass_and_stiffness(
+        intrinsic_delaunay(intrinsic_triangulation(vertices, corners)), len(vertices)
+    )
     levels = [vertex_values]
     for variance in added_variances:
         levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), steps))
@@ -117,7 +119,7 @@ def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: fl
     steps : number of time steps
     """
     step = variance / 2 / steps
-    solve = _factorised((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
+    solve = _lu_solver((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
     explicit = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
     first = 1 / (_GAMMA * (2 - _GAMMA))
     lumped = mass.tocsr()
@@ -127,7 +129,7 @@ def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: fl
     return values
 
 
-def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
+def _lu_solver(matrix: csc_array) -> Callable[[Floats], Floats]:
     """Return a function that solves a linear system, by sparse LU factorisation without pivoting.
 
     matrix : symmetric, positive definite matrix
@@ -183,7 +185,7 @@ _MAX_SWEEPS = 1000
 
 
 @dataclass(frozen=True)
-class Triangulation:
+class IntrinsicTriangulation:
     """Triangulation given by its edge lengths alone, without positions in space.
 
     corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1
@@ -208,7 +210,7 @@ class Triangulation:
         return np.asarray(law_of_cosines / (4 * self.areas()[:, None]))
 
 
-def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulation:
+def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTriangulation:
     """Return the edge lengths of a triangle mesh as a triangulation.
 
     A tiny length is added to all edges if a triangle is degenerate.
@@ -221,10 +223,10 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> Triangulatio
     _, side, length = triangle_edges(positions, triangles)
     slack = length[side].sum(axis=1) - 2 * length[side].max(axis=1)
     missing = max(0.0, _SLACK * float(length.mean()) - float(slack.min()))
-    return Triangulation(triangles, side, length + missing)
+    return IntrinsicTriangulation(triangles, side, length + missing)
 
 
-def delaunay(surface: Triangulation) -> Triangulation:
+def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulation:
     """Return the intrinsic Delaunay triangulation of a surface, by edge flips.
 
     The two angles opposite each edge then sum to at most pi, so that heat flows from hot to cold along every
@@ -234,7 +236,7 @@ def delaunay(surface: Triangulation) -> Triangulation:
     Source: [BobenkoSpringborn2007]; [Fisher2007] for flips by lengths.
     """
     corners, side, length = surface.corners.copy(), surface.side.copy(), surface.length.copy()
-    flipped = Triangulation(corners, side, length)
+    flipped = IntrinsicTriangulation(corners, side, length)
     flippable = _interior_edges(corners, side, len(length))
     # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
     for _ in range(_MAX_SWEEPS):
@@ -249,7 +251,7 @@ def delaunay(surface: Triangulation) -> Triangulation:
 def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
     """Return the mask (e,) of edges shared by exactly two triangles of equal orientation.
 
-    corners, side : vertex and edge indices of the triangles' sides, as in `Triangulation`
+    corners, side : vertex and edge indices of the triangles' sides, as in `IntrinsicTriangulation`
     count : number of edges
     """
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
@@ -280,7 +282,7 @@ def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) 
     return np.asarray(mutual[np.argsort(side.ravel()[mutual], kind="stable")].reshape(-1, 2).T)
 
 
-def _flip_edges(flipped: Triangulation, pairs: Index) -> None:
+def _flip_edges(flipped: IntrinsicTriangulation, pairs: Index) -> None:
     """Replace each edge ab, between triangles abc and bad, by the edge cd, in place.
 
     pairs : (2, m) indices of the sides of these edges
@@ -306,7 +308,7 @@ def _apex_coordinates(base: Floats, first: Floats, second: Floats) -> tuple[Floa
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))
 
 
-def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, csc_array]:
+def mass_and_stiffness(surface: IntrinsicTriangulation, count: int) -> tuple[csc_array, csc_array]:
     """Return mass matrix M [mm2] and stiffness matrix K [-] of linear finite elements, each (n, n).
 
     The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent

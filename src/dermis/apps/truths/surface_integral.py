@@ -49,7 +49,7 @@ def integrate_exitance(
     from dermis.apps.truths.octree_gather import gather_exitance
 
     bound = (error / _ERROR_AT_UNIT_BOUND) ** (2 / 3)
-    tree = _weighted_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error))
+    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error))
     table = tabulate_profile(profile)
     exitance = np.zeros_like(positions)
     slices = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(positions), _POINTS_PER_CALL)]
@@ -67,7 +67,7 @@ def integrate_exitance(
     return exitance
 
 
-def _weighted_bounds(tree: Octree, factor: float) -> Octree:
+def _weight_error_bounds(tree: Octree, factor: float) -> Octree:
     """Return the octree with a larger weight of those error bounds whose errors do not cancel.
 
     factor : factor of these bounds

@@ -18,7 +18,7 @@ _BARYCENTRIC_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Patch:
+class SurfacePatch:
     """Small triangles of a patch, and the mesh triangles that they subdivide.
 
     positions : (n, 3) vertex positions [mm]
@@ -82,7 +82,7 @@ class Patch:
         return sum((weights[:, k, None] * values[..., corners[:, k], :] for k in range(3)), np.zeros(()))
 
 
-def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: ArrayLike) -> Patch:
+def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: ArrayLike) -> SurfacePatch:
     """Return a patch of a mesh, with welded uv seams, on which light can be blurred by given variances.
 
     centre_mm, radius_mm : ball inside which results are valid; an infinite radius takes the whole mesh [mm]
@@ -102,7 +102,7 @@ def refine_patch(
     radius_mm: float,
     edge_mm: float,
     margin_mm: float,
-) -> Patch:
+) -> SurfacePatch:
     """Return the surface within radius plus margin of a centre, with edges of at most `edge_mm`.
 
     Edges that are too long are halved in both of their triangles, so no crack opens. New vertices lie on the
@@ -136,7 +136,7 @@ def refine_patch(
         corners, source, weights = split_triangles(corners, weights, midpoint[side], vertices)
         parent = parent[source]
     used, compact = np.unique(corners, return_inverse=True)
-    return Patch(vertices[used], compact.reshape(-1, 3), parent, weights, centre, float(radius_mm))
+    return SurfacePatch(vertices[used], compact.reshape(-1, 3), parent, weights, centre, float(radius_mm))
 
 
 def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:

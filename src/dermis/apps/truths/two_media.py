@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import MAX_EVENTS, RandomState, deflect, refract, uniform
+from dermis.apps.truths.photon import MAX_EVENTS, RandomState, random_uniform, refract, scatter_direction
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Ra
     z = ux = uy = 0.0
     uz = 1.0
     medium = 0 if x < 0.0 else 1
-    depth = -math.log(uniform(rng))  # optical depth to the next scattering
+    depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_EVENTS):
         path = depth / sigma_t[medium]
         to_face = -z / uz if uz < 0.0 else math.inf
@@ -39,15 +39,15 @@ def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Ra
         elif to_face < path:
             x, z = x + to_face * ux, 0.0
             depth -= to_face * sigma_t[medium]
-            if uniform(rng) >= refract(-uz, eta)[0]:
+            if random_uniform(rng) >= refract(-uz, eta)[0]:
                 return x
             uz = -uz
         else:
             x, z = x + path * ux, z + path * uz
-            if uniform(rng) > albedo[medium]:
+            if random_uniform(rng) > albedo[medium]:
                 return math.nan
-            ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
-            depth = -math.log(uniform(rng))
+            ux, uy, uz = scatter_direction(ux, uy, uz, 0.0, rng)
+            depth = -math.log(random_uniform(rng))
     return math.nan
 
 
@@ -71,7 +71,9 @@ def tally_exits(
     width = (edges_mm[-1] - edges_mm[0]) / bins
     for start in range(bins):
         for _ in range(photons):
-            end = _trace_photon(edges_mm[0] + (start + uniform(rng)) * width, sigma_t, albedo, eta, rng)
+            end = _trace_photon(
+                edges_mm[0] + (start + random_uniform(rng)) * width, sigma_t, albedo, eta, rng
+            )
             if edges_mm[0] <= end < edges_mm[-1]:
                 tally[start, int((end - edges_mm[0]) / width)] += 1
 

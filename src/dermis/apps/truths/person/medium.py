@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.person.person import Person
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, mitsuba_rgb
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.mesh.geometry import triangle_areas
 from dermis.optics.media import SKIN_ETA
@@ -88,7 +88,7 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
                 "raw": True,
                 "to_world": to_world.scale([float(c) for c in high - low]),
             },
-            "sigma_t": rgb(extinction / extinction.max()),  # textures are limited to 1
+            "sigma_t": mitsuba_rgb(extinction / extinction.max()),  # textures are limited to 1
             "scale": float(extinction.max()),
             "phase": {"type": "isotropic"},
         }

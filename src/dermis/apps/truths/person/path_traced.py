@@ -16,9 +16,9 @@ from dermis.apps.truths.mitsuba_scene import (
 )
 from dermis.apps.truths.path_traced import (
     SAMPLES_PER_PASS,
+    MitsubaVariant,
     PathTraced,
     ProgressCallback,
-    Variant,
     hash_lighting,
     pass_count,
     render_passes,
@@ -26,7 +26,7 @@ from dermis.apps.truths.path_traced import (
 from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, VOXELS, mean_free_paths, skin_medium
 from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, mitsuba_texture, skin_shapes
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
 from dermis.mesh.mesh import Material
 from dermis.scene.model import Scene
 
@@ -44,7 +44,7 @@ def path_trace_person(
     size: tuple[int, int],
     samples: int = 64,
     *,
-    variant: Variant = "scalar_rgb",
+    variant: MitsubaVariant = "scalar_rgb",
     use_cache: bool = True,
     progress: ProgressCallback | None = None,
 ) -> PathTraced:
@@ -117,11 +117,11 @@ def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
 
 def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
     if material.part is None:
-        return {"type": "diffuse", "reflectance": rgb(material.colour)}
+        return {"type": "diffuse", "reflectance": mitsuba_rgb(material.colour)}
     tongue = material.part == "tongue"
     upper, lower = person.textures.teeth
     texture = upper if material.part == "upper teeth" else lower
-    colour = rgb(material.colour) if tongue else mitsuba_texture(mi, texture)
+    colour = mitsuba_rgb(material.colour) if tongue else mitsuba_texture(mi, texture)
     return {
         "type": "roughplastic",
         "distribution": "beckmann",

@@ -13,7 +13,7 @@ from dermis.apps.truths.mitsuba_scene import interface_gap_mm, interface_mesh, m
 from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_inwards
 from dermis.apps.truths.person.medium import COAT_INDEX, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
 from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm, profile_mm
 
 
@@ -206,14 +206,14 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
     """
     shapes = {}
     # Mitsuba's unit of length is the radius.
-    depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
+    optical_depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
     with tempfile.TemporaryDirectory() as folder:
-        for k, group in enumerate(absorption_groups(depth)):
+        for k, group in enumerate(absorption_groups(optical_depth)):
             file = Path(folder) / f"{k}.txt"
             write_curves(file, hairs.knots_mm[group], hairs.radius_mm[group])
             fibre = {
                 "type": "hair",
-                "sigma_a": rgb(depth[group].mean(axis=0)),
+                "sigma_a": mitsuba_rgb(optical_depth[group].mean(axis=0)),
                 "longitudinal_roughness": LONGITUDINAL_ROUGHNESS,
                 "azimuthal_roughness": AZIMUTHAL_ROUGHNESS,
                 "scale_tilt": CUTICLE_TILT_DEGREES,
@@ -224,12 +224,12 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
     return shapes
 
 
-def absorption_groups(depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
+def absorption_groups(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
     """Return the fibre indices of at most `MAX_HAIR_GROUPS` groups with similar absorption.
 
-    depth : (n, 3) absorption of each fibre; fibres are grouped by its sum over the channels
+    optical_depth : (n, 3) optical depth over the radius of each fibre; its sum over the channels is compared
     """
-    order = np.argsort(depth.sum(axis=1), kind="stable")
+    order = np.argsort(optical_depth.sum(axis=1), kind="stable")
     return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
 
 

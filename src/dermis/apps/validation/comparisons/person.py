@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
-from dermis.apps.truths.path_traced import PathTraced, Variant
+from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
 from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.references import check_visible
@@ -123,7 +123,7 @@ def path_trace_view(
     samples: int,
     use_cache: bool = True,
     progress: Callable[[int, int], None] | None = None,
-    variant: Variant = "scalar_rgb",
+    variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
     """Path-trace a person, in a medium with the mean exit offset of the frame's profile.
 

@@ -24,7 +24,7 @@ from dermis.apps.export.targets.mitsuba.scene import (
 )
 from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, mitsuba_rgb
 from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 from dermis.optics.cumulative_profile import CumulativeProfile
 
@@ -71,7 +71,7 @@ def half_lit_plane(
         "sampler": {"type": "independent"},
     }
     skin = {"type": "rectangle", "to_world": transform().scale([size, size, 1.0]), "interior": inside}
-    black_bsdf = {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
+    black_bsdf = {"type": "diffuse", "reflectance": mitsuba_rgb((0, 0, 0))}
     lamp = {"type": "rectangle", "to_world": lamp_to_world, "bsdf": black_bsdf}
     return mi.load_dict(
         {
@@ -79,7 +79,7 @@ def half_lit_plane(
             "integrator": {"type": "volpath", "rr_depth": 400},
             "sensor": {**sensor, **({"medium": inside} if camera_below else {})},
             "skin": {**skin, "bsdf": surface_description(boundary)},
-            "lamp": {**lamp, "emitter": {"type": "area", "radiance": rgb((1, 1, 1))}},
+            "lamp": {**lamp, "emitter": {"type": "area", "radiance": mitsuba_rgb((1, 1, 1))}},
         }
     )
 

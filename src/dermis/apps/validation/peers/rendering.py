@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.cycles import CyclesPass, Method, cycles_passes
+from dermis.apps.truths.cycles import CyclesPass, SubsurfaceMethod, cycles_passes
 from dermis.apps.truths.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.apps.validation.benchmarks.cases import FRAGMENT_TECHNIQUE, GPU_GEMS_3
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES
@@ -23,7 +23,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-METHODS: tuple[Method, ...] = ("random-walk", "burley")
+METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def render_peers(
 
 
 def _cycles_passes(
-    scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: Method, seed: int
+    scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: SubsurfaceMethod, seed: int
 ) -> list[CyclesPass]:
     """Render the passes of Cycles after an untimed one, in which Cycles builds the scene.
 

@@ -17,7 +17,7 @@ from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
-from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, rgb
+from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
@@ -98,8 +98,8 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
     return {
         "type": "homogeneous",
         "id": "skin_medium",
-        "albedo": rgb(medium.albedo),
-        "sigma_t": rgb(extinction / extinction.max()),
+        "albedo": mitsuba_rgb(medium.albedo),
+        "sigma_t": mitsuba_rgb(extinction / extinction.max()),
         "scale": float(extinction.max()),
         "phase": {"type": "isotropic"},
     }
@@ -133,7 +133,7 @@ def _lower_surface(dimmed: bool) -> SceneDict:
     """
     if not dimmed:
         return {"type": "null", "id": "skin_below"}
-    black = {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
+    black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
     return {"type": "mask", "opacity": _texture("held_back"), "bsdf": black, "id": "skin_below"}
 
 

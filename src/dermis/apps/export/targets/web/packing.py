@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 Bytes = NDArray[np.uint8]
 ByteRun = tuple[int, int, int, int, int, tuple[float, ...]]
 """Offset and size of a run of bytes, bytes per word, words per row, order of the differences between rows,
-and the step of each float in a row. With 0 bytes per word, the steps are the indices of the runs to concatenate."""
+and the step of each float in a row. With 0 bytes per word, the last entry has the indices of runs that are
+concatenated instead."""
 _ESCAPED = frozenset({0, 13, ord("<")})  # characters that HTML changes in, or that end, a script element
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _ORDERS = (0, 1, 2)
