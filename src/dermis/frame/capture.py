@@ -17,7 +17,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 _CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
 ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
-"""Kind of adapter for which frames are captured, by its name."""
+"""Kinds of adapters for which frames can be captured, by the names that callers use."""
 
 
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:

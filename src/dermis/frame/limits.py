@@ -25,8 +25,8 @@ _GEOMETRY_BYTES = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, re
 _PICTURE_BYTES = 36  # bytes per pixel
 _SAMPLE_BYTES = 8  # bytes per sample
 _CHANNEL_BYTES = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
-_FEW_SAMPLES = 4  # per pixel; with fewer, edges alias
-_BUDGET_FRACTION = 0.75  # of the available memory; the head, its maps and programs need the rest
+_FEW_SAMPLES = 4  # samples per pixel; with fewer, edges alias
+_BUDGET_FRACTION = 0.75  # fraction of free memory for a frame; the head and programs need the rest
 _MIN_SIDE = 64  # smaller sides save nothing
 
 

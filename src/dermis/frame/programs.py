@@ -26,16 +26,16 @@ HALF_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
 FRAME_FOLDER = Path(__file__).parent
 FEATURES_FOLDER = FRAME_FOLDER / "features"
-"""Root of shader paths such as "shading/shade.wgsl"."""
+"""Folder to which shader paths such as "shading/shade.wgsl" are relative."""
 SPECULAR_FOLDER = Path(str(specular.__file__)).parent
 TILE = 16
-"""Side of the workgroups of short shaders; smaller ones end before a GPU has started the next."""
+"""Side of the workgroups of short shaders; a GPU starts smaller ones more slowly than they run."""
 WORKGROUP_SIZE = 64
-"""Invocations per workgroup, EACH of each.wgsl."""
+"""Invocations per workgroup of shaders over lists, the constant EACH of each.wgsl."""
 _GROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
 _STRIP_PIXELS = 16  # pixels per invocation of shade.wgsl on software adapters
 _SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
-_MAX_SAMPLES = 64  # per invocation: a driver ends loops after 65,535 iterations
+_MAX_SAMPLES = 64  # limit of samples per invocation, as a driver ends loops after 65,535 iterations
 
 
 _COMMON_SHADERS = (  # shaders of most frames

@@ -36,7 +36,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
 FRAMES_IN_FLIGHT = 3
-"""Limit of submitted frames that are not complete: Python and the device overlap, with little latency."""
+"""Limit of submitted, incomplete frames, so that Python and the device overlap with little latency."""
 
 Submit = Callable[[], Readback]
 Receive = Callable[[Readback], T]

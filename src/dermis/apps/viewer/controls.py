@@ -13,7 +13,7 @@ from dermis.scene.camera import camera_preset
 Event = Mapping[str, Any]
 Point = tuple[float, float]
 CAMERA_PRESETS = ("portrait", "three-quarter", "profile", "ear", "cheek")
-"""Camera presets of the keys 1 to 5."""
+"""Names of the camera presets that the keys 1 to 5 select."""
 LIGHT_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
 _MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event, which sums all rotations of a frame

@@ -28,7 +28,7 @@ from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
 from dermis.scene.skin import Pigments
 
 ATLAS = "atlas"
-"""Name of the view of the atlas as a flat image."""
+"""Name of the view that shows the atlas as a flat image."""
 _MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
 
 
@@ -72,7 +72,7 @@ Table = Mapping[str, Any]
 """The [head] table of a scene file."""
 PICTURE = "picture"
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
-"""Views of a part of the light, and their values of `Settings.parts`."""
+"""Views that show a part of the reflected light, with the value of `Settings.parts` for each."""
 
 
 @dataclass(frozen=True, eq=False)

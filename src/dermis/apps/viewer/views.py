@@ -31,10 +31,10 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 LEVEL_VIEWS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
-"""Pyramid level of the irradiance by name of its view."""
+"""Level of the blur pyramid that each view of irradiance shows."""
 
 ATLAS_LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
-"""Names of the layers of the atlas."""
+"""Names of the maps over the atlas that the view "atlas" can show."""
 
 VIEW_NAMES = ("picture", *PARTS, *ATLAS_LAYERS, "shadow", "normals", ATLAS)
 """Names of all views."""

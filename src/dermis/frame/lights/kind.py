@@ -126,7 +126,7 @@ KINDS: Registry[Kind[Any]] = Registry(
     },
     f"Register its Kind in {__name__}.KINDS",
 )
-"""Kinds by their names in scene files: each shader of this folder with the module beside it."""
+"""Kinds of lights by their names in scene files; each has a module and a shader in this folder."""
 
 
 def area_light_members(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:

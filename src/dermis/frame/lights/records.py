@@ -30,7 +30,7 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 _MAX_LIGHTS = 64
-_MAX_SHADOW_FILTER = 6  # half width [shadow texels]
+_MAX_SHADOW_FILTER = 6  # largest half width of a shadow filter [shadow texels]
 _SIDE, _PART_SIDE = 4, 2  # an area light is sampled by SIDE x SIDE points, each of several parts by fewer
 _RAYS, _MIN_RAYS, _SUN_RAYS = 64, 12, 32  # shadow rays to an area light, to a part at least, and to a sun
 

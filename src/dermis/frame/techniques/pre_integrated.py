@@ -24,7 +24,7 @@ _COSINE_COUNT = 257  # odd, so that one column is N.L = 0, where incident light 
 _CURVATURE_ROWS, _EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
 _QUADRATURE_NODES = 48
 _EXTENT_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
-_SHADOW_TAIL = 0.01  # fraction of the light that scatters across the edge of a shadow beyond the table
+_SHADOW_TAIL = 0.01  # fraction of the light that scatters farther across a shadow edge than the table covers
 _MAX_PENUMBRA_MM = 8.0
 
 

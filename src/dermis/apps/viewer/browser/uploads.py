@@ -24,7 +24,7 @@ MAX_FILES = 200
 """Maximum number of files of a server."""
 
 IDLE_TIMEOUT_S = 20.0
-"""Maximum time between two pieces of a file [s]."""
+"""Maximum time between two received pieces of a file [s]."""
 
 TICKET_HEADER = b"x-dermis-ticket"
 _UPLOAD_PATH = "upload"

@@ -334,12 +334,12 @@ SURFACE_STYLES = {
     "energy": FieldStyle("energy conserved###energy", names={"none": "no", "published": "as published"}),
     "direction": FieldStyle("exit direction###direction", names={"lambertian": "Lambertian"}),
 }
-"""Labels of the surface fields of `Skin`."""
+"""Presentation of the surface fields of `Skin`."""
 
 ALBEDO_STYLES = {
     "albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})
 }
-"""Labels of the profile fields of `Skin`."""
+"""Presentation of the profile fields of `Skin`."""
 
 TECHNIQUE_STYLES = {
     "technique": FieldStyle(
@@ -357,14 +357,14 @@ TECHNIQUE_STYLES = {
     "tone": FieldStyle("tone curve###tone", names={"none": "none (linear)", "neutral": "Khronos neutral"}),
     "gamma": FieldStyle(names={"right": "gamma-correct", "wrong": "not gamma-correct"}),
 }
-"""Labels of `Settings`."""
+"""Presentation of the fields of `Settings`."""
 
 LAYER_STYLES = {
     "thickness_mm": FieldStyle("thickness###thickness"),
     "absorption_per_mm": FieldStyle("absorption σ_a###absorption"),
     "scattering_per_mm": FieldStyle("scattering σ_s'###scattering"),
 }
-"""Labels of `TissueLayer`."""
+"""Presentation of the fields of `TissueLayer`."""
 
 LIGHT_STYLES = {
     "irradiance": FieldStyle("colour###irradiance"),
@@ -372,7 +372,7 @@ LIGHT_STYLES = {
     "shadows": FieldStyle("casts shadows###shadows"),
     "angle_degrees": FieldStyle("angular size###angle"),
 }
-"""Labels of the lights."""
+"""Presentation of the fields of lights."""
 
 LIGHT_KIND_NAMES = {
     "point": "point light",

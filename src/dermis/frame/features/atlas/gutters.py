@@ -18,7 +18,7 @@ from dermis.gpu import Bindings, Buffer, Device, Recorder
 from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
-_NO_NEIGHBOUR = 0xFFFFFFFF  # word of a side without skin across it
+_NO_NEIGHBOUR = 0xFFFFFFFF  # word of a triangle edge without skin across it
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from dermis.frame.programs import TILE, program, workgroup_grid
 from dermis.frame.seams import FEATHER_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 
-_STRETCH_SOURCE_BYTES = 12  # of an entry of the list in stretch_beyond.wgsl
+_STRETCH_SOURCE_BYTES = 12  # size of an entry of stretch_sources in stretch_beyond.wgsl
 _ENTRIES_PER_ROW = 1024  # ROW of gutter.wgsl
 
 

@@ -19,10 +19,10 @@ _HALVING_KEY = "halved 2"  # key of the disk cache: increase the number when `ha
 MAX_HALVINGS = 3
 """Number of coarser resolutions of an atlas that blurs may use."""
 GUTTER_ENTRY_BYTES = 16
-"""Size of an entry of the gutter list in gutter.wgsl [bytes]."""
+"""Size of an entry in the buffer of gutter texels, see gutter.wgsl [bytes]."""
 _TEXTURE_NAME = "map of the atlas"
-_LIGHT_BYTES = 16  # of the light of a gutter texel
-_GUTTER_BIT = 1 << 15  # of the first component of reach_map, see reach.wgsl
+_LIGHT_BYTES = 16  # size of the light of a gutter texel
+_GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
 SAME_SOURCE_TEXELS = 4.0
 """Largest distance between the sources of four gutter neighbours that are averaged [texels]."""
 

@@ -13,7 +13,7 @@ from dermis.frame.features.diffusion.pyramid import MIN_SMOOTHNESS, choose_halvi
 
 Floats = NDArray[np.float64]
 ROWS_PER_UNIT = 64
-"""Rows of the kernel table per unit of variance."""
+"""Number of rows of the kernel table per unit of variance."""
 MAX_TABLE_VARIANCE = 9
 """Variance of the last row of the kernel table [step^2]."""
 TRUNCATION = 3.3
@@ -21,7 +21,7 @@ TRUNCATION = 3.3
 SUMMED_TRUNCATION = 2.4
 """Half-width of a kernel whose source is already blurred, in standard deviations.
 
-The kernel has the exact variance all the same, and the next blur smooths the changed shape: the error is at
+The kernel still has the exact variance, and the next blur smooths its truncated shape: the error is at
 most 0.014 % of an image.
 """
 MAX_SUMMED_DEVIATION = 1.5
@@ -34,7 +34,7 @@ _READS_PER_LEVEL = 2.0  # fixed cost of a level, in reads per texel of the full 
 _MIN_SAVING = 0.25  # fraction of the cost that an intermediate level has to save
 _HALVING_MARGIN = 1.001  # factor of the variance that permits a halving, against rounding
 _MIN_DEVIATION = 1.0  # least standard deviation of an intermediate level, in its own texels
-_MIN_VARIANCE_RATIO = 1.5  # between an intermediate level and any other
+_MIN_VARIANCE_RATIO = 1.5  # least ratio of the variances of an intermediate level and any other
 
 
 def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
@@ -58,7 +58,7 @@ def kernel_table() -> NDArray[np.float32]:
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MAX_TAPS + 1)
-    tap_mask = n[None, :] <= n[:, None]  # column of the table, tap
+    tap_mask = n[None, :] <= n[:, None]  # (column of the table, tap)
     low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)

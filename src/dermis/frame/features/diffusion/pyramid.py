@@ -13,10 +13,10 @@ from dermis.gpu import Device, Texture, TextureView, make_texture, mark_scratch
 from dermis.gpu.textures import make_view
 
 _TARGET_IRRADIANCE = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
-_MAX_SCALE = 2.0**100  # its inverse is a float too; dimmer light counts as none
+_MAX_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale is limited
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
-"""`Blur.halvings` of each layout."""
+"""For each layout, how often the resolution of each level is halved."""
 MIN_SMOOTHNESS = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
 MIN_WEIGHT = 1e-12
 """Least divisor of a sum of weights, for channels without any weight."""

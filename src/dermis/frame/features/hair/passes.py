@@ -28,13 +28,13 @@ from dermis.gpu import (
 )
 
 ShadingInputs = tuple[Bindings, UniformRecord, Constants]
-"""Resources of the lighting, record of the shading, and pipeline constants of the lights."""
+"""Resources of the lighting, uniform record of the shading pass, and pipeline constants of the lights."""
 
 _MAX_ROWS, _MAX_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
 _CROWDING_FACTOR = 6.0  # segments in a crowded tile over the mean of all tiles
 _CLEARING_GROUPS = 256
-_RAY_STRIDE = 4  # of the rays to an area light one in four is traced: pictures change by 0.0002 at most
+_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
 
 def draw_shadows(

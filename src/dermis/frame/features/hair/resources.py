@@ -18,28 +18,28 @@ from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
 TILE_PIXELS = 8
-"""Pixels along a side of the tiles in which segments are listed."""
+"""Side of a tile of the picture, for which strand segments are listed [pixels]."""
 _GPU_CHAINS = 64  # chains of a tile on GPUs: one for each invocation of the tile's workgroup
 OPACITY_WIDTH = 256
-"""Texels across a deep opacity map; it has half as many down."""
+"""Width of a deep opacity map, twice its height [texels]."""
 OPACITY_LAYERS = 6
 HEADER_WORDS = 8
-"""Words of a light before the texels of its deep opacity map."""
+"""Number of words that precede the texels of each light's deep opacity map."""
 _LINKS_PER_KNOT = 4
 _MAX_LINKS = 1 << 22
 _FINE_STEP, _KNOT_STEP = (
     1 << 12,
     1 << 19,
-)  # to which capacities are rounded up, so that most heads share them
-_MAX_SHADOW_CASTERS = 32_000  # coarse strands that cast the shadows of all
+)  # steps to which capacities are rounded up, so that most heads share them
+_MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
 _WIDTH_PER_COVER_PX = 0.2  # further width per cover: where hair hides hair, fewer strands are enough
 WINDOW_KNOTS = 1 << 12
-"""Knots whose bounds a workgroup of strands_window.wgsl computes."""
+"""Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 _STRAND_DTYPE = np.dtype(
     [("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)]
-)  # in strands_pose.wgsl
+)  # row of the table in strands_pose.wgsl
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 

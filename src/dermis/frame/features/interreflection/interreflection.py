@@ -16,10 +16,10 @@ from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark
 from dermis.mesh.head import Head
 
 LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
-"""Sample points and their number, links of patches, links of cells."""
+"""Buffer and number of sample points, form factors of patches, and form factors of cells."""
 _FLOAT4_BYTES = 16  # bytes of four floats
-_BOUNCES = 4  # between patches; the gathering by cells is another one
-_TEAM_SIZE = 16  # invocations of a patch or a cell
+_BOUNCES = 4  # number of bounces between patches; the gathering by cells is one more
+_TEAM_SIZE = 16  # shader invocations per patch or cell
 
 
 def shader_constants() -> dict[str, int]:

@@ -11,7 +11,7 @@ from dermis.frame.programs import FLOAT_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
-"""Number of narrow Gaussians for which the picture adds light that is finer than texels."""
+"""Number of narrow Gaussians whose light is corrected within texels when the picture is shaded."""
 TEXEL_AREA = 0.5
 """Standard deviation of the filter of light on the atlas [texels], which avoids aliasing."""
 

@@ -20,11 +20,11 @@ from dermis.mesh.head import Head
 
 DIRECTIONS = 128
 MAP_SIZE = 512
-"""Texels along the side of a depth map."""
+"""Side of a depth map [texels]."""
 CACHE_VERSION = f"1 {DIRECTIONS} {MAP_SIZE}"
 """Version of baked maps on disk; change it when baking gives other results."""
-_MAPS_PER_BATCH = 32  # depth maps that are drawn at a time
-_MAX_SIDE = 1024  # texels a side: occlusion is smooth, and such a texel is smaller than a millimetre
+_MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
+_MAX_SIDE = 1024  # largest side of an occlusion map [texels]; its texels are smaller than a millimetre
 
 
 def bake_occlusion(

@@ -26,7 +26,7 @@ from dermis.mesh.subdivide import coarse_triangles
 Floats = NDArray[np.float64]
 VIEW_COUNT = 64
 DEPTH_MAP_SIDE = 256
-"""Texels along the side of a depth map."""
+"""Side of a depth map [texels]."""
 _MARGIN_MM = 1.0
 _BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
 _ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e

@@ -18,11 +18,11 @@ from dermis.mesh.head import Head
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
 TOLERANCE_MM = 2.0
-"""Depth by which the mesh around a visible landmark may be in front of it."""
+"""Largest depth by which the mesh may be in front of a landmark that counts as visible."""
 _LANDMARK_DTYPE = np.dtype(
     [("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)]
 )  # as in landmarks.wgsl
-_RESULT_FLOATS = 4  # position, and visibility
+_RESULT_FLOATS = 4  # x, y, z and visibility
 
 
 @dataclass(frozen=True, eq=False)

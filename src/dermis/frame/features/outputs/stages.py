@@ -110,7 +110,7 @@ DRAW_STAGES: Registry[DrawStage] = Registry(
         "label": _draw_label,
     },
 )
-"""Stages by the names of their shaders, features/outputs/STAGE.wgsl."""
+"""Functions that declare the passes of a stage, by the name of its shader features/outputs/STAGE.wgsl."""
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:

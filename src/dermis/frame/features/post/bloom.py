@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.programs import program
 from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 
-_OMITTED_HALVINGS = 4  # that are left out: the widest Gaussian spans a sixteenth of the picture
+_OMITTED_HALVINGS = 4  # omitted halvings: the widest Gaussian spans a sixteenth of the picture
 
 
 @dataclass(frozen=True, eq=False)

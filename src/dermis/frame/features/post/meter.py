@@ -12,13 +12,13 @@ from dermis.gpu import Bindings, Buffer, Constants, Device, Recorder, Texture, U
 from dermis.scene.settings import Settings
 
 METER_SIDE = 64
-"""Metered points along each side of a grid over the picture."""
+"""Number of metered points along each side of a grid over the picture."""
 METER_KEY = 0.85
-"""Value of white skin in the metered light: the exposure of studio light is then about 1."""
+"""Linear value to which white skin is exposed, such that the exposure of studio light is about 1."""
 MAX_CLIPPED_FRACTION = 0.01
-"""Fraction of the visible skin that may be brighter than the picture can show."""
+"""Largest fraction of the visible skin that may be overexposed."""
 MIN_HIGHLIGHT_FACTOR = 0.5
-"""Least factor by which highlights lower the exposure: one stop."""
+"""Least factor by which highlights reduce the exposure: one stop."""
 
 
 def shader_constants() -> dict[str, float]:

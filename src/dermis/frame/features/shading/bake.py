@@ -27,7 +27,7 @@ CHANNELS: Mapping[str, int] = MappingProxyType(
         "curvature": 1,
     }
 )
-"""Numbers of each quantity that bake.wgsl computes at a point, in its order."""
+"""Number of channels of each quantity that bake.wgsl computes at a point, in the order of its results."""
 CHANNEL_COUNT = sum(CHANNELS.values())
 
 

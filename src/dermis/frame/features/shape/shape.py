@@ -21,11 +21,11 @@ Words = NDArray[np.uint32]
 VERTICES_PER_ROW = 512
 """Vertices per row of the vertex texture; each has four texels."""
 VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
-"""Names of the vertices in geometry.wgsl and texel_stretch.wgsl."""
+"""Names of the vertex textures and buffers in geometry.wgsl and texel_stretch.wgsl."""
 _VERTEX_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
-_VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of shape_vertices.wgsl
+_VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
 MIN_TANGENT = 1e-3
-"""Least length of dpdu without its part along the normal, relative to dpdu; shorter ones are replaced."""
+"""Least length of dpdu orthogonal to the normal, over the length of dpdu; shorter tangents are replaced."""
 
 
 @dataclass(frozen=True, eq=False)

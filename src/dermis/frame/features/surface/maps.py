@@ -25,7 +25,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.specular.beckmann import beckmann_table
 
 _SOFTWARE_SIDE = 1024  # limit of painted maps on software adapters, which are slow [texels]
-_MEAN_SIDE = 512  # of the grid over which the mean of a map is computed [texels]
+_MEAN_SIDE = 512  # side of the grid over which the mean of a map is computed [texels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def upload_maps(
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
         return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded), None)
-    if not decoded and use_colour and maps.colour is None:  # only a picture can be taken for linear
+    if not decoded and use_colour and maps.colour is None:  # a painted map has no sRGB encoding
         found = paint.paint_arrays(device, _painted_surface(head), maps.look, side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)

@@ -34,8 +34,8 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # of the tables, in standard deviations of the widest Gaussian
-_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # of rounded widths
+_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # range of the tables, in standard deviations
+_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
 _CACHE_SIZE = 4
 _UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
 _COARSENING = 1.5  # factor of the cell side when memory does not hold the pairs

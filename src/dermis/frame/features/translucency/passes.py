@@ -31,7 +31,7 @@ _MIN_VARIANCE_RATIO = 0.72
 _PAIRS_PER_ROW, _PAIRS_PER_GROUP = (
     1024,
     64,
-)  # pairs of a row, and of a workgroup in it, as in translucency_weights.wgsl
+)  # pairs of a row of workgroups, and of a workgroup in translucency_weights.wgsl
 _MIN_SMOOTHNESS = 0.45  # least standard deviation of the light that sources sample, over their spacing
 
 

@@ -32,13 +32,13 @@ from dermis.gpu import (
 from dermis.gpu.program import Program
 from dermis.gpu.textures import make_view
 
-_TARGET_GROUPS = 2048  # workgroups that occupy a GPU; each takes more triangles where there are more
+_TARGET_GROUPS = 2048  # number of workgroups that occupy a GPU; for large meshes each takes more triangles
 _GROUP_TRIANGLES = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
-_RUN_TRIANGLES = 16  # of them that are consecutive in the mesh, where triangles are many and small
+_RUN_TRIANGLES = 16  # consecutive triangles per workgroup of a mesh with many small triangles
 _GROUPS_PER_ROW = 32768
-_TILE_PIXELS = (64, 32)  # pixels, as in tiles.wgsl
-_DEPTH, _TRIANGLE, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
-_MAX_DEPTH_STEP_MM = 0.1  # at which the depth and the triangle of a sample fit in one word
+_TILE_PIXELS = (64, 32)  # width and height of a tile, as in tiles.wgsl
+_DEPTH, _TRIANGLE, _BOTH = 0, 1, 2  # modes of visibility_buffer.wgsl: what it records
+_MAX_DEPTH_STEP_MM = 0.1  # largest step of depth for which depth and triangle of a sample share one word
 
 
 @dataclass(eq=False)

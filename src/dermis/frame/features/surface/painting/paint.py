@@ -57,8 +57,8 @@ _LIST_NAMES: dict[str, Sequence[str]] = {
     "grounds": list(NOISE_REGIONS),
 }
 SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
-_MAX_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
-_PADDING = (0, 0), (0, 2)  # from two to four columns
+_MAX_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
+_PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
 _MAP_NAMES = ("colour", "specular", "roughness")

@@ -19,9 +19,9 @@ from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device
 
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
-_MAX_BLOCKS = 40  # along a side
-_BOUNDS_BYTES = 48  # as in bounds.wgsl
-_MAX_GUTTER_COPIES = 8  # of a source in gutters, at most, as in map_positions.wgsl
+_MAX_BLOCKS = 40  # limit of blocks along a side of the atlas
+_BOUNDS_BYTES = 48  # size of the struct Bounds of bounds.wgsl
+_MAX_GUTTER_COPIES = 8  # COPIES of map_positions.wgsl
 _PAIR_BYTES = 12
 
 
