@@ -161,7 +161,7 @@ class TruncatedNormal(Distribution):
         return min(max(self.mean + self.sd * deviation, self.low), self.high)
 
     def spec_value(self) -> SpecValue:
-        """Return a table of `truncated`."""
+        """Return the TOML table with the key `truncated`."""
         return {"truncated": _float_list(self.mean, self.sd, self.low, self.high)}
 
 

@@ -164,7 +164,7 @@ class Target(ABC):
         refuse("library", f"none for {self.name}", f"got {format_value(str(folder))}", "Omit this option")
 
     def resolve_version(self, version: str | None) -> str:
-        """Return a supported version; None selects the newest.
+        """Return the requested version if it is supported; None selects the newest.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Target(ABC):
         Returns
         -------
         str
-            The version.
+            Supported version of the program.
 
         Raises
         ------
@@ -208,7 +208,7 @@ class Target(ABC):
         Returns
         -------
         Path
-            The path.
+            Path of the main file.
         """
         suffix = suffix or next(filter(None, self.suffixes))
         return output if output.suffix else output / f"{subject.identifier}{suffix}"
@@ -232,7 +232,9 @@ class Target(ABC):
 
     @abstractmethod
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters that a user might choose without knowing their meaning.
+        """Return the parameters that a user might choose without knowing their meaning in the program.
+
+        The report shows their errors beside those of the fitted parameters.
 
         Parameters
         ----------
@@ -244,12 +246,12 @@ class Target(ABC):
         Returns
         -------
         tuple of Parameter
-            The parameters, named as those of `parameters`.
+            Naive parameters, with the names that `parameters` uses.
         """
 
     @abstractmethod
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile that the program renders, by its own formulas.
+        """Return the cumulative profile that the program renders, predicted by its own formulas.
 
         Parameters
         ----------
@@ -263,7 +265,7 @@ class Target(ABC):
         Returns
         -------
         CumulativeProfile
-            The profile.
+            Fraction of the light that leaves within each radius, by channel.
         """
 
     @abstractmethod

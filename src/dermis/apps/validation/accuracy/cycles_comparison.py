@@ -1,4 +1,4 @@
-"""Highlights and skins of the frame compared with those of Cycles, for docs/accuracy.md.
+"""Highlights and skins rendered by dermis, compared with those of Cycles for docs/accuracy.md.
 
 Both need Blender's Python, so the page shows the last measurement (benchmarks/results).
 """
@@ -81,7 +81,7 @@ def highlights(adapter: str = "auto") -> None:
 
 
 def looks(adapter: str = "auto") -> None:
-    """Render skins by the frame and by Cycles; write results/look.json and docs/images/look.webp."""
+    """Render skins by dermis and by Cycles; write results/look.json and docs/images/look.webp."""
     in_checkout(PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEADS}
@@ -181,7 +181,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Render a scene by the frame, and its surface reflection alone for the reflected fraction."""
+    """Render a scene by dermis, and its surface reflection alone for the reflected fraction."""
     options = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -216,7 +216,7 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return the Cycles material with the head's colours and the mean exit offset of the frame's profile.
+    """Return the Cycles material with the head's colours and the mean exit offset of its profile in dermis.
 
     The mean distance between entry and exit by Burley's profile is 2.5 d, where d is the mean free path over
     a factor of the colour.

@@ -1,4 +1,4 @@
-"""Frames of the package's human compared with path-traced pictures, for docs/path_traced.md.
+"""Views of the package's human by dermis and by path tracing, compared for docs/path_traced.md.
 
 Paths are cached on disk while they are traced, so an interrupted run continues where it stopped.
 """
@@ -51,7 +51,7 @@ def iris_cells(pair: PersonComparison) -> dict[str, str]:
 
 
 def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:
-    """Return a sheet of all views, with the frame to the left of the reference, as a WebP file."""
+    """Return a sheet of all views, with dermis's picture to the left of the reference, as a WebP file."""
     panels = {}
     for pair in pairs:
         panels[pair.name] = pair.tone_mapped(pair.ours)

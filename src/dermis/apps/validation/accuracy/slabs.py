@@ -60,7 +60,7 @@ def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
 
 
 def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
-    """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by the frame.
+    """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by dermis.
 
     thickness : thickness of the slab [mm]
     """

@@ -78,7 +78,7 @@ def _compare(
 
 
 def table_line(first: str, row: ComparisonRow) -> str:
-    """Return a Markdown row with the errors of a technique after a first cell."""
+    """Return a Markdown row with a given first cell and the errors of a technique."""
     return f"| {first} | " + " | ".join(cells(row)) + " |"
 
 

@@ -85,7 +85,7 @@ def integrated_light(mesh: Mesh, beam: Array, points: Array, spacing: float) -> 
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with light through slabs far from their rim, by the frame and by the profile."""
+    """Return Markdown rows with light through slabs far from their rim, by dermis and by the profile."""
     rows = []
     for thickness in THICKNESSES_MM:
         beam = np.array([0.0, 0.0, 1.0])

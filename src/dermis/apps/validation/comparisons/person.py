@@ -1,4 +1,4 @@
-"""Views of the package's human rendered by the frame and by path tracing, with the frame's errors."""
+"""Views of the package's human rendered by dermis and by path tracing, with the errors of dermis."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _WHITE_PERCENTILE = 98.0
 
 @dataclass(frozen=True, eq=False)
 class PersonComparison:
-    """View of a person by the frame and by path tracing, with the errors of the frame.
+    """View of a person rendered by dermis and by path tracing, with the errors of dermis.
 
     name : key of `VIEWS`
-    ours, reference : (h, w, 3) linear radiance of the frame and of the path-traced picture
+    ours, reference : (h, w, 3) linear radiance by dermis, and by path tracing
     variance : (h, w, 3) variance of the reference's noise
     mask : (h, w) pixels that are compared
-    relrmse, energy : relative RMSE, and ratio of the frame's light to the reference's, over the mask
-    energy_by_channel : ratio of the frame's light to the reference's in red, green and blue
+    relrmse, energy : relative RMSE, and total light by dermis over that of the reference, over the mask
+    energy_by_channel : total light by dermis over that of the reference, in red, green and blue
     samples : paths per pixel
     seconds : duration of path tracing [s]
     """
@@ -82,13 +82,13 @@ def compare_person(
     use_cache: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> PersonComparison:
-    """Render a view of a person by the frame and by path tracing.
+    """Render a view of a person by dermis and by path tracing.
 
-    textures : maps of the skin as the frame paints them, from `person_textures`
+    textures : maps of the skin as dermis paints them, from `person_textures`
     name : key of `VIEWS`
     side : side of the pictures [pixel]
     samples : paths per pixel; some views use more
-    atlas : side of the frame's atlas [texel]
+    atlas : side of dermis's atlas [texel]
     use_cache, progress : as in `path_trace`
 
     Raises DermisError for unknown views, and for heads without modelled eyes.
@@ -104,7 +104,7 @@ def compare_person(
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
-    """Return the linear radiance (h, w, 3) of the frame, drawn at twice the size and averaged.
+    """Return the linear radiance (h, w, 3) of a scene by dermis, drawn at twice the size and averaged.
 
     More samples per pixel would be equivalent, but on software adapters many samples with many large lights
     exceed the time limit of a pass.
@@ -125,9 +125,9 @@ def path_trace_view(
     progress: Callable[[int, int], None] | None = None,
     variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
-    """Path-trace a person, in a medium with the mean exit offset of the frame's profile.
+    """Path-trace a person, in a medium with the mean exit offset of the profile that dermis uses.
 
-    textures : maps of the skin as the frame paints them, from `person_textures`
+    textures : maps of the skin as dermis paints them, from `person_textures`
     size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
@@ -143,7 +143,7 @@ def path_trace_view(
 def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
     """Return the comparison of a frame with a path-traced picture.
 
-    ours : (h, w, 3) linear radiance of the frame
+    ours : (h, w, 3) linear radiance by dermis
     mask : (h, w) pixels to compare
     """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
@@ -245,7 +245,7 @@ PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
 def view_scene(head: Head, view: View) -> Scene:
     """Return the scene of a view, with softboxes in place of point lights.
 
-    A path that leaves through a cornea cannot hit a point light.
+    A path that leaves an eye through its cornea cannot hit a point light.
     """
     pose = None if view.pose is None else Pose(expression(view.pose))
     camera = view.camera(head)
@@ -269,10 +269,11 @@ _HIGHLIGHT_FACTOR = 1.6  # brightness of highlights over the median of the ring
 
 
 class IrisErrors(NamedTuple):
-    """Errors of an iris in the frame against the path-traced reference.
+    """Errors of an iris as rendered by dermis against the path-traced reference.
 
-    right, down : shift of the reference's pupil from the frame's [pixel]
-    brightness : mean of the frame over that of the reference on the ring of the iris, without highlights [-]
+    right, down : shift of the reference's pupil from that of dermis [pixel]
+    brightness : mean brightness by dermis over that of the reference, on the ring of the iris without
+        highlights [-]
     left_half, right_half : the brightness ratio on each half of the ring [-]
     """
 
@@ -313,7 +314,7 @@ def _without_highlights(image: Floats, ring: Mask) -> Mask:
 
 
 def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
-    """Return by how much the reference is shifted to the right of and below the frame [pixel].
+    """Return the shift of the reference to the right of, and below, the picture by dermis [pixel].
 
     Shift and brightness are fitted together by least squares.
 

@@ -1,4 +1,4 @@
-"""Maps of a person's skin as the frame paints them, for a path tracer."""
+"""Maps of a person's skin as dermis paints them, for a path tracer."""
 
 from __future__ import annotations
 

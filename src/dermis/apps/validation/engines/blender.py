@@ -137,7 +137,7 @@ def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the differences of Cycles from the frame in outline and colour, for a head without hair."""
+    """Yield the differences of Cycles from dermis in outline and colour, for a head without hair."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
@@ -153,7 +153,7 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture that shows a head with hair by the frame and by each version of Cycles."""
+    """Write a picture that shows a head with hair by dermis and by each version of Cycles."""
     subject = load_subject("human").with_painted_maps(TEXELS, "auto")
     columns = [render_dermis(subject, PICTURE_SIDE)]
     for version, python in pythons.items():

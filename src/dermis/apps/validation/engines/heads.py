@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 
 
 def heads() -> None:
-    """Render one head in all installed programs and compare each picture with the frame.
+    """Render one head in all installed programs and compare each picture with that of dermis.
 
     Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. DERMIS_BLENDER_PYTHONS
     names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
@@ -73,7 +73,7 @@ def heads() -> None:
 def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
     """Return a function for each installed program, by name, that renders linear pictures (h, w, 4).
 
-    ours : (h, w, 4) picture of the frame, whose alpha replaces that of programs without alpha
+    ours : (h, w, 4) picture by dermis, whose alpha replaces that of programs without alpha
     """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
@@ -91,7 +91,7 @@ def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[]
 def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
     """Return the canvas of the exported page in Chromium as linear light (h, w, 4).
 
-    ours : (h, w, 4) picture of the frame, whose alpha is used
+    ours : (h, w, 4) picture by dermis, whose alpha is used
     """
     with TemporaryDirectory() as folder_name, chromium_page(SIDE) as page:
         file = Path(folder_name) / "head.html"
@@ -107,7 +107,7 @@ def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     """Return linear pictures (h, w, 4) of the exported scene by Mitsuba, one per random seed.
 
-    ours : (h, w, 4) picture of the frame, whose alpha is used
+    ours : (h, w, 4) picture by dermis, whose alpha is used
     """
     mi = load_mitsuba()
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
@@ -124,7 +124,7 @@ def over_grey(picture: Floats) -> Floats:
 
 
 def render_dermis(subject: Subject, side: int) -> Floats:
-    """Return the linear picture (h, w, 4) of the subject by the frame."""
+    """Return the linear picture (h, w, 4) of the subject by dermis."""
     assert subject.scene is not None
     settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
@@ -155,9 +155,9 @@ def render_cycles(
 
 
 def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
-    """Return differences in outline and colour, and relative RMSE, of another program from the frame.
+    """Return the differences of another program from dermis in outline, colour and relative RMSE.
 
-    ours : (h, w, 4) picture of the frame
+    ours : (h, w, 4) picture by dermis
     theirs : (seeds, h, w, 4) pictures of the other program with different random seeds
     """
     mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)

@@ -89,7 +89,7 @@ def babylon_table() -> str:
 
 
 def heads_table() -> str:
-    """Return a Markdown table that compares a head in all programs with the frame."""
+    """Return a Markdown table that compares a head in all programs with its picture by dermis."""
     titles = "program", "outline [px]", "lit skin relative to dermis", "relative RMSE", "pixels"
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 

@@ -95,7 +95,7 @@ class PeerRenders:
     """Pictures and times of all renderers for one scene.
 
     light, region : names of the scene's light and of the visible region
-    ours : frames of dermis by names in VARIANTS and GPU_GEMS_3_VARIANTS
+    ours : frames of dermis by names in `DERMIS_VARIANTS` and `GPU_GEMS_3_VARIANTS`
     cycles : passes of Cycles by method, for each seed and each of `PeerPlan.samples`
     left_out : reasons why methods of Cycles are missing
     reference : path-traced image by Mitsuba
