@@ -73,6 +73,24 @@ def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def few_form_factor_lines() -> Iterator[None]:
+    """Compute form factors from fewer lines; tests of their accuracy use `many_form_factor_lines`."""
+    from dermis.atlas import interreflection
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(interreflection, "LINE_BUNDLES", 24)
+        yield
+
+
+@pytest.fixture
+def many_form_factor_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute form factors as accurately as the package does."""
+    from dermis.atlas import interreflection
+
+    monkeypatch.setattr(interreflection, "LINE_BUNDLES", 128)
+
+
 @pytest.fixture(autouse=True)
 def strict_floating_point() -> Iterator[None]:
     """Turn a division by zero, an overflow or a NaN into an error; underflow to zero is permitted."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dermis.environment import isotropic_fits
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import directions, solid_angles
@@ -65,11 +66,17 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
     assert model in ("two-lobe", "phong", "phong-plain") or across > 0.97 * (weight * z**2).sum()
 
 
-def test_mirrors_of_another_packages_model_are_fitted_when_asked_for() -> None:
-    """Compare a fit on demand with the table."""
+def test_mirrors_of_another_packages_model_are_fitted_when_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Compare the two roughest rows of a fit on demand with the table."""
+    shipped = isotropic_lobe_table("kelemen")
+    monkeypatch.setattr(isotropic_fits, "ROUGHNESS_COUNT", 3)
+    monkeypatch.setattr(isotropic_fits, "LOBE_TABLE_ROUGHNESSES", LOBE_TABLE_ROUGHNESSES[-3:])
     with MODELS.including("theirs", MODELS["kelemen"]):
         made = isotropic_lobe_table("theirs")
-    assert np.allclose(made, isotropic_lobe_table("kelemen"), atol=2e-3)
+    assert made.shape == (3, *shipped.shape[1:])
+    assert np.allclose(made[-2:], shipped[-2:], atol=2e-3)
 
 
 @pytest.fixture(scope="module")

@@ -131,7 +131,7 @@ def test_damaged_rigs_and_clips(rigged, tmp_path_factory, data: st.DataObject) -
     path = tmp_path_factory.getbasetemp() / "damaged.glb"
     path.write_bytes(bytes(content))
     try:
-        _, rig = load_rigged(path)
+        rig = load_rigged(path).rig
         if rig is not None:
             assert np.isfinite(rig.positions_mm).all() and np.isfinite(rig.targets.delta_mm).all()
             assert rig.targets.point.max(initial=0) < len(rig.positions_mm)

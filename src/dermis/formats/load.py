@@ -28,7 +28,7 @@ from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_CACHE_VERSION = 5  # increment when `load_rigged` returns other results for the same file
+_CACHE_VERSION = 6  # increment when `load_rigged` returns other results for the same file
 _MESH_FIELDS = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGET_FIELDS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON_FIELDS = [field.name for field in fields(Skeleton) if field.name != "names"]
@@ -119,7 +119,7 @@ def _load_uncached(
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
-    return RiggedMesh(mesh, rig)
+    return RiggedMesh(mesh, rig, mesh_file.notes)
 
 
 def _weld_groups(parts: list[MeshPart]) -> Floats:
@@ -177,10 +177,14 @@ def _match_groups(
 
 
 class RiggedMesh(NamedTuple):
-    """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed."""
+    """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
+
+    notes : sentences on what of the file is mended, replaced or left out, for users
+    """
 
     mesh: Mesh
     rig: Rig | None
+    notes: tuple[str, ...] = ()
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
@@ -199,8 +203,9 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
-    mesh, rig = rigged
+    mesh, rig, notes = rigged
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
+    metadata["notes"] = notes
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
     rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
     if rig is not None:
@@ -224,17 +229,18 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
     materials = [Material(**one | {"colour": tuple(one["colour"])}) for one in metadata["materials"]]
     mesh = Mesh(**{name: arrays[name] for name in _MESH_FIELDS}, materials=tuple(materials))
     vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
+    notes = tuple(metadata["notes"])
     if "targets" not in metadata:
-        return RiggedMesh(mesh, None)
+        return RiggedMesh(mesh, None, notes)
     values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGET_FIELDS}
     values["rest"] = values["rest"] if len(arrays["target rest"]) else None
     targets = MorphTargets(tuple(metadata["targets"]), **values)  # type: ignore[arg-type]
     if metadata["bones"] is None:
-        return RiggedMesh(mesh, Rig(arrays["control"], targets))
+        return RiggedMesh(mesh, Rig(arrays["control"], targets), notes)
     skeleton = Skeleton(
         tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON_FIELDS}
     )
-    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton))
+    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton), notes)
 
 
 def is_eye_name(names: Sequence[str]) -> bool:

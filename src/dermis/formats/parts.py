@@ -95,11 +95,13 @@ class MeshFile:
     """Geometry and bones of a mesh file.
 
     weights : default weights of morph targets by name, without those of weight 0
+    notes : sentences on what of the file is mended, replaced or left out, for users
     """
 
     parts: list[MeshPart]
     bones: Bones | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def is_deformable(self) -> bool:

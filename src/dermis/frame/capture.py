@@ -46,7 +46,7 @@ def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
     """
     for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
         count = int(record["coarse"]) // factor
-        record["wider"] *= record["coarse"] / max(1, count)
+        record["width_scale"] *= record["coarse"] / max(1, count)
         record["coarse"] = count
     return frame
 

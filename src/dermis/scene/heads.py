@@ -170,6 +170,8 @@ def load_head(
         check_head_height(rigged.mesh, name, mesh_options["unit_mm"])
         maps, notice = pending_maps.result()
     check_relief(height_mm, maps.height, f"{name}: height_mm")
+    for note in rigged.notes:
+        notify(f"{path}: {note}")
     if notice:
         notify(notice)
     credit = f"{sample.attribution}, {sample.licence}" if sample else ""
