@@ -238,7 +238,7 @@ def _float_list(*values: float) -> list[float]:
     return list(map(float, values))
 
 
-_MAX_NUMBER = 1e9  # of a number
+_MAX_NUMBER = 1e9  # largest magnitude of a number in a spec
 _EXPECTED_FORMS = (
     "a number, a text, or one of {uniform = [low, high]}, {log_uniform = [low, high]}, "
     "{normal = [mean, sd]}, {truncated = [mean, sd, low, high]}, {choice = [...], weights = [...]} "

@@ -17,9 +17,9 @@ from dermis.frame.renderer import Renderer
 from dermis.scene.toml_text import value_text
 
 SHEET_IMAGES = 16
-"""Images of the contact sheet."""
+"""Number of images on the contact sheet."""
 MAX_COUNTED = 20_000
-"""Images from which the statistics of the table are computed."""
+"""Number of images from which the statistics of the parameter table are computed."""
 _COLUMNS, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
 _MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
 _MAX_COLUMN_WIDTH = 60  # characters

@@ -15,7 +15,7 @@ from dermis.frame.observation import Observation
 from dermis.images.codecs import encode_png
 
 PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
-"""Suffixes of the picture's file and of the record's."""
+"""File name suffixes of the picture and of the record."""
 NestedNumbers = list[Union["NestedNumbers", float, None]]
 """Array as nested lists; null where a number is not finite."""
 _PIXEL_DIGITS = 3

@@ -33,7 +33,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_ALL_HAIRS_PIXELS = 1000  # side of the pictures that get all hairs; they show 230 mm at the closest
+_ALL_HAIRS_PIXELS = 1000  # side of pictures with all hairs; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED, _HEAD = "person.seed", "person.head"

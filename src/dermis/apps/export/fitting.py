@@ -15,7 +15,7 @@ from dermis.optics.media import Floats
 from dermis.optics.radial import TINY
 
 _BURLEY_MEDIAN_RADIUS = 1.58  # of Burley's profile, in units of d: half of the light leaves within
-_LOG_RANGE = np.log(30.0)  # search range of lengths on each side of the one with equal median radius
+_LOG_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
 _BISECTIONS, _MEDIUM_BISECTIONS = 40, 30
 _MIN_WIDTH_MM = 1e-9
 _MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # distances from an edge of light, in median radii

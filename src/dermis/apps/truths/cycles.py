@@ -202,7 +202,7 @@ class PrincipledSkin:
 
 SkinMaterial = Medium | Lambertian | BeckmannSurface | PrincipledSkin
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
-"""Cycles' methods of subsurface scattering by our names."""
+"""Cycles' names of the subsurface methods, by their names here."""
 
 
 def describe_scene(

@@ -21,7 +21,7 @@ Mitsuba = Any
 MitsubaObject = Any
 """Untyped object of Mitsuba: a scene, a mesh, a transform, a material or a medium."""
 Vector = Sequence[float] | Floats
-"""Three numbers."""
+"""Vector of three components: a position, direction or colour."""
 UNIT_MM = 100.0
 """Length of Cycles' unit; a head is a few units in size, as its sampling expects."""
 _Y_AXIS = 0.0, 1.0, 0.0

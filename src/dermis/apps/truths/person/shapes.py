@@ -195,7 +195,7 @@ CUTICLE_TILT_DEGREES = 2.0
 LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Roughness in the parametrisation for artists [Chiang2016]."""
 MAX_HAIR_GROUPS = 12
-"""Largest number of different absorptions; curves of one file share one."""
+"""Largest number of hair groups; all fibres of a group have the mean absorption coefficient."""
 _MIN_RADIUS_MM = 1e-3
 
 

@@ -23,7 +23,7 @@ COMMANDS = {
     f"{HERE}.thin:thin": "Print the tables of light through slabs, wedges and ears.",
     f"{HERE}.half_space:half_space": "Print the table of reflection by direction.",
 }
-"""Functions that are commands, with their descriptions."""
+"""Functions that run as commands, with their descriptions."""
 
 if __name__ == "__main__":
     run_script(COMMANDS, f"python -m {HERE}")

@@ -29,7 +29,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_FULL_COVERAGE = 0.999  # of a pixel
+_FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
 _WHITE_PERCENTILE = 98.0
 
 

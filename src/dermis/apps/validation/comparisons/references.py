@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 _SPACING_MM, _FINEST_MM = 3.0, 0.2  # at twice the spacing, a laser's stripe loses 1.5 % of its light
 _HEAT_RADIUS_MM = 10.0
 _MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
-_FULL_COVERAGE = 0.999  # of a pixel
+_FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
 PIXEL_SAMPLES = 16
 
 

@@ -35,7 +35,7 @@ SKINS: dict[str, tuple[Boundary, ...]] = {
     "skin2": ("matched", "smooth", "rough"),
     "dj3": ("matched", "smooth"),
 }
-"""Skins, and the surface boundaries for which each is measured."""
+"""Surface models for which each skin is measured, by its name."""
 _REACH_D, _PIXELS, _PASSES, _SUBSAMPLES = 3.0, 8, 8, 16
 _LAMP_HEIGHT_D = 0.01
 _PLANE_HALF_SIDE_D = 500.0

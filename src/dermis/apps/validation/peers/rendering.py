@@ -46,12 +46,12 @@ DERMIS_VARIANTS = {
     "Lambertian skin, atlas 1024": RenderVariant("texture-space", 1024, "lambertian"),
     "screen space": RenderVariant("screen-space", 64),
 }
-"""Variants by their names in the table; screen space needs no atlas."""
+"""Variants of dermis by their names in the report; screen space needs no atlas."""
 GPU_GEMS_3_VARIANTS = {
     "passes of 2007 as compute": RenderVariant(GPU_GEMS_3, direction="lambertian"),
     "passes of 2007 as fragments": RenderVariant(FRAGMENT_TECHNIQUE, direction="lambertian"),
 }
-"""Passes of GPU Gems 3 (2007) in our renderer, to compare with the first variant."""
+"""Passes of GPU Gems 3 (2007) in dermis, to compare with the first of `DERMIS_VARIANTS`."""
 FIRST_SEEDS = (100, 200)
 """Seeds of the first pass of each turn; further passes have the following seeds."""
 _STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}

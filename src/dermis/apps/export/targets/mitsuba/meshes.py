@@ -17,7 +17,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-_SUBDIVISIONS = 4  # parts of each edge
+_SUBDIVISIONS = 4  # pieces into which each edge is divided
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:

@@ -24,7 +24,7 @@ from dermis.specular.fresnel import SKIN_ETA
 Floats = NDArray[np.float32]
 Boundary = Literal["matched", "smooth", "rough"]
 BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
-"""Kinds of skin surface, with their index of refraction."""
+"""Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
 _OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m

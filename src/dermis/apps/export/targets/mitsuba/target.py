@@ -112,8 +112,8 @@ class Mitsuba(Target):
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
     """Return the medium whose profile under a surface is closest to `curve`, as bright as the lightest skin.
 
-    Heads are lit from all directions. Under a matched surface, oblique light returns up to a quarter more
-    light than light along the normal; refraction removes this difference.
+    Heads are lit from all directions. Under an index-matched surface, oblique light returns up to a quarter
+    more light than light along the normal; refraction removes this difference.
 
     curve : reference profile
     boundary : surface model of the skin
@@ -159,7 +159,7 @@ class SkinColours:
     def medium_colour(self, boundary: Boundary) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
-        Under a matched surface, textures can only change lightness, so the colour is the mean at peak
+        Under an index-matched surface, textures can only change lightness, so the colour is the mean at peak
         luminance.
         """
         return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.peak, 0.97)

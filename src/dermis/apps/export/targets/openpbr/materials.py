@@ -50,7 +50,7 @@ MAP_INPUTS: Mapping[str, str] = {
     "specular": "specular_weight",
     "normal": "geometry_normal",
 }
-"""Input of OpenPBR that each map sets."""
+"""OpenPBR input that each map sets, by the role of the map."""
 LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
