@@ -19,6 +19,8 @@ from dermis.base.arrays import Doubles, Index, Ints, Numbers
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
+    from dermis.formats.materials import FileMaterial
+
 Colour = tuple[float, float, float]
 
 GREY: Colour = (0.8, 0.8, 0.8)
@@ -40,10 +42,12 @@ class MaterialGroup:
 
     names : of the material if it has one, then of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
+    material : index in the materials of the file, -1 for none
     """
 
     names: tuple[str, ...]
     colour: Colour = GREY
+    material: int = -1
 
     def name_contains(self, word: str) -> bool:
         """Return whether a lower-case word occurs in one of the names."""
@@ -62,6 +66,8 @@ class MeshPart:
     bone, weight : (v, k) bones of each vertex, and weights that sum to 1; None without bones
     quads : (q, 2) pairs of triangles that are the halves of a quad
     separate : whether its vertices must not be welded to coincident vertices of other parts
+    colours : (v, 3) linear colours of vertices, or None
+    other_uv : (v, 2) further uv coordinates by their index in the file, which textures use
     """
 
     group: MaterialGroup
@@ -74,6 +80,8 @@ class MeshPart:
     weight: Doubles | None = None
     quads: Index = field(default_factory=lambda: np.empty((0, 2), np.int64))
     separate: bool = False
+    colours: Doubles | None = None
+    other_uv: Mapping[int, Doubles] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -95,12 +103,14 @@ class MeshFile:
     """Geometry and bones of a mesh file.
 
     weights : default weights of morph targets by name, without those of weight 0
+    materials : materials of the file, to which the groups refer
     notes : sentences on what of the file is mended, replaced or left out, for users
     """
 
     parts: list[MeshPart]
     bones: Bones | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
+    materials: tuple[FileMaterial, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property

@@ -110,7 +110,23 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
         _stack_padded([part.bone for part in parts]),
         _stack_padded([part.weight for part in parts]),
         np.vstack([part.quads + offset for part, offset in zip(parts, faces, strict=False)]),
+        colours=_joined_colours(parts),
+        other_uv={
+            index: _joined_uv(parts, index) for index in sorted(set().union(*(p.other_uv for p in parts)))
+        },
     )
+
+
+def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
+    """Return the vertex colours of all parts, white for parts without; None if no part has any."""
+    if all(part.colours is None for part in parts):
+        return None
+    return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in parts])
+
+
+def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
+    """Return further uv coordinates of all parts, 0 for parts without."""
+    return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
@@ -128,7 +144,15 @@ def select_vertices(part: MeshPart, used: Index) -> MeshPart:
     }
     bone = None if part.bone is None else part.bone[used]
     weight = None if part.weight is None else part.weight[used]
-    return replace(part, positions=part.positions[used], targets=targets, bone=bone, weight=weight)
+    return replace(
+        part,
+        positions=part.positions[used],
+        targets=targets,
+        bone=bone,
+        weight=weight,
+        colours=None if part.colours is None else part.colours[used],
+        other_uv={index: uv[used] for index, uv in part.other_uv.items()},
+    )
 
 
 def _transpose_targets(

@@ -13,6 +13,7 @@ from dermis.base.errors import refuse
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
+from dermis.formats.gltf.read_materials import KNOWN_EXTENSIONS, read_materials
 from dermis.formats.gltf.rigs import (
     Armature,
     SkinInfluences,
@@ -24,7 +25,8 @@ from dermis.formats.gltf.rigs import (
     read_targets,
     target_names,
 )
-from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads, parse_colour, to_floats
+from dermis.formats.materials import FileMaterial
+from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_COUNTS = {
@@ -33,13 +35,7 @@ _MAX_COUNTS = {
     "vertices": limits.MAX_VERTICES,
     "displacements by targets": limits.MAX_DISPLACEMENTS,
 }
-_SUPPORTED_EXTENSIONS = (
-    "KHR_materials_",
-    "KHR_texture_",
-    "EXT_texture_",
-    "KHR_lights_",
-    "KHR_mesh_quantization",
-)
+_SUPPORTED_EXTENSIONS = (*KNOWN_EXTENSIONS, "KHR_mesh_quantization", "KHR_lights_punctual")
 
 
 def read_gltf(path: Path) -> MeshFile:
@@ -52,14 +48,15 @@ def read_gltf(path: Path) -> MeshFile:
     _refuse_extensions(document)
     nodes = read_nodes(document)
     armature, weights = read_armature(document, nodes), default_weights(document, nodes)
-    parts = list(_SceneReader(document, nodes, armature, weights).parts())
-    return MeshFile(parts, armature.bones if armature else None, weights)
+    materials = read_materials(document)
+    parts = list(_SceneReader(document, nodes, armature, weights, materials).parts())
+    return MeshFile(parts, armature.bones if armature else None, weights, materials)
 
 
 def _refuse_extensions(document: Document) -> None:
     """Refuse a file that requires unsupported extensions, such as compressed geometry."""
     required = map(str, document.items("extensionsRequired"))
-    unsupported = [name for name in required if not name.startswith(_SUPPORTED_EXTENSIONS)]
+    unsupported = [name for name in required if name not in _SUPPORTED_EXTENSIONS]
     if unsupported:
         actual = f"the file requires {', '.join(map(str, unsupported))}"
         refuse(document.path, "plain glTF geometry", actual, "Export without compression")
@@ -76,6 +73,7 @@ class _SceneReader:
     nodes: Nodes
     armature: Armature | None
     weights: dict[str, float]
+    materials: tuple[FileMaterial, ...]
 
     def parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
@@ -137,9 +135,10 @@ class _SceneReader:
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
-        uv, normals = (
-            to_floats(self.document.read_values(attributes[name])) if name in attributes else None
-            for name in ("TEXCOORD_0", "NORMAL")
+        group = self._material_group(mesh, primitive)
+        uv, normals, colours = (
+            self.document.read_floats(attributes[name]) if name in attributes else None
+            for name in ("TEXCOORD_0", "NORMAL", "COLOR_0")
         )
         targets = read_targets(self.document, mesh, names, primitive, len(positions))
         displaced = apply_targets(positions, targets, self.weights)
@@ -149,14 +148,27 @@ class _SceneReader:
         extras = _own_extras(primitive)
         corner_counts = np.full(len(triangles) // 2 if extras.get("quads") is True else 0, 4)
         return MeshPart(
-            self._material_group(mesh, primitive),
+            group,
             displaced,
             uv,
             normals,
             triangles,
             quads=find_quads(corner_counts, triangles),
             separate=extras.get("alone") is True,
+            colours=None if colours is None else np.clip(colours[:, :3], 0.0, 1.0),
+            other_uv=self._other_uv(group, attributes, len(positions)),
         ), targets
+
+    def _other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
+        """Return the further uv coordinates (count, 2) that textures of a material use, by their index."""
+        material = self.materials[group.material] if group.material >= 0 else FileMaterial()
+        found = {}
+        for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
+            if f"TEXCOORD_{index}" not in attributes:
+                actual = f"material {material.name!r} uses uv set {index}, which its mesh does not have"
+                refuse(self.document.path, "uv for each texture", actual, limits.DAMAGED_ADVICE)
+            found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(count, 2)
+        return found
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
         """Return the vertex indices of a primitive's triangles, (f, 3); strips and fans are expanded.
@@ -181,9 +193,10 @@ class _SceneReader:
         material: Tree = {}
         if "material" in primitive:
             material = self.document.item("materials", primitive["material"])
+        index = primitive.get("material", -1)
         names = tuple(str(item["name"]) for item in (material, mesh) if item.get("name"))
-        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
-        return MaterialGroup(names, parse_colour(factor) if factor else GREY)
+        colour = self.materials[index].colour if index >= 0 else None
+        return MaterialGroup(names, colour or GREY, index)
 
 
 def _own_extras(primitive: Tree) -> Tree:

@@ -1,0 +1,189 @@
+"""Reading of the materials of glTF files, with their textures and extensions."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from dermis.base.errors import refuse
+from dermis.formats.gltf.document import Document, Tree
+from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
+from dermis.formats.parts import Colour, parse_colour
+from dermis.formats.referenced_files import resolve_uri
+from dermis.images.io import EmbeddedPicture
+
+_WRAPS: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
+_NEAREST = 9728
+_SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
+_ALPHA_MODES: Mapping[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
+_SCATTERING = (
+    "KHR_materials_volume_scatter",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_subsurface",
+)
+_GLOSS, _UNLIT, _STRENGTH = (
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_unlit",
+    "KHR_materials_emissive_strength",
+)
+_ROUGHNESS_CHANNEL, _METALNESS_CHANNEL, _GLOSS_CHANNEL = 1, 2, 3
+_NOT_DRAWN = {
+    "KHR_materials_anisotropy": "anisotropic highlights",
+    "KHR_materials_clearcoat": "clear coat",
+    "KHR_materials_dispersion": "dispersion",
+    "KHR_materials_ior": "index of refraction",
+    "KHR_materials_iridescence": "iridescence",
+    "KHR_materials_sheen": "sheen",
+    "KHR_materials_specular": "specular strength",
+    "KHR_materials_transmission": "transmission",
+    "KHR_materials_variants": "variants",
+    "KHR_materials_volume": "absorbing volume",
+}
+KNOWN_EXTENSIONS = (
+    *_SOURCE_EXTENSIONS,
+    *_SCATTERING,
+    *_NOT_DRAWN,
+    _GLOSS,
+    _UNLIT,
+    _STRENGTH,
+    "KHR_texture_transform",
+)
+"""Extensions of materials and textures that are read or named in a note."""
+
+
+def read_materials(document: Document) -> tuple[FileMaterial, ...]:
+    """Return the materials of a file in its order."""
+    return tuple(_Reader(document, material).read() for material in document.items("materials"))
+
+
+class _Reader:
+    """Reader of one material; properties without effect are collected for its note."""
+
+    def __init__(self, document: Document, material: Tree) -> None:
+        self.document, self.material = document, material
+        self.extensions: Tree = material.get("extensions") or {}
+        self.unused: list[str] = []
+
+    def read(self) -> FileMaterial:
+        """Return the material."""
+        own = (self.material.get("extras") or {}).get("dermis")
+        pbr: Tree = self.material.get("pbrMetallicRoughness") or {}
+        if _GLOSS in self.extensions:
+            pbr = self._from_glossiness(self.extensions[_GLOSS])
+        textures = self._textures(pbr)
+        factor = pbr.get("baseColorFactor")
+        emission = self._emission()
+        is_unlit = _UNLIT in self.extensions
+        if "emission" in textures and "colour" not in textures and (factor is None or max(factor[:3]) == 0):
+            textures["colour"], factor, is_unlit = textures.pop("emission"), [*emission, 1.0], True
+            emission = (0.0, 0.0, 0.0)
+        self.unused += [text for name, text in _NOT_DRAWN.items() if name in self.extensions]
+        self.unused += [name for name in self.extensions if name not in KNOWN_EXTENSIONS]
+        return FileMaterial(
+            str(self.material.get("name") or ""),
+            textures,
+            parse_colour(factor) if factor else None,
+            alpha=float(factor[3]) if factor and len(factor) > 3 else 1.0,
+            alpha_mode=_ALPHA_MODES[self.material.get("alphaMode", "OPAQUE")],
+            alpha_cutoff=float(self.material.get("alphaCutoff", 0.5)),
+            roughness=float(pbr.get("roughnessFactor", 1.0)),
+            metalness=float(pbr.get("metallicFactor", 1.0)),
+            emission=emission,
+            normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
+            occlusion_strength=float((self.material.get("occlusionTexture") or {}).get("strength", 1.0)),
+            is_unlit=is_unlit,
+            scatters=any(name in self.extensions for name in _SCATTERING),
+            maps=own if isinstance(own, dict) else None,
+            unused=tuple(self.unused),
+        )
+
+    def _from_glossiness(self, gloss: Tree) -> Tree:
+        """Return metallic-roughness properties of a specular-glossiness material."""
+        pbr = {
+            "baseColorFactor": gloss.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0]),
+            "metallicFactor": 0.0,
+            "roughnessFactor": 1.0 - float(gloss.get("glossinessFactor", 1.0)),
+        }
+        if "specularFactor" in gloss:
+            self.unused.append("specular colour")
+        if "diffuseTexture" in gloss:
+            pbr["baseColorTexture"] = gloss["diffuseTexture"]
+        if "specularGlossinessTexture" in gloss:
+            self.unused.append("picture of specular colour and glossiness")
+        return pbr
+
+    def _textures(self, pbr: Tree) -> dict[Role, Texture]:
+        gloss = pbr.get("metallicRoughnessTexture")
+        references: dict[Role, tuple[Tree | None, int | None]] = {
+            "colour": (pbr.get("baseColorTexture"), None),
+            "normal": (self.material.get("normalTexture"), None),
+            "roughness": (gloss, _ROUGHNESS_CHANNEL),
+            "metalness": (gloss, _METALNESS_CHANNEL),
+            "occlusion": (self.material.get("occlusionTexture"), 0),
+            "emission": (self.material.get("emissiveTexture"), None),
+        }
+        found = {role: self._texture(reference, channel) for role, (reference, channel) in references.items()}
+        return {role: texture for role, texture in found.items() if texture is not None}
+
+    def _emission(self) -> Colour:
+        strength = float((self.extensions.get(_STRENGTH) or {}).get("emissiveStrength", 1.0))
+        r, g, b = (strength * float(value) for value in self.material.get("emissiveFactor", (0.0, 0.0, 0.0)))
+        return r, g, b
+
+    def _texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
+        """Return the texture of a reference, None if there is none or its picture cannot be read."""
+        if reference is None:
+            return None
+        entry = self.document.item("textures", reference["index"])
+        picture = self._picture(entry)
+        if picture is None:
+            return None
+        extension = (reference.get("extensions") or {}).get("KHR_texture_transform") or {}
+        uv_set: int = extension.get("texCoord", reference.get("texCoord", 0))
+        sampler = self.document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
+        if sampler.get("magFilter") == _NEAREST:
+            self.unused.append("magnification without interpolation")
+        wrap = _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
+        return Texture(picture, uv_set, _transform(extension), wrap, channel)
+
+    def _picture(self, entry: Tree) -> EmbeddedPicture | Path | None:
+        extensions = entry.get("extensions") or {}
+        sources = [extensions[name].get("source") for name in _SOURCE_EXTENSIONS if name in extensions]
+        sources.append(entry.get("source"))
+        source = next((one for one in sources if one is not None), None)
+        if source is None:
+            if "KHR_texture_basisu" in extensions:
+                actual = "a texture has only a KTX2 picture (KHR_texture_basisu)"
+                refuse(
+                    self.document.path, "PNG, JPEG, WebP or AVIF", actual, "Export with one of these formats"
+                )
+            return None
+        return read_picture(self.document, source)
+
+
+def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
+    """Return the bytes or the file of an image of a document; its content decides on its format.
+
+    Raises DermisError for a file outside the folder.
+    """
+    image = document.item("images", source)
+    name = f"{document.path}, image {image.get('name', source)}"
+    if "bufferView" in image:
+        return EmbeddedPicture(name, bytes(document.read_view(image["bufferView"])))
+    uri = image["uri"]
+    if uri.startswith("data:"):
+        return EmbeddedPicture(name, base64.b64decode(uri.partition(",")[2]))
+    return resolve_uri(document.path, uri)
+
+
+def _transform(extension: Tree) -> UvTransform:
+    """Return the transform of KHR_texture_transform: scaled, rotated, then offset."""
+    if not extension:
+        return IDENTITY
+    (x, y), (scale_x, scale_y) = extension.get("offset", (0.0, 0.0)), extension.get("scale", (1.0, 1.0))
+    angle = float(extension.get("rotation", 0.0))
+    cos, sin = math.cos(angle), math.sin(angle)
+    return (cos * scale_x, sin * scale_y, float(x), -sin * scale_x, cos * scale_y, float(y))

@@ -1,0 +1,78 @@
+"""Materials of mesh files: pictures with their mapping to the surface, and factors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.formats.maps import PathLike
+
+Wrap = Literal["repeat", "mirror", "clamp"]
+Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "occlusion", "emission"]
+AlphaMode = Literal["opaque", "mask", "blend"]
+UvTransform = tuple[float, float, float, float, float, float]
+
+IDENTITY: UvTransform = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Picture of a material, with its mapping to the surface.
+
+    uv_set : index of the uv coordinates of the vertices
+    transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
+    wrap : continuation beyond the picture along u and v
+    channel : channel of a scalar in a colour picture; None for the first channel of a grey picture
+    """
+
+    picture: PathLike
+    uv_set: int = 0
+    transform: UvTransform = IDENTITY
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    channel: int | None = None
+
+    @property
+    def mapping(self) -> tuple[int, UvTransform]:
+        """Return what determines the position in the picture of each point of the surface."""
+        return self.uv_set, self.transform
+
+    def map_uv(self, uv: Doubles) -> Doubles:
+        """Return the positions (n, 2) in the picture, 0 to 1, of uv coordinates (n, 2) with v down."""
+        a, b, c, d, e, f = self.transform
+        return np.asarray(uv @ np.array([[a, d], [b, e]]) + [c, f])
+
+
+@dataclass(frozen=True)
+class FileMaterial:
+    """Material of a mesh file, as glTF's metallic-roughness model states it.
+
+    names : of the material, empty for none
+    textures : pictures by role; factors multiply them
+    colour, alpha : linear base colour and opacity [-]
+    roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
+    metalness, emission, normal_scale, occlusion_strength : as in glTF
+    is_unlit : whether the base colour is the radiance, and light is ignored
+    scatters : whether the file states that light scatters below the surface
+    maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
+    unused : properties that have no effect here, for the note
+    """
+
+    name: str = ""
+    textures: Mapping[Role, Texture] = field(default_factory=dict)
+    colour: tuple[float, float, float] | None = None
+    alpha: float = 1.0
+    alpha_mode: AlphaMode = "opaque"
+    alpha_cutoff: float = 0.5
+    roughness: float | None = None
+    metalness: float = 0.0
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal_scale: float = 1.0
+    occlusion_strength: float = 1.0
+    is_unlit: bool = False
+    scatters: bool = False
+    maps: Mapping[str, object] | None = None
+    unused: tuple[str, ...] = ()
