@@ -82,9 +82,9 @@ def test_obj_without_its_mtl_keeps_its_groups(obj: Path) -> None:
 def test_obj_groups_by_g_alone(obj: Path) -> None:
     text = "\n".join(line for line in obj.read_text().splitlines() if "mtl" not in line)
     obj.write_text(text)
-    assert [(m.name, m.kind) for m in load_mesh(obj).materials] == [("face", "skin"), ("ball", "skin")]
-    named = load_mesh(obj, opaque=("BALL",))
-    assert [(m.name, m.kind) for m in named.materials] == [("face", "skin"), ("ball", "opaque")]
+    assert [(m.name, m.kind) for m in load_mesh(obj).materials] == [("face", "skin"), ("ball", "opaque")]
+    named = load_mesh(obj, skin_groups=("BALL",))
+    assert [(m.name, m.kind) for m in named.materials] == [("face", "opaque"), ("ball", "skin")]
 
 
 def test_obj_comments_and_line_ends_are_no_damage(obj: Path) -> None:

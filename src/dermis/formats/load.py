@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from functools import partial
 from pathlib import Path
@@ -13,28 +13,31 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Ints, Numbers
+from dermis.base.arrays import Doubles, Floats, Numbers
 from dermis.base.disk import Arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
-from dermis.formats.parts import MaterialGroup, MeshPart, default_unit_mm, is_gltf
+from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_gltf
 from dermis.formats.read import Origin, Up, join_parts, read_mesh_file, select_vertices, to_y_up
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
+from dermis.formats.skin_groups import choose_skin, describe_choice
 from dermis.mesh.geometry import compact_vertices, weld
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_CACHE_VERSION = 6  # increment when `load_rigged` returns other results for the same file
+_CACHE_VERSION = 7  # increment when `load_rigged` returns other results for the same file
 _MESH_FIELDS = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGET_FIELDS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON_FIELDS = [field.name for field in fields(Skeleton) if field.name != "names"]
 _ARRAY_NAMES = [
     *_MESH_FIELDS,
     "outline",
+    "colours",
+    "other uv",
     "metadata",
     "control",
     *(f"target {name}" for name in _TARGET_FIELDS),
@@ -58,33 +61,35 @@ def load_rigged(
     unit_mm: float | None = None,
     v_origin: Origin = "auto",
     up: Up = "y",
+    skin_groups: tuple[str, ...] = (),
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
     """Load mesh and rig of a .glb, .gltf, .obj or .ply file, in millimetres, with Y up and v down.
 
-    Groups (materials, glTF meshes or OBJ `g`) with "skin" in their name are skin and all others are opaque;
-    in a file without such a group, every group is skin. The mesh is checked by `check_mesh`; its size is not
-    checked.
+    Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; all others are opaque.
+    The mesh is checked by `check_mesh`; its size is not checked.
 
     unit_mm : length of the file's unit [mm]; None for that of the format (`default_unit_mm`)
     v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
         format
     up : up axis of the file; with "z" the face looks along -Y, as in Blender
+    skin_groups : names of the groups that are skin; empty to find them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
 
-    Raises `DermisError` when the file is missing, damaged or not a mesh, has no uv, or fails `check_mesh`.
+    Raises `DermisError` when the file is missing, damaged or not a mesh, or fails `check_mesh`.
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
-    load = partial(_load_uncached, source, unit, v_origin, up, opaque, eye_groups)
+    groups = GroupNames(skin_groups, opaque, eye_groups)
+    load = partial(_load_uncached, source, unit, v_origin, up, groups)
     is_glb = source.suffix.lower() == ".glb" and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
     if not data or b'"uri"' in data:  # parts of it are in other files
         return load()
     default_name = source.stem  # of groups without a name
-    return cached_rigged(data, repr((default_name, unit, v_origin, up, opaque, eye_groups)), load)
+    return cached_rigged(data, repr((default_name, unit, v_origin, up, groups)), load)
 
 
 def _load_uncached(
@@ -92,8 +97,7 @@ def _load_uncached(
     unit: float,
     v_origin: Origin,
     up: Up,
-    opaque: tuple[str, ...],
-    eye_groups: tuple[str, ...],
+    groups: GroupNames,
 ) -> RiggedMesh:
     """Load mesh and rig without the disk cache; for the parameters see `load_rigged`.
 
@@ -107,19 +111,24 @@ def _load_uncached(
         positions, normals = to_y_up(unit * part.positions, up).astype(np.float32), to_y_up(part.normals, up)
         uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
         check_arrays(positions, uv, part.triangles, source)
-        material, materials = _triangle_materials(mesh_file.parts, opaque, eye_groups, source)
+        assigned, note = _assign_materials(mesh_file, groups, source)
         used, corners = compact_vertices(part.triangles)
         vertices = select_vertices(part, used)
         point = weld(np.column_stack((positions, _weld_groups(mesh_file.parts)))[used])
         if mesh_file.is_deformable:
             point = split_points(point, vertices, to_head[:3, :3], source)
-        arrays = positions[used], uv[used], corners, material, materials, normals[used], point
+        counts = [len(part.triangles) for part in mesh_file.parts]
+        material = np.repeat(np.array(assigned.of_part, np.int32), counts)
+        arrays = positions[used], uv[used], corners, material, assigned.materials, normals[used], point
         mesh = build_mesh(*arrays, part.quads)
         check_mesh(mesh, source)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
-    return RiggedMesh(mesh, rig, mesh_file.notes)
+    notes = (*((note,) if note else ()), *mesh_file.notes)
+    colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
+    other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
+    return RiggedMesh(mesh, rig, notes, FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv))
 
 
 def _weld_groups(parts: list[MeshPart]) -> Floats:
@@ -136,28 +145,46 @@ def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
     return np.where(np.abs(flipped - clamped) <= UV_TOLERANCE, clamped, flipped)
 
 
-def _triangle_materials(
-    parts: list[MeshPart], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
-) -> tuple[Ints, tuple[Material, ...]]:
-    """Return the material index of each triangle (f,), and the materials in the order of the file.
+class _AssignedMaterials(NamedTuple):
+    """Materials of the mesh, and which of them each part of the file has.
 
-    opaque : names of groups that are not skin
-    eye_groups : names of groups that contain eyeballs
+    of_part : index of the material of each part
+    in_file, has_uv : see `FileSurface`
     """
-    unnamed = (source.stem,)
+
+    materials: tuple[Material, ...]
+    of_part: list[int]
+    in_file: tuple[int, ...]
+    has_uv: tuple[bool, ...]
+
+
+def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> tuple[_AssignedMaterials, str]:
+    """Return the materials of the mesh, in the order of the file, and a note on what was taken for skin."""
+    parts, unnamed = mesh_file.parts, (source.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
-    is_opaque = _match_groups(groups, opaque, "opaque", source)
-    is_eye = _match_groups(groups, eye_groups, "eye_groups", source)
-    has_skin_group = any(group.name_contains("skin") for group in groups)
-    index: dict[Material, int] = {}
-    per_part = []
-    for group, opaque_group, eye_group in zip(groups, is_opaque, is_eye, strict=True):
-        kind = "opaque" if opaque_group or (has_skin_group and not group.name_contains("skin")) else "skin"
+    is_opaque = _match_groups(groups, names.opaque, "opaque", source)
+    is_eye = _match_groups(groups, names.eyes, "eye_groups", source)
+    scatters = [group.material >= 0 and mesh_file.materials[group.material].scatters for group in groups]
+    is_skin = _match_groups(groups, names.skin, "skin_groups", source)
+    if not names.skin:
+        is_skin = choose_skin(parts, groups, scatters)
+    is_skin = [skin and not opaque for skin, opaque in zip(is_skin, is_opaque, strict=True)]
+    stated = (
+        names.skin
+        or names.opaque
+        or all(skin or is_eye_name(group.names) for skin, group in zip(is_skin, groups, strict=True))
+    )
+    index: dict[tuple[Material, int, bool], int] = {}
+    of_part = []
+    for part, group, skin, eye_group in zip(parts, groups, is_skin, is_eye, strict=True):
         eye = eye_group or is_eye_name(group.names)
-        material = Material(group.names[0], kind, group.colour, eye=eye)
-        per_part.append(index.setdefault(material, len(index)))
-    counts = [len(part.triangles) for part in parts]
-    return np.repeat(np.array(per_part, dtype=np.int32), counts), tuple(index)
+        material = Material(group.names[0], "skin" if skin else "opaque", group.colour, eye=eye)
+        key = material, group.material, part.uv is not None
+        of_part.append(index.setdefault(key, len(index)))
+    materials, in_file, has_uv = zip(*index, strict=True)
+    return _AssignedMaterials(materials, of_part, in_file, has_uv), "" if stated else describe_choice(
+        groups, is_skin
+    )
 
 
 def _match_groups(
@@ -176,6 +203,29 @@ def _match_groups(
     return [any(name.casefold() in folded for name in group.names) for group in groups]
 
 
+class GroupNames(NamedTuple):
+    """Names of groups of a file that users state to be skin, not skin, or eyeballs."""
+
+    skin: tuple[str, ...] = ()
+    opaque: tuple[str, ...] = ()
+    eyes: tuple[str, ...] = ()
+
+
+class FileSurface(NamedTuple):
+    """What the pictures of a mesh file need besides the mesh.
+
+    in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    has_uv : (m,) whether the triangles of each material have uv in the file
+    colours : (v, 3) linear colours of vertices, or None
+    other_uv : (v, 2) further uv coordinates by their index in the file
+    """
+
+    in_file: tuple[int, ...] = ()
+    has_uv: tuple[bool, ...] = ()
+    colours: Floats | None = None
+    other_uv: Mapping[int, Floats] = {}
+
+
 class RiggedMesh(NamedTuple):
     """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
 
@@ -185,6 +235,7 @@ class RiggedMesh(NamedTuple):
     mesh: Mesh
     rig: Rig | None
     notes: tuple[str, ...] = ()
+    surface: FileSurface = FileSurface()
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
@@ -203,10 +254,13 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
-    mesh, rig, notes = rigged
+    mesh, rig, notes, surface = rigged
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
-    metadata["notes"] = notes
+    metadata |= {"notes": notes, "in_file": surface.in_file, "has_uv": surface.has_uv}
+    metadata["uv_sets"] = list(surface.other_uv)
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
+    arrays["colours"] = _EMPTY_ARRAY if surface.colours is None else surface.colours
+    arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _EMPTY_ARRAY
     rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
     if rig is not None:
         metadata |= {"targets": list(rig.targets.names), "bones": None}
@@ -229,18 +283,20 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
     materials = [Material(**one | {"colour": tuple(one["colour"])}) for one in metadata["materials"]]
     mesh = Mesh(**{name: arrays[name] for name in _MESH_FIELDS}, materials=tuple(materials))
     vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
-    notes = tuple(metadata["notes"])
+    notes, colours = tuple(metadata["notes"]), arrays["colours"] if len(arrays["colours"]) else None
+    other_uv = dict(zip(metadata["uv_sets"], arrays["other uv"], strict=True))
+    surface = FileSurface(tuple(metadata["in_file"]), tuple(metadata["has_uv"]), colours, other_uv)
     if "targets" not in metadata:
-        return RiggedMesh(mesh, None, notes)
+        return RiggedMesh(mesh, None, notes, surface)
     values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGET_FIELDS}
     values["rest"] = values["rest"] if len(arrays["target rest"]) else None
     targets = MorphTargets(tuple(metadata["targets"]), **values)  # type: ignore[arg-type]
     if metadata["bones"] is None:
-        return RiggedMesh(mesh, Rig(arrays["control"], targets), notes)
+        return RiggedMesh(mesh, Rig(arrays["control"], targets), notes, surface)
     skeleton = Skeleton(
         tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON_FIELDS}
     )
-    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton), notes)
+    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton), notes, surface)
 
 
 def is_eye_name(names: Sequence[str]) -> bool:

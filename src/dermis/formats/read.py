@@ -179,9 +179,11 @@ def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
 
 def _part_uv(part: MeshPart, source: Path) -> Doubles:
     name = part.group.names[0] if part.group.names else "the mesh"
-    if part.uv is None or part.uv.shape != (len(part.positions), 2):
-        advice = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
-        refuse(source, "uv at every vertex", f"{name!r} has none", advice)
+    if part.uv is None:
+        return np.zeros((len(part.positions), 2))
+    if part.uv.shape != (len(part.positions), 2):
+        actual = f"{name!r} has {len(part.uv)} for {len(part.positions)} vertices"
+        refuse(source, "uv at every vertex", actual, limits.DAMAGED_ADVICE)
     if not np.abs(part.uv).max() <= MAX_ABSOLUTE_UV:
         actual = f"{name!r} has some that are NaN, infinite or beyond {MAX_ABSOLUTE_UV:g}"
         refuse(source, "finite uv", actual, limits.DAMAGED_ADVICE)

@@ -142,7 +142,7 @@ class _Reader:
         if picture is None:
             return None
         extension = (reference.get("extensions") or {}).get("KHR_texture_transform") or {}
-        uv_set: int = extension.get("texCoord", reference.get("texCoord", 0))
+        uv_set = extension["texCoord"] if "texCoord" in extension else reference.get("texCoord", 0)
         sampler = self.document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
         if sampler.get("magFilter") == _NEAREST:
             self.unused.append("magnification without interpolation")

@@ -1,0 +1,250 @@
+"""Common maps of several materials, baked from their pictures, factors and vertex colours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dermis.atlas.raster import covered_texels
+from dermis.atlas.texture_tiles import PADDING, Tile, base_texture, file_uv, lay_out_tiles
+from dermis.base.arrays import Doubles, Floats, Mask, Numbers
+from dermis.formats.load import FileSurface
+from dermis.formats.maps import colour_map, slope_map
+from dermis.formats.materials import FileMaterial, Role, Texture, Wrap
+from dermis.formats.parts import GREY
+from dermis.images.filters import mip_chain
+from dermis.images.io import read_image
+from dermis.mesh.mesh import Mesh
+
+_STRIP_TEXELS = 1 << 22  # texels that are sampled at once, to limit memory
+_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
+    "colour": (1.0, 1.0, 1.0),
+    "normal": (0.0, 0.0),
+    "roughness": (1.0,),
+    "metalness": (1.0,),
+    "occlusion": (1.0,),
+    "emission": (1.0, 1.0, 1.0),
+}
+"""Values where a material has no picture, to which its factors apply."""
+
+
+@dataclass(frozen=True, eq=False)
+class PackedTextures:
+    """Common layout and maps of several materials.
+
+    vertices, uv : (n,) and (n, 2) vertices of the mesh and their uv in the common maps
+    maps : (side, side, k) values by role, factors included; only roles that a picture or a factor sets
+    notes : sentences on what is not exact
+    """
+
+    vertices: Numbers
+    uv: Floats
+    maps: Mapping[str, Floats]
+    notes: tuple[str, ...] = ()
+
+
+def pack_textures(
+    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
+) -> PackedTextures:
+    """Return the common layout and maps of some materials of a mesh.
+
+    surface, materials : of the file that the mesh comes from
+    members : (m,) materials of the mesh that share the maps
+    """
+    tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
+    baker = _Baker(mesh, surface, materials, tiles, side)
+    notes = (f"its pictures are reduced to {scale:.0%} of their size to fit one map",) if scale < 0.99 else ()
+    return PackedTextures(
+        np.concatenate([tile.vertices for tile in tiles]),
+        np.concatenate([tile.layout_uv(side) for tile in tiles]).astype(np.float32),
+        {role: baker.bake(role) for role in baker.roles()},
+        notes,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Baker:
+    """Maps over a layout of tiles."""
+
+    mesh: Mesh
+    surface: FileSurface
+    materials: Sequence[FileMaterial]
+    tiles: list[Tile]
+    side: int
+
+    def roles(self) -> list[Role]:
+        """Return the roles for which a material has a picture, and colour."""
+        used = {role for tile in self.tiles for role in self._material(tile).textures}
+        return [role for role in _DEFAULTS if role in used | {"colour"}]
+
+    def bake(self, role: Role) -> Floats:
+        """Return the common map (side, side, k) of a role."""
+        default = np.array(_DEFAULTS[role], np.float32)
+        channels = len(default) + (role == "colour")  # opacity
+        baked = np.zeros((self.side, self.side, channels), np.float32)
+        for tile in self.tiles:
+            values = self._tile_values(tile, role)
+            padded = np.pad(values, ((PADDING, PADDING), (PADDING, PADDING), (0, 0)), mode="edge")
+            x, y = (corner - PADDING for corner in tile.corner)
+            baked[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
+        return baked
+
+    def _material(self, tile: Tile) -> FileMaterial:
+        return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
+
+    def _tile_values(self, tile: Tile, role: Role) -> Floats:
+        """Return the values (h, w, k) of a role over a tile, factors included."""
+        material, (width, height) = self._material(tile), tile.size
+        texture = material.textures.get(role)
+        factor = _factor(material, role)
+        if texture is None:
+            default = np.array([*_DEFAULTS[role], *((1.0,) if role == "colour" else ())], np.float32)
+            values = np.broadcast_to(default, (height, width, len(default))).copy()
+        else:
+            values = self._sampled(tile, texture, role)
+        values *= factor
+        if role == "colour" and self.surface.colours is not None:
+            values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
+        return values
+
+    def _sampled(self, tile: Tile, texture: Texture, role: Role) -> Floats:
+        """Return the values (h, w, k) of a picture over a tile."""
+        picture = _read(texture, role)
+        base = base_texture(self._material(tile))
+        if base is not None and base.mapping == texture.mapping:
+            (width, height), span = tile.size, tile.high - tile.low
+            u = tile.low[0] + (np.arange(width) + 0.5) / width * span[0]
+            v = tile.low[1] + (np.arange(height) + 0.5) / height * span[1]
+            return sample_grid(picture, u, v, texture.wrap)
+        own = texture.map_uv(file_uv(self.mesh, self.surface, texture.uv_set, tile.vertices))
+        position = self._interpolated(tile, own)
+        return sample_points(picture, position, texture.wrap)
+
+    def _interpolated(self, tile: Tile, values: Numbers) -> Floats:
+        """Return values of the tile's vertices (n, k) at its texels (h, w, k), continued beyond triangles."""
+        from scipy.ndimage import distance_transform_edt
+
+        width, height = tile.size
+        corner = np.searchsorted(tile.vertices, self.mesh.triangles[tile.triangles])
+        place = (tile.layout_uv(self.side) * self.side - tile.corner)[corner] - 0.5
+        texel, which = covered_texels(place, (height, width))
+        y, x = np.divmod(texel, width)
+        weights = _barycentric(place[which], np.stack([x, y], axis=1).astype(np.float64))
+        baked = np.zeros((height * width, values.shape[1]), np.float32)
+        baked[texel] = np.einsum("nk,nkc->nc", weights, np.asarray(values, np.float64)[corner[which]])
+        if len(texel) == 0:
+            return np.broadcast_to(values.mean(axis=0), (height, width, values.shape[1])).astype(np.float32)
+        uncovered = np.ones(height * width, bool)
+        uncovered[texel] = False
+        near = distance_transform_edt(
+            uncovered.reshape(height, width), return_distances=False, return_indices=True
+        )
+        return np.asarray(baked.reshape(height, width, -1)[tuple(near)])
+
+
+def _barycentric(corners: Doubles, points: Doubles) -> Doubles:
+    """Return the barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 2)."""
+    a, b, c = corners.transpose(1, 0, 2)
+    (bx, by), (cx, cy), (px, py) = (b - a).T, (c - a).T, (points - a).T
+    area = bx * cy - by * cx
+    area = np.where(area == 0.0, 1.0, area)
+    second, third = (px * cy - py * cx) / area, (bx * py - by * px) / area
+    return np.asarray(np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0))
+
+
+def _factor(material: FileMaterial, role: Role) -> Floats:
+    """Return the factor of a material for a role, (k,)."""
+    colour = material.colour or ((1.0, 1.0, 1.0) if "colour" in material.textures else GREY)
+    factors: dict[Role, Sequence[float]] = {
+        "colour": (*colour, material.alpha),
+        "normal": (material.normal_scale, material.normal_scale),
+        "roughness": (1.0 if material.roughness is None else material.roughness,),
+        "metalness": (material.metalness,),
+        "occlusion": (1.0,),
+        "emission": material.emission,
+    }
+    return np.array(factors[role], np.float32)
+
+
+def _read(texture: Texture, role: Role) -> Floats:
+    """Return the picture of a role as linear values (H, W, k)."""
+    if role == "normal":
+        return slope_map(texture.picture, "up")
+    if role in ("colour", "emission"):
+        colours = colour_map(texture.picture)
+        if role == "emission":
+            return colours
+        image = read_image(texture.picture)
+        opaque = np.ones((*colours.shape[:2], 1), np.float32)
+        opacity = _unit_range(image[..., 3:]) if image.shape[2] == 4 else opaque
+        return np.concatenate([colours, opacity], axis=2)
+    image = read_image(texture.picture)
+    channel = min(texture.channel or 0, image.shape[2] - 1)
+    return _unit_range(image[..., channel : channel + 1])
+
+
+def _unit_range(image: Numbers) -> Floats:
+    if image.dtype == np.float32:
+        return np.asarray(np.clip(image, 0.0, 1.0), np.float32)
+    return np.asarray(image / np.float32(np.iinfo(image.dtype.str).max), np.float32)
+
+
+def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]) -> Floats:
+    """Return a picture (h, w, k) at all pairs of positions u (w,) and v (h,), 0 to 1 within it, filtered."""
+    step = (
+        max(abs(float(u[-1] - u[0])) / max(len(u) - 1, 1), 1e-9),
+        max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
+    )
+    picture = _reduced(picture, min(step[0] * picture.shape[1], step[1] * picture.shape[0]))
+    left, right, across = _neighbours(u, picture.shape[1], wrap[0])
+    top, bottom, down = _neighbours(v, picture.shape[0], wrap[1])
+    if not across.any() and not down.any():
+        return np.asarray(picture[top[:, None], left[None, :]])
+    sampled = np.empty((len(v), len(u), picture.shape[2]), np.float32)
+    rows = max(1, _STRIP_TEXELS // max(len(u), 1))
+    weight = across[None, :, None].astype(np.float32)
+    for start in range(0, len(v), rows):
+        own = slice(start, start + rows)
+        upper, lower = (
+            picture[line[own, None], left] * (1 - weight) + picture[line[own, None], right] * weight
+            for line in (top, bottom)
+        )
+        blend = down[own, None, None].astype(np.float32)
+        sampled[own] = upper * (1 - blend) + lower * blend
+    return sampled
+
+
+def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
+    """Return a picture (h, w, k) at positions (..., 2), 0 to 1 within it, interpolated."""
+    left, right, across = _neighbours(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
+    top, bottom, down = _neighbours(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
+    x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)
+    upper = picture[top, left] * (1 - x) + picture[top, right] * x
+    lower = picture[bottom, left] * (1 - x) + picture[bottom, right] * x
+    return np.asarray(upper * (1 - y) + lower * y)
+
+
+def _reduced(picture: Floats, texels_per_sample: float) -> Floats:
+    """Return the mip level of a picture that has about one texel for each sample."""
+    level = int(np.floor(np.log2(max(texels_per_sample, 1.0)) + 0.1))
+    return mip_chain(picture)[level] if level else picture
+
+
+def _neighbours(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
+    """Return the two texels around positions, 0 to 1 within a picture, and the weight of the second."""
+    texel = position * size - 0.5
+    texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * size, np.rint(texel), texel)
+    first = np.floor(texel)
+    index = first.astype(np.int64)
+    return _wrapped(index, size, wrap), _wrapped(index + 1, size, wrap), texel - first
+
+
+def _wrapped(index: Numbers, size: int, wrap: Wrap) -> Numbers:
+    if wrap == "clamp":
+        return np.clip(index, 0, size - 1)
+    if wrap == "repeat":
+        return index % size
+    folded = index % (2 * size)
+    return np.minimum(folded, 2 * size - 1 - folded)

@@ -1,0 +1,175 @@
+"""One uv layout for several materials: tiles of a common map, one for each material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles, Floats, Mask
+from dermis.formats.load import FileSurface
+from dermis.formats.maps import MAX_SIDE
+from dermis.formats.materials import FileMaterial, Texture
+from dermis.images.io import read_size
+from dermis.mesh.geometry import components, triangle_areas
+from dermis.mesh.mesh import Mesh
+
+UV_TOLERANCE = 2e-2
+"""Part of a picture by which uv may leave it without the layout showing more than the picture [-]."""
+PADDING = 8
+"""Texels around each tile that continue its border, so that mip levels do not mix materials."""
+_PLAIN_SIDE = 16  # texels of a tile without a picture that is not skin
+_MIN_SKIN_SIDE = 256  # texels of a tile of skin without a picture
+_GROWTH = 1.02  # of the side of the map until all tiles fit
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """Rectangle of the common map that shows one material of the mesh.
+
+    material : index of the file's material, -1 for none
+    vertices, triangles : indices of the mesh
+    uv : (n, 2) positions of the vertices in the material's pictures, v down
+    low, high : (2,) part of the picture that the tile shows
+    size : width and height [texel]
+    corner : left and top texel in the map, without the padding
+    """
+
+    material: int
+    vertices: NDArray[np.integer]
+    triangles: NDArray[np.integer]
+    uv: Doubles
+    low: Doubles
+    high: Doubles
+    size: tuple[int, int]
+    corner: tuple[int, int] = (0, 0)
+
+    def layout_uv(self, side: int) -> Doubles:
+        """Return the uv of the vertices in the common map (n, 2)."""
+        fraction = (self.uv - self.low) / np.maximum(self.high - self.low, 1e-12)
+        return np.asarray((np.array(self.corner) + fraction * self.size) / side)
+
+
+def base_texture(material: FileMaterial) -> Texture | None:
+    """Return the texture whose mapping determines the layout of a material: its colour, else the first."""
+    return material.textures.get("colour") or next(iter(material.textures.values()), None)
+
+
+def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.integer]) -> Doubles:
+    """Return uv coordinates of vertices as in the file (n, 2), with v down."""
+    uv: Floats = mesh.uv if uv_set == 0 else surface.other_uv[uv_set]
+    return uv[vertices].astype(np.float64)
+
+
+def lay_out_tiles(
+    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
+) -> tuple[list[Tile], int, float]:
+    """Return the tiles of some materials, the side of their common map, and the scale of their pictures.
+
+    surface : of the file that the mesh comes from
+    members : (m,) materials of the mesh that share the map
+    """
+    of_file = np.array(surface.in_file)[mesh.material]
+    member = members[mesh.material]
+    tiles = []
+    for index in np.unique(of_file[member]).tolist():
+        triangles = np.flatnonzero(member & (of_file == index))
+        tiles.append(
+            _unplaced_tile(
+                mesh, surface, materials[index] if index >= 0 else FileMaterial(), index, triangles
+            )
+        )
+    tiles = _with_plain_sizes(mesh, tiles, materials)
+    return _pack(tiles)
+
+
+def _unplaced_tile(
+    mesh: Mesh, surface: FileSurface, material: FileMaterial, index: int, triangles: NDArray[np.integer]
+) -> Tile:
+    vertices = np.unique(mesh.triangles[triangles])
+    texture = base_texture(material)
+    uv = file_uv(mesh, surface, texture.uv_set if texture else 0, vertices)
+    if texture:
+        uv = _move_charts(mesh, texture, texture.map_uv(uv), vertices, triangles)
+    low, high = uv.min(axis=0), uv.max(axis=0)
+    inside = (low > -UV_TOLERANCE) & (high < 1.0 + UV_TOLERANCE)
+    low, high = np.where(inside, np.minimum(low, 0.0), low), np.where(inside, np.maximum(high, 1.0), high)
+    width, height = _picture_size(material)
+    size = (max(1, round(width * (high[0] - low[0]))), max(1, round(height * (high[1] - low[1]))))
+    return Tile(index, vertices, triangles, uv, low, high, size if width else (0, 0))
+
+
+def _picture_size(material: FileMaterial) -> tuple[int, int]:
+    """Return the largest width and height of the pictures of a material; 0 for none."""
+    sizes = [read_size(texture.picture) for texture in material.textures.values()]
+    return max((width for width, _ in sizes), default=0), max((height for _, height in sizes), default=0)
+
+
+def _move_charts(
+    mesh: Mesh, texture: Texture, uv: Doubles, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
+) -> Doubles:
+    """Return uv with connected charts moved by whole pictures towards the first one, where pictures repeat."""
+    if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
+        return uv
+    corner = np.searchsorted(vertices, mesh.triangles[triangles])
+    chart = components(len(vertices), corner[:, :2].ravel(), corner[:, 1:].ravel())
+    count = int(chart.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, chart, uv)
+    np.maximum.at(high, chart, uv)
+    period = np.array([{"repeat": 1.0, "mirror": 2.0, "clamp": np.inf}[wrap] for wrap in texture.wrap])
+    moved = np.where(np.isfinite(period), period * np.floor((low + high) / 2.0 / period), 0.0)
+    return np.asarray(uv - np.nan_to_num(moved)[chart])
+
+
+def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
+    """Return tiles in which those without pictures have a size: as fine as the others if they are skin."""
+    area = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
+    density = [tile.size[0] * tile.size[1] / max(own, 1e-9) for tile, own in zip(tiles, area, strict=True)]
+    usual = float(np.median([own for own in density if own > 0] or [0.0]))
+    sized = []
+    for tile, own in zip(tiles, area, strict=True):
+        if tile.size == (0, 0):
+            is_skin = mesh.materials[int(mesh.material[tile.triangles[0]])].kind == "skin"
+            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * own)))) if is_skin else _PLAIN_SIDE
+            tile = Tile(
+                tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)
+            )
+        sized.append(tile)
+    return sized
+
+
+def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
+    """Return placed tiles, the side of the map, and the scale by which tiles shrank to fit the largest map."""
+    scale = 1.0
+    while True:
+        sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
+        side, corners = _shelves(sizes)
+        if side <= MAX_SIDE:
+            break
+        scale *= 0.98 * MAX_SIDE / side
+    placed = [
+        Tile(t.material, t.vertices, t.triangles, t.uv, t.low, t.high, (w, h), corner)
+        for t, (w, h), corner in zip(tiles, sizes, corners, strict=True)
+    ]
+    return placed, side, scale
+
+
+def _shelves(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
+    """Return the side of the smallest square into which shelves of rectangles fit, and their corners."""
+    padded = np.array(sizes) + 2 * PADDING
+    order = np.argsort(-padded[:, 1], kind="stable")
+    side = float(max(padded.max(), np.sqrt(padded.prod(axis=1).sum())))
+    while True:
+        corners, x, y, shelf = np.zeros_like(padded), 0, 0, 0
+        for index in order:
+            width, height = padded[index]
+            if x + width > side:
+                x, y, shelf = 0, y + shelf, 0
+            corners[index] = x, y
+            x, shelf = x + width, max(shelf, height)
+        if y + shelf <= side:
+            return int(np.ceil(side)), [(int(x) + PADDING, int(y) + PADDING) for x, y in corners]
+        side *= _GROWTH

@@ -1,0 +1,119 @@
+"""Choice of the groups of a mesh file that are skin."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from dermis.formats.parts import MaterialGroup, MeshPart
+from dermis.mesh.geometry import triangle_areas
+
+_WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+SKIN_WORDS = ("skin", "skins", "epidermis", "flesh")
+"""Words that make a group skin; all other groups are then not skin."""
+BODY_WORDS = (
+    *("face", "head", "body", "torso", "neck", "ear", "ears", "nose", "lip", "lips", "nostril", "nostrils"),
+    *("arm", "arms", "hand", "hands", "leg", "legs", "foot", "feet", "limbs", "finger", "fingers", "forearm"),
+)
+"""Words that make a group skin in files where no group has one of `SKIN_WORDS`."""
+OTHER_WORDS = (
+    *("hair", "hairs", "brow", "brows", "eyebrow", "eyebrows", "lash", "lashes", "eyelash", "eyelashes"),
+    *("beard", "mustache", "moustache", "scalp", "eye", "eyes", "eyeball", "eyeballs", "iris", "cornea"),
+    *("sclera", "pupil", "tear", "tears", "tearline", "occlusion", "highlight", "teeth", "tooth", "tongue"),
+    *(
+        "gum",
+        "gums",
+        "mouth",
+        "cloth",
+        "cloths",
+        "clothes",
+        "clothing",
+        "outfit",
+        "shirt",
+        "tshirt",
+        "jacket",
+    ),
+    *(
+        "coat",
+        "dress",
+        "skirt",
+        "pants",
+        "trousers",
+        "jeans",
+        "shorts",
+        "tops",
+        "bottoms",
+        "underwear",
+        "bra",
+    ),
+    *("shoe", "shoes", "boot", "boots", "sock", "socks", "glove", "gloves", "hat", "cap", "helmet", "hood"),
+    *("glasses", "eyewear", "goggles", "mask", "scarf", "collar", "tie", "belt", "armor", "armour", "metal"),
+    *("earring", "earrings", "necklace", "jewelry", "jewellery", "nail", "nails", "accessory", "accessories"),
+    *("eyeline", "eyeliner", "leather", "moleskin", "sheepskin", "horn", "horns", "background", "plinth"),
+)
+"""Words of groups that are never skin, unless another word of the group is in `SKIN_WORDS`."""
+HEAD_REGION = 0.3
+"""Part of a standing figure's height, from the top, in which the skin of the head is looked for [-]."""
+_MIN_COVERAGE = 0.1  # of the area of the head region
+
+
+def choose_skin(
+    parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
+) -> list[bool]:
+    """Return for each mesh part whether it is skin.
+
+    The first of these rules that applies to a part decides: materials that scatter light; names with words of
+    `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `OTHER_WORDS`; parts without a word of
+    `OTHER_WORDS` that cover a tenth of the head or more. If none applies, all parts are skin.
+
+    groups : names of the parts
+    scatters : whether the file states that light scatters below the surface of a part
+    """
+    words = [_words(group) for group in groups]
+    is_other = [bool(own & set(OTHER_WORDS)) for own in words]
+    named = [_has_skin_word(own) for own in words]
+    body = [bool(own & set(BODY_WORDS)) and not other for own, other in zip(words, is_other, strict=True)]
+    for rule in (list(scatters), named, body):
+        if any(rule):
+            return rule
+    covering = _covers_head(parts, is_other)
+    return covering if any(covering) else [True] * len(parts)
+
+
+def _words(group: MaterialGroup) -> set[str]:
+    return {word.casefold() for name in group.names for word in _WORD_PATTERN.findall(name)}
+
+
+def _has_skin_word(words: set[str]) -> bool:
+    """Return whether a word is that of skin, or a compound such as faceskin."""
+    own = {word for word in words if word.endswith(("skin", "skins")) and word not in OTHER_WORDS}
+    return bool(own | (words & set(SKIN_WORDS)))
+
+
+def _covers_head(parts: Sequence[MeshPart], is_other: Sequence[bool]) -> list[bool]:
+    """Return for each mesh part whether it covers a notable fraction of the area of the head."""
+    heights = np.concatenate([part.positions[:, 1] for part in parts])
+    lowest = heights.max() - HEAD_REGION * np.ptp(heights)
+    area = np.zeros(len(parts))
+    for index, part in enumerate(parts):
+        corners = part.positions[part.triangles]
+        area[index] = triangle_areas(corners)[corners[..., 1].mean(axis=1) >= lowest].sum()
+    area[np.array(is_other)] = 0.0
+    return [bool(own >= _MIN_COVERAGE * area.sum() > 0.0) for own in area]
+
+
+def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
+    """Return the note on what was taken for skin, and how to change it; empty for a single group."""
+    names = [group.names[0] for group in groups]
+    skin = list(dict.fromkeys(name for name, own in zip(names, is_skin, strict=True) if own))
+    other = [name for name in dict.fromkeys(names) if name not in skin]
+    if not other:
+        return ""
+    return f"skin is {_listed(skin)}; not skin: {_listed(other)}. --skin-groups NAME,... chooses others"
+
+
+def _listed(names: Sequence[str], most: int = 6) -> str:
+    shown = ", ".join(repr(name) for name in names[:most])
+    return f"{shown} and {len(names) - most} more" if len(names) > most else shown
