@@ -80,11 +80,11 @@ def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "_address_space_limit", lambda: 3.0 * GB)
     monkeypatch.setattr(memory, "_address_space_used", lambda: 0.5 * GB)
     monkeypatch.setenv("LP_NUM_THREADS", "2")
-    memory.check_software()
+    memory.check_software_address_space()
     monkeypatch.setenv("LP_NUM_THREADS", "16")
     assert memory.available_memory() <= 2.5 * GB
     with pytest.raises(DermisError, match=r"at least 5\.\d GB for graphics drivers"):
-        memory.check_software()
+        memory.check_software_address_space()
 
 
 def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -82,9 +82,9 @@ def render(
     frame_outputs = FrameOutputs(outputs, outputs_format, output)
     landmark_output = FrameLandmarks(landmarks, output)
     from dermis.frame.renderer import Renderer
-    from dermis.gpu.memory import check_drivers
+    from dermis.gpu.memory import check_driver_address_space
 
-    check_drivers()  # before the head is loaded, which needs memory too
+    check_driver_address_space()  # before the head is loaded, which needs memory too
     with _gc_disabled(), ThreadPoolExecutor(1) as pool:
         future = pool.submit(Renderer, adapter)  # the driver starts and compiles while the head is loaded
         with spinner("loading"):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dermis.base.errors import refuse
-from dermis.gpu.memory import check_drivers
+from dermis.gpu.memory import check_driver_address_space
 from dermis.gpu.types import Untyped
 
 _TYPEDEF = "typedef "
@@ -150,7 +150,7 @@ def list_adapters() -> list[Adapter]:
 
     Raises DermisError if drivers fail, or would fail for lack of address space.
     """
-    check_drivers()
+    check_driver_address_space()
     try:
         import wgpu
     except (ImportError, OSError) as error:
@@ -196,9 +196,9 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
 
 
 def similar_adapters(selector: str) -> list[Adapter]:
-    """Return the best adapter for a selector, and all other matching GPUs of its kind and backend.
+    """Return the best adapter for a selector, then all other matching GPUs of the same kind and backend.
 
-    The common backend ensures that no GPU is listed twice. A software adapter is returned alone.
+    As all use one backend, no GPU is listed twice. A software adapter is returned alone.
 
     Raises DermisError if no adapter matches.
     """
@@ -225,7 +225,7 @@ def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str
     """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
 
     offered : limits of the adapter by name
-    raised : names of the limits for which all that the adapter offers is requested
+    raised : names of the limits that are requested at the full value that the adapter offers
     """
     limits = {
         name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
@@ -252,7 +252,7 @@ def _kind_rank(kind: str) -> int:
 
 @contextlib.contextmanager
 def _silenced_stderr() -> Iterator[None]:
-    """Redirect file descriptor 2 to the null device, as drivers write warnings to it without a display."""
+    """Discard writes to stderr (file descriptor 2): without a display, drivers print warnings there."""
     try:
         saved = os.dup(2)
     except OSError:  # there is no stderr

@@ -13,7 +13,7 @@ from dermis.gpu.types import NativeObject, Texture, TextureOrView, Untyped, is_t
 
 UNIFORM_BUFFER = {"type": "uniform"}
 
-_DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
+_VIEW_DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
 
 _ALL_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
 
@@ -141,7 +141,7 @@ def _default_view(device: Device, texture: Texture, dimension: str) -> object:
     )
     if dimension not in views:
         descriptor = device.ffi.new("WGPUTextureViewDescriptor *")
-        descriptor.dimension, descriptor.aspect = _DIMENSIONS[dimension], _ASPECT_ALL
+        descriptor.dimension, descriptor.aspect = _VIEW_DIMENSIONS[dimension], _ASPECT_ALL
         descriptor.mipLevelCount = _ALL_LEVELS
         descriptor.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
         handle = device.checked.wgpuTextureCreateView(texture._internal, descriptor)

@@ -61,7 +61,7 @@ class CommandList(Recorder):
         """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
         in_place : ignored, as it only matters for finding stale passes
-        access : access of the program to these resources, which caches native dispatches for later frames
+        access : `Access` of the program to these resources; it caches the native dispatch for later frames
         """
         key = stage, groups, program.record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
@@ -270,8 +270,9 @@ def make_dispatch(
 class ComputePass:
     """Compute pass that is encoded by direct calls of the native library, for speed.
 
-    wgpu wraps each call in Python to catch its errors. Without that no error is lost: the library collects
-    the errors of a pass until the encoder finishes. The library also keeps the bound resources alive.
+    wgpu wraps each call in Python to check for errors. Skipping this wrapper loses no errors, because the
+    native library collects the errors of a pass and reports them when the encoder finishes. The native
+    library also keeps the bound resources alive.
     """
 
     def __init__(
@@ -312,7 +313,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Reserve a timestamp for a pass and return its `timestamp_writes`; None for a pass without one."""
+        """Reserve a timestamp for a pass and return its `timestamp_writes`; None if it takes no timestamp."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None

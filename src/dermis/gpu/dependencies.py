@@ -49,7 +49,7 @@ class ResourceState:
         return found
 
     def set_version(self, version: int) -> None:
-        """Set the version of this resource and its views; that of a viewed texture becomes unknown."""
+        """Set the version of this resource and its views; the version of a viewed texture becomes unknown."""
         self.version = version
         for view in self.views:
             view.version = version
@@ -85,7 +85,7 @@ def mark_scratch(device: Device, resource: R) -> R:
 
 
 def resource_state(device: Device, resource: Bindable) -> ResourceState:
-    """Return the content version of a texture, buffer or view, whose tracking starts on first use."""
+    """Return the state of a texture, buffer or view; its version is tracked from the first call on."""
     found = device.resource_states.get(resource)
     if found is None:
         texture = getattr(resource, "texture", None)
@@ -160,7 +160,8 @@ class Dependencies:
     def _stale_given(self, valid: set[ResourceState]) -> list[bool]:
         """Return for each pass whether it writes a needed output that is not in `valid`.
 
-        Needed are the final content of resources other than scratch, and the inputs of stale passes.
+        An output is needed if it is the final content of a resource that is not scratch, or the input of a
+        stale pass.
         """
         stale, needed = [False] * len(self.passes), set[tuple[int | None, ResourceState]]()
         for index in range(len(stale) - 1, -1, -1):

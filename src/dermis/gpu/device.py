@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, check_limits, device_limits, select_adapters
-from dermis.gpu.memory import allocation, check_software
+from dermis.gpu.memory import check_software_address_space, checked_allocation
 from dermis.gpu.types import Bindable, Buffer, Sampler, Untyped
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_TIMED_PASSES = 2048
-_STAGING_STEP = 4096
+_MAX_TIMED_PASSES = 2048
+_STAGING_STEP_BYTES = 4096
 _LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"  # in wgpu's log; DeviceLostError says so too
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
@@ -54,12 +54,12 @@ class Device:
     that the adapter supports.
 
     adapter, reason : adapter, and why it was chosen, for users
-    bare : whether to keep the default sizes too, and to request no feature
+    bare : whether the largest sizes are WebGPU's defaults too, and no feature is requested
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi, lib, checked : native library of wgpu, called directly in each frame to save the overhead of wgpu's
-        Python code; functions of `checked` raise the library's errors, those of passes when their encoder is
-        submitted
+        Python code; functions of `checked` raise the library's errors; errors in a pass are raised when its
+        encoder is submitted
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
     spare_chunks : unused host memory for uniforms, kept because allocation takes longer
@@ -74,7 +74,7 @@ class Device:
         self.reason = reason
         logging.getLogger("wgpu").addFilter(_is_no_loss_note)
         if adapter.kind == "CPU":
-            check_software()
+            check_software_address_space()
         check_limits(adapter.name, adapter.handle.limits)
         features = [] if bare else list(adapter.features)
         limits = device_limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
@@ -116,15 +116,15 @@ class Device:
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
     def command_encoder(self) -> Untyped:
-        """Return a new command encoder, without a label, which wgpu itself would take longer to create."""
+        """Return a new command encoder without a label, created faster than by wgpu's own method."""
         handle = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
         return self._encoder("", handle, self.handle)
 
     def submit(self, encoder: Untyped) -> int:
         """Submit the commands of an encoder and return the number of the submission, for `wait`.
 
-        Raises GPUError for errors of the commands, and for a lost device, for which the library would abort
-        the process.
+        Raises GPUError if a command is invalid, or if the device is lost; submitting to a lost device would
+        abort the process.
         """
         finished = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(finished, self.lib.wgpuCommandBufferRelease)
@@ -176,7 +176,7 @@ class Device:
 
     def acquire_staging(self, size: int) -> Buffer:
         """Return a mappable buffer of at least `size` bytes for a readback, a released one if possible."""
-        size = -(-size // _STAGING_STEP) * _STAGING_STEP
+        size = -(-size // _STAGING_STEP_BYTES) * _STAGING_STEP_BYTES
         spare = self._staging.get(size)
         if spare:
             return spare.pop()
@@ -185,7 +185,7 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for later readbacks; buffers of other sizes are dropped."""
+        """Keep a staging buffer for later readbacks; a buffer of a new size replaces those of other sizes."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
@@ -210,7 +210,7 @@ class Device:
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
         limit = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
-        with allocation(self.adapter.name, name, size, limit):
+        with checked_allocation(self.adapter.name, name, size, limit):
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
@@ -229,9 +229,9 @@ class Device:
         import wgpu
 
         if self._timestamps is None:
-            queries = self.handle.create_query_set(type="timestamp", count=_TIMED_PASSES)
+            queries = self.handle.create_query_set(type="timestamp", count=_MAX_TIMED_PASSES)
             usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
-            self._timestamps = queries, self.handle.create_buffer(size=8 * _TIMED_PASSES, usage=usage)
+            self._timestamps = queries, self.handle.create_buffer(size=8 * _MAX_TIMED_PASSES, usage=usage)
         return self._timestamps
 
 

@@ -133,7 +133,7 @@ class Memo:
         return result
 
     def _mark_hits_used(self, key: FunctionKey | None = None) -> None:
-        """Mark results used in this frame as most recently used: all, or those that depend on a key."""
+        """Move results used in this frame to the front of the cache: all, or those that depend on `key`."""
         for one, result in self._hits:
             if key is None or key in result.keys:
                 self._mark_used(one, result)

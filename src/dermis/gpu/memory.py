@@ -15,10 +15,10 @@ from dermis.gpu.types import Buffer
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
-_LISTING_BYTES = 0.5e9, 0.15e9
+_DRIVER_LOADING_BYTES = 0.5e9, 0.15e9
 """Address space that loading all drivers takes, and per thread of Mesa's adapter; measured with Mesa 22.3."""
 
-_SOFTWARE_BYTES = 0.9e9, 0.22e9
+_SOFTWARE_RENDERING_BYTES = 0.9e9, 0.22e9
 """Address space to render the package's human in software at 512x512, atlas 1024, and per thread."""
 
 _MAX_THREADS = 16  # of Mesa's software adapter
@@ -51,8 +51,8 @@ class OutOfMemoryError(DermisError):
 
 
 @contextlib.contextmanager
-def allocation(device: str, name: str, size: float, limit: float) -> Iterator[None]:
-    """Raise OutOfMemoryError if the resource that is created in this context does not fit.
+def checked_allocation(device: str, name: str, size: float, limit: float) -> Iterator[None]:
+    """Raise OutOfMemoryError if the resource that the body of this context creates does not fit.
 
     device, name : names of the adapter and of the resource, for the message
     size, limit : size of the resource, and largest size that the device allows [byte]
@@ -117,16 +117,16 @@ def probe_memory(device: Device, limit: float) -> float:
     return float(total)
 
 
-def check_drivers() -> None:
+def check_driver_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
     if _address_space_limit() < math.inf and not _has_drivers():
-        _check_address_space(_per_threads(_LISTING_BYTES), _per_threads(_SOFTWARE_BYTES))
+        _check_address_space(_per_threads(_DRIVER_LOADING_BYTES), _per_threads(_SOFTWARE_RENDERING_BYTES))
 
 
-def check_software() -> None:
+def check_software_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to render in software."""
     if _address_space_limit() < math.inf:
-        _check_address_space(_per_threads(_SOFTWARE_BYTES))
+        _check_address_space(_per_threads(_SOFTWARE_RENDERING_BYTES))
 
 
 def available_memory() -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import DermisError
 from dermis.gpu.command_list import CommandList
 from dermis.gpu.device import Device
-from dermis.gpu.memory import allocation
+from dermis.gpu.memory import checked_allocation
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.types import Texture, TextureView
 
@@ -61,7 +61,7 @@ def make_texture(
         (upload); shaders can read it in any case
     name : name of the texture, for error messages
 
-    Raises DermisError for sizes over the device's limit, and OutOfMemoryError if its memory is full.
+    Raises DermisError for sizes over the device's limit, and OutOfMemoryError if the device's memory is full.
     """
     import wgpu
 
@@ -78,7 +78,7 @@ def make_texture(
     }[use]
     description = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
     texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
-    with allocation(device.adapter.name, description, FORMAT_BYTES[texel] * texels, math.inf):
+    with checked_allocation(device.adapter.name, description, FORMAT_BYTES[texel] * texels, math.inf):
         texture: Texture = device.handle.create_texture(
             size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
         )

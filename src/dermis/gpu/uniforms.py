@@ -62,7 +62,7 @@ class Uniforms:
             self._device.write(self._chunk(index), staged, self._end if last else CHUNK_BYTES)
 
     def finish(self) -> None:
-        """Forget all records after the last submission, and keep their host memory for later frames."""
+        """Forget all records, after the last submission; their host memory is kept for later frames."""
         self._device.spare_chunks.extend(self._staged)
         self.clear()
 

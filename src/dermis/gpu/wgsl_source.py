@@ -50,7 +50,8 @@ class ShaderFolder(os.PathLike[str]):
 
     path : path of the folder
     lists : functions that return the members of each list, by list name; called whenever a shader is composed
-    numbers : function that returns constants shared by shaders and Python, by name; called as `lists` are
+    numbers : function that returns constants shared by shaders and Python, by name; called whenever a shader
+        is composed
     options : names for which `//#if` is true in the shaders of all folders
     """
 
