@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.features.atlas.passes import draw_coarser
+from dermis.frame.features.atlas.passes import draw_coarser_stretch_maps
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import FrameInputs
@@ -84,7 +84,7 @@ def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) ->
     metric = np.dstack([atlas.stretch, atlas.shear * (stretch == "full"), np.zeros_like(atlas.shear)])
     upload(device, made.resources["stretch_map"], metric)
     frame = CommandList(device)
-    draw_coarser(frame, made)
+    draw_coarser_stretch_maps(frame, made)
     frame.submit()
     return made
 

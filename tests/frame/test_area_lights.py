@@ -14,9 +14,9 @@ from twins import surface
 
 from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
-from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
+from dermis.frame.features.irradiance.irradiance import TEXEL_FILTER_SIGMA
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.lights.records import light_records, light_views
+from dermis.frame.lights.records import light_records, light_shadow_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
 from dermis.frame.programs import device_constants, strip_constants
 from dermis.frame.renderer import Renderer
@@ -149,7 +149,8 @@ def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
         shadows=False,
     )
     made, points = entered(renderer, FLOOR, light)
-    variance = np.array([6.0**2, 6.0**2 + (TEXEL_AREA * 200 / 64) ** 2])  # as given, as texels hold it
+    # As given, and as texels hold it.
+    variance = np.array([6.0**2, 6.0**2 + (TEXEL_FILTER_SIGMA * 200 / 64) ** 2])
     exact = 2 * np.sqrt(variance[0] / variance[1]) * np.exp(-0.5 * (points[..., 0] - 10) ** 2 / variance[1])
     exact *= np.abs(points[..., 1]) < 50
     inside = np.abs(np.abs(points[..., 1]) - 50) > 3
@@ -159,7 +160,7 @@ def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
 def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:
     """Return positions along the middle of the floor on x, and the visibility of the light at each."""
     scene = scene_of(head, light)
-    views = light_views(scene, scene.head.mesh.outline, size)
+    views = light_shadow_views(scene, scene.head.mesh.outline, size)
     inputs = run_frame(renderer, scene, shadow_size=size)
     x = np.linspace(-55, 55, 4 * SIZE * SIZE // 4).astype(np.float32).reshape(SIZE, SIZE)
     points = np.dstack([x, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)])

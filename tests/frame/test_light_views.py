@@ -7,7 +7,7 @@ import pytest
 from setups import head_of, place, scene_of
 
 from dermis.base.errors import DermisError
-from dermis.frame.lights.records import light_views
+from dermis.frame.lights.records import light_shadow_views
 from dermis.frame.projection import view_axes
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
@@ -22,10 +22,10 @@ LIGHTS: tuple[Light, ...] = (
 
 
 def test_each_sees_what_it_sees_alone() -> None:
-    together = light_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)
+    together = light_shadow_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)
     assert [view is None for view in together] == [False, False, True, False]
     for light, view in zip(LIGHTS, together, strict=True):
-        (alone,) = light_views(scene_of(BALL, light), BALL.mesh.outline, 64)
+        (alone,) = light_shadow_views(scene_of(BALL, light), BALL.mesh.outline, 64)
         assert (alone is None) == (view is None)
         if view and alone:
             assert np.allclose(view.clip, alone.clip, rtol=1e-5, atol=1e-6)
@@ -34,7 +34,7 @@ def test_each_sees_what_it_sees_alone() -> None:
 
 @pytest.mark.parametrize("index", [0, 3])
 def test_maps_hold_the_head_tightly(index: int) -> None:
-    view = light_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)[index]
+    view = light_shadow_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)[index]
     assert view
     corners = np.c_[BALL.mesh.positions, np.ones(len(BALL.mesh.positions))] @ view.clip.T
     x, y, depth = (corners[:, :3] / corners[:, 3:]).T
@@ -47,7 +47,7 @@ def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
     """A light inside the bounds, or so near that no map can cover the head, is refused by name."""
     lamp = PointLight(position=place(BALL, inside), target=(100.0, 0.0, 0.0))
     with pytest.raises(DermisError, match=r"light 2.*a position outside the head"):
-        light_views(scene_of(BALL, LIGHTS[0], lamp), BALL.mesh.outline, 64)
+        light_shadow_views(scene_of(BALL, LIGHTS[0], lamp), BALL.mesh.outline, 64)
 
 
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])

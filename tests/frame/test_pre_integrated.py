@@ -18,7 +18,7 @@ from dermis.frame.techniques.pre_integrated import (
     half_light_sigma_mm,
     penumbra_width_mm,
     scattered_cosine,
-    shadow_edge,
+    shadow_edge_row,
     sphere_table,
 )
 from dermis.gpu import download
@@ -87,7 +87,7 @@ def test_more_curved_is_softer() -> None:
 def test_shadow_edge(half_width_mm: float) -> None:
     """Compare with a step blurred by the line profile: odd about its centre, from 0 to 1."""
     radius = penumbra_width_mm(PROFILE)
-    made = shadow_edge(PROFILE, radius, half_width_mm)
+    made = shadow_edge_row(PROFILE, radius, half_width_mm)
     assert made[0].max() < 1e-15 and made[-1].min() == 1
     assert np.allclose(made + made[::-1], 1) and (np.diff(made, axis=0) >= 0).all()
     x = np.linspace(-40, 40, 16001)
@@ -189,7 +189,7 @@ def test_straight_shadow(renderer: Renderer, down: float) -> None:
     middle = np.interp(0.5, dry[seen, 0] / dry.max(), x[seen])
     assert middle == pytest.approx(10.0, abs=0.15 + 0.4 * down)  # points are lifted off the wall
     radius = penumbra_width_mm(PROFILE)
-    edge = shadow_edge(PROFILE, radius, 0.5)
+    edge = shadow_edge_row(PROFILE, radius, 0.5)
     at = np.clip((x - middle) / radius, -1, 1)
     exact = np.stack([np.interp(at, np.linspace(-1, 1, len(edge)), edge[:, k]) for k in range(3)], axis=-1)
     off = np.abs(made / made.max() - exact)[seen]

@@ -12,7 +12,7 @@ from setups import AnyLight, frontal, head_of, joined, place, probe, run_frame, 
 from tolerances import LIT
 
 from dermis.atlas.build import cached_atlas
-from dermis.frame.lights.records import light_views
+from dermis.frame.lights.records import light_shadow_views
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import plane, uv_sphere
@@ -60,7 +60,7 @@ def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=shadow_size)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
     x, profile = points[row, :350, 0], visibility[row, :350]
-    (view,) = light_views(scene_of(PLATE, light), PLATE.mesh.outline, shadow_size)
+    (view,) = light_shadow_views(scene_of(PLATE, light), PLATE.mesh.outline, shadow_size)
     assert view is not None
     allowed = view.texel * np.sqrt(2) + softness
     near = (x > -40) & (x < 5)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
 
-from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.features.surface.texels import SURFACE_TEXEL_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.primitives import uv_sphere
@@ -93,7 +93,7 @@ def test_what_changed_is_seen(renderer: Renderer) -> None:
 def test_gone_with_its_atlas(renderer: Renderer) -> None:
     inputs = run_frame(renderer, SCENE, atlas=SIZE)
     texture = inputs.layouts[0].surfaces
-    assert texture.size == (SIZE, SIZE, 2) and SURFACE_BYTES == 2 * 16
+    assert texture.size == (SIZE, SIZE, 2) and SURFACE_TEXEL_BYTES == 2 * 16
     gone = weakref.ref(texture)
     del texture, inputs
     renderer.clear_cache()

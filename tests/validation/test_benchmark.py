@@ -35,7 +35,7 @@ from dermis.apps.validation.benchmarks.report import (
 )
 from dermis.apps.validation.benchmarks.run import Benchmark, SkippedCase, run_benchmark
 from dermis.base.errors import DermisError
-from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.features.surface.texels import SURFACE_TEXEL_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
@@ -137,7 +137,7 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     assert thin.pairs.count > receivers > 10
     words = np.frombuffer(renderer.device.handle.queue.read_buffer(thin.weights), np.uint32)
     assert len(words) == 2 * thin.pairs.count and (words[::2] & 0xFFFFFF).max() == sources - 1
-    lists = 8 * thin.pairs.count + (4 + SURFACE_BYTES) * sources + 12 * receivers
+    lists = 8 * thin.pairs.count + (4 + SURFACE_TEXEL_BYTES) * sources + 12 * receivers
     light = min(4 * sources, (levels.size >> traffic.inputs.blurs[0].halvings[1 + thin.source_level]) ** 2)
     assert (
         stage_bytes(traffic)["translucency"] == lists + light * texel_bytes(levels.stacks[0]) + 16 * receivers

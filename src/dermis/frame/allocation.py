@@ -15,8 +15,12 @@ from dermis.frame.features.interreflection.interreflection import (
     make_interreflection,
     placeholder_interreflection,
 )
-from dermis.frame.features.occlusion.baked import occlusion_map, placeholder_occlusion
-from dermis.frame.features.occlusion.moving import VertexSky, make_moving_map, make_vertex_sky
+from dermis.frame.features.occlusion.baked import cached_occlusion_map, placeholder_occlusion
+from dermis.frame.features.occlusion.moving import (
+    VertexSkyVisibility,
+    make_moving_map,
+    make_vertex_sky_visibility,
+)
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import view_record
 from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
@@ -81,7 +85,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         scattered=scattered,
         technique=own,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
-        sky=_vertex_sky(memo, device, request, layouts[0], shapes)
+        sky=_cached_sky_visibility(memo, device, request, layouts[0], shapes)
         if request.occlusion_follows_shape
         else None,
         hair=strands,
@@ -154,12 +158,12 @@ def _shared_bindings(
     }
 
 
-def _vertex_sky(
+def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
-) -> VertexSky:
-    """Return buffers with the visible fraction of the sky at each vertex, computed for the head at rest."""
+) -> VertexSkyVisibility:
+    """Return resources of sky visibility at the vertices, cached or computed for the head at rest."""
     at_rest = rest_geometry(memo, device, layout.head, shapes.tables, request.topology, None, 0)
-    return memo.get(make_vertex_sky, device, request.topology, untracked=(at_rest,))
+    return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
 
 def _layout_atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
@@ -196,7 +200,7 @@ def _make_layout(
         gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=number)
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
-        occlusion = cached(occlusion_map, device, head, atlas, untracked=inputs, owner=number)
+        occlusion = cached(cached_occlusion_map, device, head, atlas, untracked=inputs, owner=number)
     else:
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None

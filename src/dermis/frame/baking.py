@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.atlas.raster import rasterise, texel_corners
 from dermis.base.errors import DermisError
 from dermis.frame.features.shading import bake as baking_pass
-from dermis.frame.features.shading.bake import CHANNEL_COUNT, CHANNELS
+from dermis.frame.features.shading.bake import BAKED_CHANNEL_COUNT, BAKED_CHANNELS
 from dermis.frame.features.shape import curvature
 from dermis.frame.features.shape.curvature import make_curvature
 from dermis.frame.inputs import FrameInputs
@@ -41,7 +41,7 @@ class BakedMaps:
     """Maps of the skin of a head in its uv layout, row 0 at the top.
 
     covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest one in the mask
-    maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.CHANNELS`
+    maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.BAKED_CHANNELS`
     absent : reason why a map is missing, by the name of the map
     """
 
@@ -85,7 +85,7 @@ def bake_albedo(
     points = baking_pass.point_words(triangle, weights)
     job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_SIDE)
     values = renderer.reopening_device.run(job)
-    return np.ascontiguousarray(values[:, : CHANNELS["albedo"]])
+    return np.ascontiguousarray(values[:, : BAKED_CHANNELS["albedo"]])
 
 
 def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
@@ -125,7 +125,7 @@ def _texel_weights(
 def _available_outputs(
     renderer: Renderer, scene: Scene, settings: Settings, names: tuple[str, ...], absent: dict[str, str]
 ) -> tuple[str, ...]:
-    """Return `names` if the scene can render these outputs, else nothing and the reason in `absent`."""
+    """Return `names` if the scene has these outputs; else return () and add the reason to `absent`."""
     try:
         renderer.draw(scene, settings, timed=False, outputs=names)
     except DermisError:
@@ -142,7 +142,7 @@ def _bake_points(
     points: NDArray[np.uint32],
     side: int,
 ) -> Floats:
-    """Light the atlas by a frame, and return the (n, CHANNEL_COUNT) shading channels at points.
+    """Render a frame to light the atlas, and return (n, BAKED_CHANNEL_COUNT) values at surface points.
 
     outputs : names of outputs whose resources bake.wgsl needs
     points : (n, 4) surface points, packed by `features.shading.bake.point_words`
@@ -152,7 +152,7 @@ def _bake_points(
     inputs = renderer.prepare(scene, settings, "", outputs)
     bindings, output_resources = _bake_bindings(renderer, inputs, scene), inputs.resources.outputs
     pigments = output_resources.light.pigments if output_resources and "melanin" in outputs else (0.0, 0.0)
-    values = np.empty((len(points), CHANNEL_COUNT), np.float32)
+    values = np.empty((len(points), BAKED_CHANNEL_COUNT), np.float32)
     for start in range(0, len(points), _POINTS_PER_PASS):
         part = slice(start, start + _POINTS_PER_PASS)
         options = bindings, points[part], 1.0 / side, pigments
@@ -178,13 +178,13 @@ def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[s
     """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
 
     texel : (n,) indices of the skin texels, row by row
-    values : (n, CHANNEL_COUNT) shading channels of these texels
+    values : (n, BAKED_CHANNEL_COUNT) values at these texels, in the channels of `BAKED_CHANNELS`
     """
     covered = np.zeros(side * side, np.bool_)
     covered[texel] = True
     uncovered, nearest = np.flatnonzero(~covered), _nearest_covered_texels(covered.reshape(side, side))
     maps, first = {}, 0
-    for name, count in CHANNELS.items():
+    for name, count in BAKED_CHANNELS.items():
         channels = values[:, first : first + count]
         first += count
         if name in absent:

@@ -11,8 +11,8 @@ import numpy as np
 
 from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.mixture import sum_layer_count
-from dermis.frame.features.shadows.shadows import SHADOW_BYTES
-from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.features.shadows.shadows import SHADOW_TEXEL_BYTES
+from dermis.frame.features.surface.texels import SURFACE_TEXEL_BYTES
 from dermis.frame.request import FrameRequest
 from dermis.frame.technique import TechniqueTraits
 from dermis.gpu import Device
@@ -84,7 +84,7 @@ def suggest_settings(request: FrameRequest, budget: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory of a frame for each size setting [bytes], without that of the head and its maps."""
+    """Return the memory of a frame by size setting [bytes], without that of the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE_BYTES + _SAMPLE_BYTES * settings.samples + technique.pixel_bytes
@@ -97,7 +97,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
     return {
         "atlas": texel * atlases.side**2,
         "size": float(pixel * width * height),
-        "shadow_size": float(SHADOW_BYTES * request.shadow_layers * settings.shadow_size**2),
+        "shadow_size": float(SHADOW_TEXEL_BYTES * request.shadow_layers * settings.shadow_size**2),
     }
 
 
@@ -140,4 +140,4 @@ def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int)
         return layouts * _GEOMETRY_BYTES
     blurs = technique.texel_bytes(blur_count)
     blended = _TEXEL_BYTES + layouts * _DISTANCE_BYTES if layouts > 1 else 0
-    return blurs + blended + layouts * (_GEOMETRY_BYTES + SURFACE_BYTES + _TEXEL_BYTES)
+    return blurs + blended + layouts * (_GEOMETRY_BYTES + SURFACE_TEXEL_BYTES + _TEXEL_BYTES)

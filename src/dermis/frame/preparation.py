@@ -27,7 +27,7 @@ from dermis.frame.features.shading.view import EyePoses, camera_views, pinhole, 
 from dermis.frame.features.shape.shape import MotionBytes, rest_motion
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
-from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_views
+from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_shadow_views
 from dermis.frame.limits import out_of_memory_error
 from dermis.frame.projection import Views, shadow_map_views
 from dermis.frame.request import FrameRequest
@@ -263,5 +263,5 @@ def _light_resources(
 
     The first two parameters only serve as cache keys.
     """
-    views, part_counts = light_views(scene, outline, size), light_part_counts(scene)
+    views, part_counts = light_shadow_views(scene, outline, size), light_part_counts(scene)
     return light_records(shade_program(device), scene, views), shadow_map_views(views), part_counts

@@ -28,7 +28,7 @@ FRAME_FOLDER = Path(__file__).parent
 FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""
 SPECULAR_FOLDER = Path(str(specular.__file__)).parent
-TILE = 16
+TILE_SIDE = 16
 """Side of the workgroups of short shaders; a GPU starts smaller ones more slowly than they run."""
 WORKGROUP_SIZE = 64
 """Invocations per workgroup of shaders over lists, the constant EACH of each.wgsl."""
@@ -113,7 +113,7 @@ def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Add to pipeline constants those of the device that a shader declares."""
+    """Return `constants`, and those of `device_constants` that the shader declares, by name."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 

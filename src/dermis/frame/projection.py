@@ -70,7 +70,7 @@ class ShadowView(NamedTuple):
 
 
 def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
-    """Return the projections of all shadow maps, sampled at pixel centres; views of None are skipped."""
+    """Return the projections of all shadow maps, sampled at pixel centres; None entries are skipped."""
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 
@@ -161,14 +161,17 @@ def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
 def point_shadow_views(
     lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, size: int
 ) -> list[ShadowView]:
-    """Return a view from each point light that just contains the whole mesh, computed for all at once.
+    """Return for each point light the narrowest view from its position that contains the whole mesh.
 
     lights : name and light, for each light
     centre : centre of the head, the origin of light positions [mm]
     outline : outline of the head's shape
     size : side of the shadow maps [texels]
 
-    Raises DermisError when a light is inside the bounds of the mesh, which a single map cannot cover.
+    All views are computed at once.
+
+    Raises DermisError if a light is inside the bounds of the mesh, because one shadow map cannot cover all
+    directions.
     """
     if not lights:
         return []
@@ -216,7 +219,7 @@ def _largest_tangents(sides: NDArray[np.floating], depth: NDArray[np.floating]) 
 
 
 def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
-    """Return a view in the direction of parallel light that just contains the whole mesh.
+    """Return the narrowest view along the direction of parallel light that contains the whole mesh.
 
     size : side of the shadow map [texels]
     """

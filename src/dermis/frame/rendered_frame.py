@@ -134,7 +134,7 @@ class RenderedFrame(ShortRepr):
 
 def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
     assert frame.outputs is not None
-    planes = frame.outputs.planes_with(name)
+    planes = frame.outputs.planes_of_output(name)
     start, size = planes.byte_range(name)
     raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
     return planes.array(name, np.frombuffer(raw, np.uint8).copy())

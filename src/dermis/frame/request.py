@@ -55,7 +55,7 @@ class FrameRequest:
 
     @property
     def topology(self) -> Head:
-        """Return the head without hair and maps whose mesh all people of a template share."""
+        """Return the head without hair and maps; all people of a template share its mesh."""
         return self.head.topology
 
     @property
@@ -125,7 +125,7 @@ class FrameRequest:
 
     @property
     def has_fine_relief(self) -> bool:
-        """Return whether the skin has relief finer than its maps, whose strength painted gloss maps store."""
+        """Return whether the skin has relief finer than its maps; painted gloss maps store its strength."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 

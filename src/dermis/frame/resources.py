@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from dermis.frame.features import diffusion, hair, outputs, post, shape
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.interreflection.interreflection import Interreflection
-from dermis.frame.features.occlusion.moving import MovingOcclusion, VertexSky
+from dermis.frame.features.occlusion.moving import MovingOcclusion, VertexSkyVisibility
 from dermis.frame.features.shadows.shadows import ShadowMaps
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.surface.painting.paint import ExpressionMaps
@@ -58,7 +58,7 @@ class Resources:
     scattered: Texture
     technique: TechniqueResources | None
     output_layers: TechniqueResources | None
-    sky: VertexSky | None
+    sky: VertexSkyVisibility | None
     hair: hair.Resources | None
     visibility: ViewLayers
     view: UniformRecord

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dermis.atlas.build import MIN_SIZE
+from dermis.atlas.build import MIN_ATLAS_SIZE
 from dermis.scene.settings import Settings
 
 FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
@@ -17,7 +17,7 @@ class SeamMethod:
 
     layouts : names of layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other
         seams
-    edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGES`
+    edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGE_MODES`
     feathered : whether the stretch map is changed near edges so that blurs become narrower there
     coloured : whether empty texels have the colour `Settings.seam_colour` instead of black
     """
@@ -62,4 +62,4 @@ def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_oc
     layouts = method.layouts
     if blur_count:
         return AtlasPlan(layouts, settings.atlas)
-    return AtlasPlan(layouts[:1], settings.atlas) if has_occlusion else AtlasPlan(("mesh",), MIN_SIZE)
+    return AtlasPlan(layouts[:1], settings.atlas) if has_occlusion else AtlasPlan(("mesh",), MIN_ATLAS_SIZE)

@@ -90,7 +90,7 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """Return the irradiance that enters the skin at points, times its colour before scattering (n, 3) [-].
+    """Return irradiance times the skin colour before scattering, (n, 3) at points of the surface [-].
 
     scene : scene without maps and environment, because these need atlas positions; interreflection is ignored
     triangle, barycentric : (n,) triangle indices and (n, 3) barycentric weights of the points

@@ -40,7 +40,7 @@ class ProfileSplit:
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return (k, 3) differences of the blurred weights, for each other profile: minus this one's [-]."""
+        """Return for each other profile its (k, 3) blurring weights minus those of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -93,5 +93,5 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians, if `normalise` scaled to a sum of 1 per channel [-]."""
+    """Return the (k, 3) weights of the Gaussians; `normalise` scales them to a sum of 1 per channel [-]."""
     return profile.weight / profile.albedo if normalise else profile.weight

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.programs import TILE, program
+from dermis.frame.programs import TILE_SIDE, program
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Recorder
@@ -37,7 +37,7 @@ class Dim(AtlasTechnique):
         """Declare the pass that halves the light."""
         shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store=levels.texel)
         bound = {"light": levels.layer(0), "stored": levels.layer(1)}
-        graph.compute("dim", shader, bound, (levels.size, levels.size), TILE)
+        graph.compute("dim", shader, bound, (levels.size, levels.size), TILE_SIDE)
 
 
 TECHNIQUE = Dim()

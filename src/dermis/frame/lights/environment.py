@@ -85,7 +85,7 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 
 
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
-    """Return an upper bound of irradiance: of a surface that faces all lights and the brightest sky [-].
+    """Return an upper bound of the irradiance: that of a surface facing all lights and the brightest sky [-].
 
     scene : scene that has the suns of its environment among its lights
     """

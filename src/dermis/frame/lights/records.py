@@ -31,13 +31,16 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float64]
 _MAX_LIGHTS = 64
 _MAX_SHADOW_FILTER = 6  # largest half width of a shadow filter [shadow texels]
-_SIDE, _PART_SIDE = 4, 2  # an area light is sampled by SIDE x SIDE points, each of several parts by fewer
-_RAYS, _MIN_RAYS, _SUN_RAYS = 64, 12, 32  # shadow rays to an area light, to a part at least, and to a sun
+_SAMPLES_PER_SIDE = 4  # an area light is sampled by 4 x 4 points
+_PART_SAMPLES_PER_SIDE = 2  # each of several parts of a light is sampled by 2 x 2 points
+_SHADOW_RAYS = 64  # shadow rays to an area light that is not divided
+_MIN_SHADOW_RAYS = 12  # least number of shadow rays to a part of a light
+_SUN_SHADOW_RAYS = 32  # shadow rays to a sun
 
 
 def light_shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in lights.wgsl and soft_shadows.wgsl, by name."""
-    return {"max_lights": _MAX_LIGHTS, "max_rays": _RAYS, "min_rays": _MIN_RAYS}
+    return {"max_lights": _MAX_LIGHTS, "max_rays": _SHADOW_RAYS, "min_rays": _MIN_SHADOW_RAYS}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
@@ -72,7 +75,7 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Add the pipeline constant that enables oblique incidence, if the skin is a half-space.
+    """Return `constants`; if they set HALF_SPACE, add the pipeline constant that enables oblique incidence.
 
     Only passes that know the shape of the surface around a point may use the result.
     """
@@ -84,7 +87,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
     return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
 
 
-def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
+def light_shadow_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
     """Return the view of the shadow map of each part of each light, None for lights without shadows.
 
     outline : outline of the head's shape
@@ -118,7 +121,7 @@ def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | 
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
-    views : view of the shadow map of each part of each light, from `light_views`
+    views : view of the shadow map of each part of each light, from `light_shadow_views`
     """
     record = program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
@@ -140,7 +143,7 @@ def light_sample_points() -> Floats:
 
     Columns are x and y on the unit disc, then x and y on the square.
     """
-    even = (0.5 + np.arange(_RAYS)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
+    even = (0.5 + np.arange(_SHADOW_RAYS)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
     disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     return np.hstack([disc, 2.0 * even - 1.0])
@@ -177,8 +180,8 @@ def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblin
         # a tent of half width h fades over 2 h texels
         "softness": 0.5 * light.softness_mm,
         "half_width": min(max(half_width, 1), _MAX_SHADOW_FILTER),
-        "rays": _SUN_RAYS if parallel else max(_MIN_RAYS, _RAYS // siblings),
-        "side": 1 if kind.punctual else _PART_SIDE if siblings > 1 else _SIDE,
+        "rays": _SUN_SHADOW_RAYS if parallel else max(_MIN_SHADOW_RAYS, _SHADOW_RAYS // siblings),
+        "side": 1 if kind.punctual else _PART_SAMPLES_PER_SIDE if siblings > 1 else _SAMPLES_PER_SIDE,
         **shadow,
         **kind.members(light, centre, distance),
     }

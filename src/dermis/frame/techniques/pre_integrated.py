@@ -32,8 +32,8 @@ _MAX_PENUMBRA_MM = 8.0
 class PreIntegratedTables(TechniqueResources):
     """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture with the rows of `sphere_table`, then one row of `shadow_edge` for each width of shadow
-        filter
+    table : texture with the rows of `sphere_table`, then one row of `shadow_edge_row` for each width of
+        shadow filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
@@ -82,7 +82,7 @@ TECHNIQUE = PreIntegratedSkin()
 def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
     """Compute the tables of scattered light for a profile, and upload them."""
     penumbra = penumbra_width_mm(profile)
-    edges = [shadow_edge(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGE_ROWS)]
+    edges = [shadow_edge_row(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGE_ROWS)]
     rows = np.concatenate([sphere_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
     return PreIntegratedTables(
@@ -127,7 +127,7 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     return np.asarray(scale * (half * w * np.cos(lit) * np.sin(lit) * bell).sum(axis=-1))
 
 
-def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
+def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
     """Return light after scattering across a straight shadow edge, (m, c) from dark to lit [-].
 
     radius_mm : distance from the edge of the first and of the last entry [mm]

@@ -85,7 +85,7 @@ class ScreenSpace(Technique):
         return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture layers for the light below the skin and the fraction that leaves it."""
+        """Return texture layers: light below the skin, and the fraction of it that leaves to the camera."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
@@ -181,7 +181,7 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
 
 
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return the kernel integrated from 0 to n distances, (1, n, 4), and the largest distance [mm].
+    """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the last distance [mm].
 
     Distances are evenly spaced in their square root.
     """
@@ -192,7 +192,7 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
 
 def _kernel_reach_mm(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which, on one side, no channel has over `_MAX_TAIL` of its light [mm]."""
+    """Return the distance beyond which each channel has at most `_MAX_TAIL` of its light per side [mm]."""
     distance = np.geomspace(_MIN_REACH_MM, _MAX_REACH_MM, 4096)
     beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

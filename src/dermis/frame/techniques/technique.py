@@ -20,7 +20,7 @@ from dermis.frame.features.diffusion.pyramid import (
     make_levels,
 )
 from dermis.frame.features.irradiance import irradiance
-from dermis.frame.features.irradiance.irradiance import TEXEL_AREA
+from dermis.frame.features.irradiance.irradiance import TEXEL_FILTER_SIGMA
 from dermis.frame.features.surface import texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency.resources import Translucency
@@ -63,7 +63,7 @@ class Technique(TechniqueTraits):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Add Gaussians of weight 0 to the split that make blurs cheaper, and return their levels; here none.
+        """Insert Gaussians of weight 0 that make blurs cheaper, here none; return the split and their levels.
 
         edge : filter mode at the edges of charts
         """
@@ -173,13 +173,13 @@ class AtlasTechnique(Technique):
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum the light of each layout, and blend two layouts."""
+        """Declare the passes that compute, blur and sum the light of each layout, and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
             return resources.scattered
         for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
-            into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_AREA
+            into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_FILTER_SIGMA
             graph.repeat(draw_stretch, layout.head, layout.atlas)
             if layout.gutter_update:
                 graph.repeat(

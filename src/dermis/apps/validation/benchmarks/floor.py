@@ -12,7 +12,7 @@ import numpy as np
 
 from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.features.surface.texels import SURFACE_BYTES
+from dermis.frame.features.surface.texels import SURFACE_TEXEL_BYTES
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
@@ -92,7 +92,7 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
     entered = texels * FORMAT_BYTES[levels.texel]
     blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halving for halving in blur.halvings[1:]]
     stages: dict[str, float] = {
-        "irradiance": texels * (SURFACE_BYTES + shadow_bytes) + entered,
+        "irradiance": texels * (SURFACE_TEXEL_BYTES + shadow_bytes) + entered,
         "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _blur_surface_bytes(inputs, texels),
         "combine": sum(blurred) + texels * texel_bytes(inputs.resources.scattered),
     }
@@ -132,7 +132,7 @@ def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -
     pairs, halving = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     lists = thin.weights.size + pairs.receiver_ranges.size
-    lists += (_INDEX_BYTES + SURFACE_BYTES * thin.uses_tables) * sources
+    lists += (_INDEX_BYTES + SURFACE_TEXEL_BYTES * thin.uses_tables) * sources
     level = (levels.size >> halving) ** 2
     source_texels = min(_BILINEAR_TEXELS * sources, level) * FORMAT_BYTES[levels.texel]
     return float(lists + source_texels + receivers * texel_bytes(thin.pairs.transmitted))

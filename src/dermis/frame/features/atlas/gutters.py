@@ -27,8 +27,8 @@ class GutterTracing:
 
     starts : buffer of the start of each path, for gutter_trace.wgsl
     sides : buffer of the triangle across each edge of each triangle, for gutter_trace.wgsl
-    halvings : buffers of each coarser atlas with gutters: the finer gutter texels that each gutter texel
-        averages, by their names in gutter_halve.wgsl
+    halvings : for each coarser atlas, buffers by their names in gutter_halve.wgsl: the finer gutter texels
+        that each of its gutter texels averages
     """
 
     starts: Buffer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.textures import GUTTER_ENTRY_BYTES, AtlasTextures
 from dermis.frame.features.shape.mesh import HeadGeometry
-from dermis.frame.programs import TILE, program, workgroup_grid
+from dermis.frame.programs import TILE_SIDE, program, workgroup_grid
 from dermis.frame.seams import FEATHER_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 
@@ -24,26 +24,26 @@ def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> N
         listed = bound | {"stretch_sources": atlas.stretch_sources}
         groups = workgroup_grid(atlas.stretch_sources.size // _STRETCH_SOURCE_BYTES)
         graph.dispatch("stretch", beyond, listed, groups, in_place="stretch_map")
-    draw_coarser(graph, atlas)
+    draw_coarser_stretch_maps(graph, atlas)
 
 
-def draw_coarser(graph: Recorder, atlas: AtlasTextures) -> None:
-    """Declare the passes that average the stretch map of the finest resolution for all coarser ones."""
+def draw_coarser_stretch_maps(graph: Recorder, atlas: AtlasTextures) -> None:
+    """Declare the passes that compute the stretch map of each coarser resolution from the next finer one."""
     finer, halve = atlas.resources, program(graph.device, "atlas/stretch_halve.wgsl")
     for level in atlas.coarser:
         maps = {"finer": finer["stretch_map"], "reach_map": finer["reach_map"]}
         coarser = level.resources["stretch_map"]
-        graph.compute("stretch", halve, maps | {"stretch_map": coarser}, coarser.size[:2], TILE)
+        graph.compute("stretch", halve, maps | {"stretch_map": coarser}, coarser.size[:2], TILE_SIDE)
         finer = level.resources
 
 
 def _placeholder_edge_map(device: Device) -> Texture:
-    """Return a 1 x 1 placeholder for `edge_map`, the texel distances to chart edges, where it is not read."""
+    """Return a 1 x 1 texture to bind as `edge_map` for shaders that do not read the distances to edges."""
     return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))
 
 
 def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
-    """Declare the passes that copy light to the gutters of a texture from its sources across seams.
+    """Declare the passes that fill the gutters of a texture with its light from across the seams.
 
     A buffer holds the light in between, because a pass cannot read and write the same texture.
 
@@ -59,8 +59,8 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     size = (_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}
-    graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE)
-    graph.compute(stage, place, {**lists, "stored": light}, size, TILE, in_place="stored")
+    graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE_SIDE)
+    graph.compute(stage, place, {**lists, "stored": light}, size, TILE_SIDE, in_place="stored")
 
 
 def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, into: Texture) -> None:

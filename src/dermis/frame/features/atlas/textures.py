@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
-from dermis.atlas.stitched.geodesics import INNER_WEIGHTS, START_SHIFT
+from dermis.atlas.stitched.geodesics import INNER_POINT_WEIGHTS, START_SHIFT
 from dermis.base.disk import cached_arrays
 from dermis.frame.seams import FEATHER_MM, SEAM_METHODS, SeamMethod
 from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, mark_scratch
@@ -29,7 +29,7 @@ SAME_SOURCE_TEXELS = 4.0
 
 def atlas_constants() -> dict[str, int | float]:
     """Return the values that `//#fill` lines insert in shaders of the atlas, by name."""
-    _, inner_b, inner_c = INNER_WEIGHTS
+    _, inner_b, inner_c = INNER_POINT_WEIGHTS
     tracing = {
         "inward": START_SHIFT,
         "inner_b": inner_b,
@@ -87,7 +87,7 @@ def upload_atlas(
     resources = {"atlas": texture_from_array(device, texels, "rg32uint", _TEXTURE_NAME)}
     if seams.feathered or len(seams.layouts) > 1:
         resources["edge_map"] = texture_from_array(device, edge_distances(atlas), "r32float", _TEXTURE_NAME)
-    even = _mean_density(atlas.stretch[own]) if stretch == "none" else 0.0
+    even = _rms_density(atlas.stretch[own]) if stretch == "none" else 0.0
     feather = FEATHER_MM if seams.feathered else 0.0
     mip = AtlasMip(atlas.coverage, own, atlas.edge_distance, atlas.gutter, atlas.source)
     return _upload_mip(
@@ -102,15 +102,15 @@ def upload_atlas(
     )
 
 
-def _mean_density(stretch: NDArray[np.float16]) -> float:
-    """Return the root mean square of (n, 2) texel densities along u and v [texels/mm]."""
+def _rms_density(stretch: NDArray[np.float16]) -> float:
+    """Return the root mean square of all (n, 2) texel densities along u and v [texels/mm]."""
     return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
 
 
 def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    own : mask of the texels to count, those of charts without gutters
+    own : mask of the texels to count: those inside charts, gutters excluded
 
     Non-negative half floats are ordered like their 16-bit patterns, so a histogram of these is faster than
     sorting.

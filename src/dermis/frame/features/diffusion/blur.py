@@ -14,12 +14,12 @@ from dermis.frame.features.diffusion.kernels import (
     MAX_SUMMED_DEVIATION,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    SUMMED_TRUNCATION,
-    TRUNCATION,
+    SUMMED_TRUNCATION_SIGMAS,
+    TRUNCATION_SIGMAS,
     kernel_table,
 )
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.programs import TILE, program
+from dermis.frame.programs import TILE_SIDE, program
 from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
 from dermis.gpu.textures import texture_from_array
 
@@ -41,7 +41,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
             source = _halve(graph, levels, source, k - 1, halvings)
         # The level after an intermediate one gains most of its width in one blur.
         wide = k > 1 and k - 1 in blur.intermediate_levels and k not in blur.intermediate_levels
-        truncation = TRUNCATION if wide or (full_first and k == 1) else SUMMED_TRUNCATION
+        truncation = TRUNCATION_SIGMAS if wide or (full_first and k == 1) else SUMMED_TRUNCATION_SIGMAS
         clear = blur.scale * np.asarray(blur.clear)
         for axis, blurred in enumerate((levels.scratch_view(halvings), levels.layer(k, halvings))):
             shader = _axis_program(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
@@ -68,7 +68,7 @@ def _halve(
 
 def _dispatch(graph: Recorder, shader: ComputeProgram, bindings: MutableBindings, side: int) -> None:
     linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
-    graph.compute("diffuse", shader, bindings | {"linear": linear}, (side, side), TILE)
+    graph.compute("diffuse", shader, bindings | {"linear": linear}, (side, side), TILE_SIDE)
 
 
 def _axis_program(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> ComputeProgram:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.programs import FLOAT_FORMAT, TILE, program
+from dermis.frame.programs import FLOAT_FORMAT, TILE_SIDE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureOrView, make_texture
 from dermis.optics.gaussians import MAX_GAUSSIANS
 
@@ -60,7 +60,7 @@ def draw(
             "linear": device.sampler(mag_filter="linear", min_filter="linear"),
             "stored": levels.scratch_view(mip) if mip else target,
         }
-        graph.compute("combine", shader, bindings, (levels.size >> mip,) * 2, TILE)
+        graph.compute("combine", shader, bindings, (levels.size >> mip,) * 2, TILE_SIDE)
 
 
 def placeholder_light(device: Device) -> Texture:

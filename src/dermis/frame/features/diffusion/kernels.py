@@ -16,17 +16,17 @@ ROWS_PER_UNIT = 64
 """Number of rows of the kernel table per unit of variance."""
 MAX_TABLE_VARIANCE = 9
 """Variance of the last row of the kernel table [step^2]."""
-TRUNCATION = 3.3
+TRUNCATION_SIGMAS = 3.3
 """Half-width of a kernel in standard deviations."""
-SUMMED_TRUNCATION = 2.4
+SUMMED_TRUNCATION_SIGMAS = 2.4
 """Half-width of a kernel whose source is already blurred, in standard deviations.
 
 The kernel still has the exact variance, and the next blur smooths its truncated shape: the error is at
 most 0.014 % of an image.
 """
 MAX_SUMMED_DEVIATION = 1.5
-"""Largest standard deviation at which `SUMMED_TRUNCATION` suits unblurred light too [texel]."""
-_MAX_TAPS = math.ceil(TRUNCATION * math.sqrt(MAX_TABLE_VARIANCE))
+"""Largest standard deviation at which `SUMMED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
+_MAX_TAPS = math.ceil(TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
 _BISECTIONS = 60
 _WIDE_TRUNCATION, _MAX_STEP = 4.0, 1.6  # as in diffuse.wgsl
 _READS_PER_PASS = 5.0  # texel reads of a pass besides its taps: stretch map, gutters, the result
@@ -37,7 +37,7 @@ _MIN_DEVIATION = 1.0  # least standard deviation of an intermediate level, in it
 _MIN_VARIANCE_RATIO = 1.5  # least ratio of the variances of an intermediate level and any other
 
 
-def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
+def tap_count(variance: float, truncation: float = TRUNCATION_SIGMAS) -> int:
     """Return the number of taps of a Gaussian kernel on each side of its centre.
 
     variance : variance of the kernel [step^2], where a step is the distance between taps
@@ -48,7 +48,7 @@ def tap_count(variance: float, truncation: float = TRUNCATION) -> int:
 
 @cache
 def kernel_table() -> NDArray[np.float32]:
-    """Return the ratio q of kernels w(n) = q^(n^2) with exact variance, (rows, columns) [-].
+    """Return the (rows, columns) table of q with which kernels w(n) = q^(n^2) have exact variance [-].
 
     w(n) is the weight of the tap n steps from the centre, so q = w(1) / w(0). Rows are variances in steps of
     1/64 step^2, columns are numbers of taps on each side of the centre.
@@ -87,8 +87,8 @@ def add_intermediate_levels(
     max_halvings : how often the resolution may be halved
 
     An intermediate level is just wide enough for the next level to have half the resolution, by the rule of
-    `choose_halvings`, and its standard deviation is at least one of its texels. Index 0 is the unblurred
-    level.
+    `choose_halvings`, and its standard deviation is at least one texel at its own resolution. Index 0 is the
+    unblurred level.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
@@ -127,6 +127,8 @@ def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: in
         per_mm2 = (texels_per_mm / 2.0**halved) ** 2
         step = max(1.0, math.floor(math.sqrt(min(_MAX_STEP**2 * before, after - before) * per_mm2)))
         scaled = (after - before) * per_mm2 / step**2
-        reach = tap_count(scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else SUMMED_TRUNCATION)
+        reach = tap_count(
+            scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else SUMMED_TRUNCATION_SIGMAS
+        )
         cost += 2.0 * (2.0 * reach + 1.0 + _READS_PER_PASS) / 4.0**halved + _READS_PER_LEVEL
     return cost

@@ -15,7 +15,7 @@ from dermis.formats.maps import mixture_map
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.diffusion.pyramid import PyramidLevels
-from dermis.frame.programs import FLOAT_FORMAT, HALF_FORMAT, TILE, program
+from dermis.frame.programs import FLOAT_FORMAT, HALF_FORMAT, TILE_SIDE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
 from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
@@ -133,7 +133,7 @@ def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, inde
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     light = {"source": levels.layer(0), "stored": entering.layer(0)}
     bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[index]}
-    graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE)
+    graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE_SIDE)
 
 
 def draw(graph: Recorder, mixture: Mixture, index: int, target: Texture) -> None:
@@ -145,4 +145,4 @@ def draw(graph: Recorder, mixture: Mixture, index: int, target: Texture) -> None
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
     weights = mixture.atlas_weights[index]
     bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": target}
-    graph.compute("profiles", shader, bindings, target.size[:2], TILE)
+    graph.compute("profiles", shader, bindings, target.size[:2], TILE_SIDE)

@@ -37,7 +37,8 @@ class SkinProfiles:
 
         Profile files are read again when the skin changes, not for each frame of the same skin.
 
-        Raises DermisError for pigments or layers whose profile was not computed from pigments or layers.
+        Raises DermisError if the skin has pigments or layers, but its profile is not one that can be computed
+        from them.
         """
         if self._current is None or self._current[0] is not skin:
             self._current = skin, self._load_or_fit(skin)

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
 MIN_SMOOTHNESS = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
-MIN_WEIGHT = 1e-12
+MIN_WEIGHT_SUM = 1e-12
 """Least divisor of a sum of weights, for channels without any weight."""
 
 

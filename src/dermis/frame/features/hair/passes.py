@@ -30,7 +30,7 @@ from dermis.gpu import (
 ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 """Resources of the lighting, uniform record of the shading pass, and pipeline constants of the lights."""
 
-_MAX_ROWS, _MAX_ITERATIONS = 8, 60_000
+_MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
 _CROWDING_FACTOR = 6.0  # segments in a crowded tile over the mean of all tiles
 _CLEARING_GROUPS = 256
@@ -146,7 +146,7 @@ def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
 def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The estimate is all fine segments, and several times the mean number of coarse ones per tile.
+    The tile is assumed to hold all fine segments, and several times the mean number of coarse ones per tile.
 
     segments : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
@@ -167,7 +167,7 @@ def rows_per_invocation(device: Device, segments: int) -> int:
     """
     if device.adapter.kind != "CPU":
         return 1
-    rows = max(1, min(_MAX_ROWS, _MAX_ITERATIONS // max(1, segments)))
+    rows = max(1, min(_MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS // max(1, segments)))
     return 1 << rows.bit_length() - 1
 
 

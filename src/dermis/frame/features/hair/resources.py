@@ -20,17 +20,16 @@ from dermis.specular.hair import hair_constants
 TILE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
 _GPU_CHAINS = 64  # chains of a tile on GPUs: one for each invocation of the tile's workgroup
-OPACITY_WIDTH = 256
+DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
-OPACITY_LAYERS = 6
-HEADER_WORDS = 8
+DEEP_OPACITY_LAYERS = 6
+"""Number of depth intervals of a deep opacity map, each with the cover of the hair within it."""
+DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
 _LINKS_PER_KNOT = 4
 _MAX_LINKS = 1 << 22
-_FINE_STEP, _KNOT_STEP = (
-    1 << 12,
-    1 << 19,
-)  # steps to which capacities are rounded up, so that most heads share them
+# Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
+_FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
@@ -102,8 +101,9 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 def strand_capacity(head: Head) -> StrandCapacity:
     """Return the capacity for the strands of a head, rounded up so that most heads can share buffers."""
     fine, coarse = map(strand_counts, (head.strands, head.hair))
-    knots, step = fine.all_knots() + coarse.all_knots(), _KNOT_STEP if coarse.hairs else _FINE_STEP
-    return StrandCapacity(_round_up(fine.hairs, _FINE_STEP), _round_up(knots, step))
+    knots = fine.all_knots() + coarse.all_knots()
+    step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
+    return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
 
 
 def _round_up(count: int, step: int) -> int:
@@ -141,13 +141,13 @@ def chains_per_tile(device: Device, tiles: int) -> int:
 
 def make_deep_opacity(device: Device, lights: int) -> Buffer:
     """Allocate a buffer for the deep opacity maps of strands, one map for each of `lights` lights."""
-    texels = (1 + OPACITY_LAYERS) * OPACITY_WIDTH**2 // 2
-    return _make_buffer(device, (HEADER_WORDS + texels) * max(1, lights))
+    texels = (1 + DEEP_OPACITY_LAYERS) * DEEP_OPACITY_WIDTH**2 // 2
+    return _make_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, lights))
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
     """Return a placeholder for the deep opacity maps of heads without hair."""
-    return device.cached("no strand shadows", lambda: _make_buffer(device, HEADER_WORDS))
+    return device.cached("no strand shadows", lambda: _make_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
 def _make_buffer(device: Device, words: int) -> Buffer:
@@ -166,7 +166,7 @@ class StrandTables:
     shadow_casters : number of coarse strands that cast the shadows of all coarse strands
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : mean optical coverage of the coarse roots by the hair around them [-]
+    mean_cover : mean over the coarse roots of the projected hair area around a root, per area of skin [-]
     """
 
     strands: Buffer
@@ -200,8 +200,8 @@ class Resources:
 
 def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the hair shaders, by name."""
-    opacity = {"strand_window": OPACITY_WIDTH, "strand_layers": OPACITY_LAYERS}
-    words = {"strand_window_words": HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
+    opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
+    words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
     return {"strand_tile": TILE_PIXELS, **opacity, **words, **hair_constants()}
 
 
@@ -211,14 +211,14 @@ def has_strands(head: Head, settings: Settings) -> bool:
 
 
 def strand_constants(head: Head, settings: Settings) -> Constants:
-    """Return the pipeline constant by which the lighting reads shadows of strands, if strands are drawn."""
+    """Return the pipeline constant that makes lighting read strand shadows; () if no strands are drawn."""
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
 def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
     """Return the number of coarse strands to draw.
 
-    Fewer and wider strands cover the same area as all strands where these are thinner than a pixel.
+    Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area.
 
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """

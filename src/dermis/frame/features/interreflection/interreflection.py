@@ -63,7 +63,7 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Interreflection of a head: its buffers, and the (3,) albedo of the profile, the sum of its weights."""
+    """Buffers of interreflection, and the (3,) albedo of the profile, which is the sum of its weights [-]."""
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]

@@ -11,9 +11,9 @@ from dermis.frame.programs import FLOAT_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
-"""Number of narrow Gaussians whose light is corrected within texels when the picture is shaded."""
-TEXEL_AREA = 0.5
-"""Standard deviation of the filter of light on the atlas [texels], which avoids aliasing."""
+"""Number of the narrowest Gaussians whose light is corrected within texels when the picture is shaded."""
+TEXEL_FILTER_SIGMA = 0.5
+"""Standard deviation of the filter that keeps light on the atlas from aliasing [texels]."""
 
 
 def fine_light_constants() -> dict[str, float]:
@@ -32,7 +32,7 @@ def fine_light_members(
     count = min(len(variance_mm2), FINE_LEVELS)
     level = np.zeros((FINE_LEVELS, 4), np.float32)
     level[:count, :3], level[:count, 3] = weight[:count], variance_mm2[:count]
-    return {"count": count, "texel_variance": TEXEL_AREA**2, "relit_mm2": relit_mm2, "level": level}
+    return {"count": count, "texel_variance": TEXEL_FILTER_SIGMA**2, "relit_mm2": relit_mm2, "level": level}
 
 
 def draw(
@@ -43,7 +43,7 @@ def draw(
     side: int,
     texel: str = FLOAT_FORMAT,
     scale: float = 1.0,
-    area: float = 0.0,
+    filter_sigma: float = 0.0,
 ) -> None:
     """Declare the pass that stores the irradiance at each texel, times the skin colour before scattering.
 
@@ -53,12 +53,12 @@ def draw(
     side : side of the atlas [texels]
     texel : format of the texture
     scale : factor from irradiance to the texels of `into`
-    area : standard deviation of the filter of light finer than texels [texels]; 0 samples texel centres, for
-        texels whose neighbours in the texture are no neighbours on the surface
+    filter_sigma : standard deviation of the filter of light finer than texels [texels]; 0 samples texel
+        centres, for texels whose neighbours in the texture are no neighbours on the surface
     """
-    if area:  # neighbouring texels are neighbours on the surface
+    if filter_sigma:  # neighbouring texels are neighbours on the surface
         constants = oblique_constants(constants)
     shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel)
-    entering = shader.record("Entering", scale=scale, area=area)
+    entering = shader.record("Entering", scale=scale, area=filter_sigma)
     bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": into}
     graph.compute("irradiance", shader, bound, (side, side))

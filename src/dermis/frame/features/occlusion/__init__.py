@@ -1,5 +1,5 @@
 """Ambient occlusion: visible fraction of the sky, baked for a head at rest and updated when it moves."""
 
-from dermis.frame.features.occlusion.moving import VertexSky, draw
+from dermis.frame.features.occlusion.moving import VertexSkyVisibility, draw
 
-__all__ = ["VertexSky", "draw"]
+__all__ = ["VertexSkyVisibility", "draw"]

@@ -18,10 +18,11 @@ from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 
-DIRECTIONS = 128
-MAP_SIZE = 512
+DIRECTION_COUNT = 128
+"""Number of directions from which a depth map of the head is drawn."""
+DEPTH_MAP_SIDE = 512
 """Side of a depth map [texels]."""
-CACHE_VERSION = f"1 {DIRECTIONS} {MAP_SIZE}"
+CACHE_VERSION = f"1 {DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
 """Version of baked maps on disk; change it when baking gives other results."""
 _MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
 _MAX_SIDE = 1024  # largest side of an occlusion map [texels]; its texels are smaller than a millimetre
@@ -34,8 +35,8 @@ def bake_occlusion(
     bindings: Bindings,
     texels: Texture,
     side: int,
-    directions: int = DIRECTIONS,
-    map_size: int = MAP_SIZE,
+    directions: int = DIRECTION_COUNT,
+    map_size: int = DEPTH_MAP_SIDE,
 ) -> NDArray[np.float32]:
     """Return the cosine-weighted visible fraction of the sky (rows, side), NaN where there is no surface [-].
 
@@ -81,7 +82,7 @@ def _light_record(shader: ComputeProgram, views: list[ShadowView]) -> UniformRec
 
 
 def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Return a baked occlusion map in which each empty texel has the value of the nearest other one.
+    """Return a baked occlusion map whose empty texels are filled from the nearest texel with a value.
 
     The last row of the atlas is repeated, as a border for filters between texels and vertices.
 
@@ -98,7 +99,9 @@ def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
     return np.nan_to_num(np.vstack([texels, texels[-1:], baked[side:]]), nan=1.0)
 
 
-def occlusion_map(device: Device, head: Head, atlas: Atlas, bindings: Bindings, texels: Texture) -> Texture:
+def cached_occlusion_map(
+    device: Device, head: Head, atlas: Atlas, bindings: Bindings, texels: Texture
+) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
     bindings : resources of the lighting without those of lights

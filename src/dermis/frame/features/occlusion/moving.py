@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.shape.mesh import HeadGeometry, upload_triangles
 from dermis.frame.features.visibility.layers import ViewLayers, draw_layers, make_layers
-from dermis.frame.programs import TILE, program, workgroup_grid
+from dermis.frame.programs import TILE_SIDE, program, workgroup_grid
 from dermis.frame.projection import PIXEL_CENTRE, Views, view_axes_array
 from dermis.gpu import Bindings, Buffer, CommandList, Device, Recorder, Texture, UniformRecord, make_texture
 from dermis.mesh.geometry import fibonacci_sphere
@@ -24,10 +24,11 @@ from dermis.mesh.rig import Motion
 from dermis.mesh.subdivide import coarse_triangles
 
 Floats = NDArray[np.float64]
-VIEW_COUNT = 64
+SKY_VIEW_COUNT = 64
+"""Number of directions from which a depth map of the moving head is drawn."""
 DEPTH_MAP_SIDE = 256
 """Side of a depth map [texels]."""
-_MARGIN_MM = 1.0
+_VIEW_MARGIN_MM = 1.0  # free space around the head in a view
 _BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
 _ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e
 _MAX_ANCHORS = 512
@@ -73,10 +74,10 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     axes = _view_axes() @ rotation.T
     local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
-    half, middle = 0.5 * (high - low) + _MARGIN_MM, 0.5 * (high + low)
+    half, middle = 0.5 * (high - low) + _VIEW_MARGIN_MM, 0.5 * (high + low)
     half[:, 2] += outline.margin_mm
     half[:, :2] *= DEPTH_MAP_SIDE / (DEPTH_MAP_SIDE - 2.0 * _BORDER_TEXELS)
-    clips = np.zeros((VIEW_COUNT, 4, 4))
+    clips = np.zeros((SKY_VIEW_COUNT, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
     clips[:, 2] *= -0.5  # from 1 near to 0 far
     clips[:, 2, 3] += 0.5
@@ -92,7 +93,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 def _view_axes() -> Floats:
     """Return the axes right, up and forward of all views of a head at rest, (k, 3, 3) unit vectors."""
     up = np.array([0.0, 1.0, 0.0])
-    return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(VIEW_COUNT)])
+    return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
 
 def make_anchors(head: Head) -> RotationAnchors:
@@ -132,8 +133,8 @@ class MovingOcclusion:
 
 
 @dataclass(frozen=True, eq=False)
-class VertexSky:
-    """Visible fraction of the sky at the vertices of a head, and the depth maps from which it is computed.
+class VertexSkyVisibility:
+    """Visible fraction of the sky at the vertices of a head, and depth maps from which it is computed.
 
     layers : depth maps from directions all around
     occluders : simplified triangles of the head that are drawn in the depth maps
@@ -147,15 +148,19 @@ class VertexSky:
     vertices: int
 
 
-def make_vertex_sky(device: Device, head: Head, rest_geometry: HeadGeometry) -> VertexSky:
-    """Return buffers with the visible fraction of the sky at the vertices, computed for the head at rest.
+def make_vertex_sky_visibility(
+    device: Device, head: Head, rest_geometry: HeadGeometry
+) -> VertexSkyVisibility:
+    """Create the resources of `VertexSkyVisibility`, and compute the visible fractions for the head at rest.
 
     rest_geometry : the triangles of the head at rest
     """
     count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
-    layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), VIEW_COUNT, triangles=False)
+    layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), SKY_VIEW_COUNT, triangles=False)
     occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_LIMITS))
-    sky = VertexSky(layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
+    sky = VertexSkyVisibility(
+        layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count
+    )
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
     _draw_vertices(commands, sky, views, sky_record(device, views, count), rest_geometry, resting=True)
     commands.submit()
@@ -174,7 +179,7 @@ def make_moving_map(device: Device, rest_map: Texture) -> tuple[Texture, MovingO
 
 def draw(
     graph: Recorder,
-    sky: VertexSky,
+    sky: VertexSkyVisibility,
     views: SkyViews,
     record: UniformRecord,
     maps: Sequence[tuple[LitAtlas, MovingOcclusion | None]],
@@ -190,7 +195,9 @@ def draw(
             _draw_map(graph, sky, layout, occlusion)
 
 
-def _draw_map(graph: Recorder, sky: VertexSky, layout: LitAtlas, occlusion: MovingOcclusion) -> None:
+def _draw_map(
+    graph: Recorder, sky: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
+) -> None:
     """Declare the passes that update the occlusion map of a layout from its vertices.
 
     The pass that finds the vertices around each texel runs only once, as its inputs are constant.
@@ -205,7 +212,7 @@ def _draw_map(graph: Recorder, sky: VertexSky, layout: LitAtlas, occlusion: Movi
     graph.compute("occlusion", find_corners, bindings, occlusion.corners.size[:2])
     maps: Bindings = {"rest_map": occlusion.rest_map, "visibility": sky.visibility, "moving_map": moving_map}
     fill = program(graph.device, "occlusion/moving_occlusion.wgsl")
-    graph.compute("occlusion", fill, {**bindings, **maps}, moving_map.size[:2], TILE)
+    graph.compute("occlusion", fill, {**bindings, **maps}, moving_map.size[:2], TILE_SIDE)
 
 
 def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
@@ -223,7 +230,7 @@ def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
 
 def _draw_vertices(
     graph: Recorder,
-    sky: VertexSky,
+    sky: VertexSkyVisibility,
     views: SkyViews,
     record: UniformRecord,
     head: HeadGeometry,

@@ -15,7 +15,8 @@ from dermis.human.labels.classes import class_number, label_classes
 from dermis.human.labels.fields import MeshLabels, hair_classes, mesh_labels
 from dermis.mesh.head import Head
 
-STAGE = "label"
+LABEL_STAGE = "label"
+"""Name of the stage that writes labels, with which the names of label outputs begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class LabelBuffers:
 def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
     """Return the buffers for the requested label outputs, None if none are requested."""
     cached = memo.get
-    if not any(name.startswith(STAGE) for name in request.outputs):
+    if not any(name.startswith(LABEL_STAGE) for name in request.outputs):
         return None
     head, settings = request.head.bare, request.settings
     labels = cached(mesh_labels, head)

@@ -17,7 +17,7 @@ from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
-TOLERANCE_MM = 2.0
+LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible."""
 _LANDMARK_DTYPE = np.dtype(
     [("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)]
@@ -50,7 +50,7 @@ class LandmarkBuffers:
 
 
 def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of landmark sets and paths of landmark files without duplicates.
+    """Check names of landmark sets and paths of landmark files, and return them without duplicates.
 
     Raises DermisError for a name that is neither a set nor a file.
     """
@@ -79,7 +79,7 @@ def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) ->
 
 def draw_landmarks(graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs) -> None:
     """Declare the pass that computes the positions and the visibility of the landmarks."""
-    shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", TOLERANCE_MM),))
+    shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", LANDMARK_TOLERANCE_MM),))
     bindings = inputs.bindings(shader) | {"landmarks": buffers.table}
     bindings |= {"points": inputs.shape.surface["points"], "results": buffers.results}
     graph.dispatch("outputs", shader, bindings, workgroup_grid(buffers.count))

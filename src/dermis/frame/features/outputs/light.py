@@ -192,7 +192,7 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
 
 
 def _pigment_parameters(skin: Skin) -> SkinParameters | None:
-    """Return the pigments of a profile, None if it is not made of pigments."""
+    """Return the pigments from which the profile of a skin is computed, None for other profiles."""
     try:
         return skin_tissue(skin).parameters
     except DermisError:  # profiles that are no tissue, such as the default

@@ -20,9 +20,9 @@ from dermis.scene.settings import Settings
 
 PictureArray = NDArray[Any]  # callers choose the dtype
 """(h, w, 3) or (h, w, 4) array of sRGB bytes or linear floats."""
-_ROW = 1024  # invocations of a row, as in the shaders
+_INVOCATIONS_PER_ROW = 1024  # as in the shaders
 _WORD_BYTES = 4  # bytes
-_PIXELS, _WORDS = 4, 3  # that an invocation of pack.wgsl reads and writes
+_PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack.wgsl
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Readback:
     size : (width, height) [pixel]
     kind : dtype of the picture
     channels : number of channels of the picture: 3, or 4 with alpha
-    words : words of four bytes that the picture takes; the outputs follow in the same bytes
+    words : size of the packed picture in words of four bytes; the outputs follow it in the downloaded bytes
     outputs : resources of the outputs that are read back too, None for the picture alone
     """
 
@@ -98,15 +98,17 @@ def start_readback(
         bindings["exposed"] = picture.exposed
         bindings["settings"] = shader.record("Straight", **encoding_members(alpha))
     else:
-        count = -(-pixels // _PIXELS)
-        shader, words, bindings["bytes"] = program(device, "outputs/pack.wgsl"), _WORDS * count, picture.bytes
+        count = -(-pixels // _PIXELS_PER_INVOCATION)
+        shader, words = program(device, "outputs/pack.wgsl"), _WORDS_PER_INVOCATION * count
+        bindings["bytes"] = picture.bytes
     _check_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
     packed = _packed_buffer(device, picture, words)
     buffers = [packed, *(outputs.buffers if outputs else ())]
     _check_size(
         device, sum(buffer.size for buffer in buffers), device.max_buffer_bytes, pixels, "outputs of "
     )
-    graph.compute("pack", shader, bindings | {"packed": packed}, (_ROW, -(-count // _ROW)))
+    grid = _INVOCATIONS_PER_ROW, -(-count // _INVOCATIONS_PER_ROW)
+    graph.compute("pack", shader, bindings | {"packed": packed}, grid)
     kind = np.float32 if linear else np.uint8
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 

@@ -43,7 +43,7 @@ class Resources:
         landmarks = [self.landmarks.results] if self.landmarks else []
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
-    def planes_with(self, name: str) -> Planes:
+    def planes_of_output(self, name: str) -> Planes:
         """Return the planes of the stage that computes an output."""
         return next(planes for planes in self.planes if name in planes.channels)
 

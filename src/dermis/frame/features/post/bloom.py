@@ -13,7 +13,7 @@ _OMITTED_HALVINGS = 4  # omitted halvings: the widest Gaussian spans a sixteenth
 
 @dataclass(frozen=True, eq=False)
 class BloomTextures:
-    """Textures of the bloom: the picture at ever lower resolution, sums on the way back, and the result."""
+    """Textures of the bloom: repeatedly halved pictures, their sums from coarse to fine, and the result."""
 
     halved: list[Texture]
     sums: list[Texture]

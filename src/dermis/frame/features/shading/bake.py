@@ -1,4 +1,4 @@
-"""Properties and light of the skin at texels of baked maps, by the code that shades the picture."""
+"""Properties and light of the skin at texels of baked maps, computed by the code that shades the picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, CommandList, Constants, Device, Texture, make_texture
 
-CHANNELS: Mapping[str, int] = MappingProxyType(
+BAKED_CHANNELS: Mapping[str, int] = MappingProxyType(
     {
         "albedo": 3,
         "normal": 3,
@@ -28,12 +28,12 @@ CHANNELS: Mapping[str, int] = MappingProxyType(
     }
 )
 """Number of channels of each quantity that bake.wgsl computes at a point, in the order of its results."""
-CHANNEL_COUNT = sum(CHANNELS.values())
+BAKED_CHANNEL_COUNT = sum(BAKED_CHANNELS.values())
 
 
 def shader_constants() -> dict[str, int]:
     """Return the values that `//#fill` lines insert in bake.wgsl, by name."""
-    return {"baked_numbers": CHANNEL_COUNT}
+    return {"baked_numbers": BAKED_CHANNEL_COUNT}
 
 
 def point_words(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -56,7 +56,7 @@ def bake(
     footprint: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """Return the (n, CHANNEL_COUNT) values of `CHANNELS` that bake.wgsl computes at surface points.
+    """Return (n, BAKED_CHANNEL_COUNT) values at surface points, in the channels of `BAKED_CHANNELS`.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
@@ -65,7 +65,7 @@ def bake(
     pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """
     shader = program(device, "shading/bake.wgsl", constants)
-    count, size = len(points), 4 * CHANNEL_COUNT * len(points)
+    count, size = len(points), 4 * BAKED_CHANNEL_COUNT * len(points)
     baked = device.storage_buffer(size, "baked")
     uniform = pigments or (0.0, 0.0)
     record = shader.record(
@@ -76,7 +76,7 @@ def bake(
     commands.dispatch("bake", shader, {**bindings, **own}, workgroup_grid(count))
     commands.submit()
     raw = device.handle.queue.read_buffer(baked, 0, size)
-    return np.frombuffer(raw, np.float32).reshape(-1, CHANNEL_COUNT).copy()
+    return np.frombuffer(raw, np.float32).reshape(-1, BAKED_CHANNEL_COUNT).copy()
 
 
 def placeholder_thickness(device: Device) -> Texture:

@@ -11,7 +11,7 @@ from dermis.frame.projection import Views
 from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 from dermis.gpu.memory import check_memory
 
-SHADOW_BYTES = 4
+SHADOW_TEXEL_BYTES = 4
 """Size of a texel of a shadow map [bytes]."""
 
 
@@ -20,8 +20,8 @@ class ShadowMaps:
     """Shadow maps of all lights.
 
     layers : depth map of each light
-    bounds : texture of the nearest depth in squares of increasing size of each map, by which area lights skip
-        squares without occluders
+    bounds : texture of the nearest depth in squares of each map, for several sizes of squares; area lights
+        read it to skip squares without occluders
     """
 
     layers: ViewLayers
@@ -38,7 +38,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
 
     Raises DermisError when they do not fit into memory.
     """
-    needed = SHADOW_BYTES * layers * size**2
+    needed = SHADOW_TEXEL_BYTES * layers * size**2
     check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
     side = _square_count(size)
     bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))

@@ -14,7 +14,7 @@ from dermis.gpu import Buffer, Device, Recorder
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Mesh
 
-SMOOTH_MM = 3.0
+SMOOTHING_SIGMA_MM = 3.0
 """Standard deviation of the smoothing [mm], about the distance that light travels in skin."""
 
 _MAX_STEPS = 256
@@ -29,7 +29,8 @@ class Curvature:
     smoothed : buffer of the smoothed curvature, one float per vertex
     scratch : buffer for intermediate steps of the smoothing
     tables : buffers of the triangles and neighbours of each vertex, by their names in the shaders
-    steps : number of smoothing steps after which the standard deviation is `SMOOTH_MM` on the head at rest
+    steps : number of smoothing steps; together they have the standard deviation `SMOOTHING_SIGMA_MM` on the
+        head at rest
     vertices : number of vertices
     """
 
@@ -66,7 +67,7 @@ def placeholder_curvature(device: Device) -> Buffer:
 
 
 def _smoothing_steps(mesh: Mesh, pairs: Index, both: Index) -> int:
-    """Return the number of smoothing steps that have a standard deviation of `SMOOTH_MM` together.
+    """Return the number of smoothing steps whose combined standard deviation is `SMOOTHING_SIGMA_MM`.
 
     pairs : (e, 2) points of the edges of the mesh
     both : (2 e, 2) the edges in both directions, sorted by their first point
@@ -76,7 +77,7 @@ def _smoothing_steps(mesh: Mesh, pairs: Index, both: Index) -> int:
     degree = 1.0 + np.bincount(both[:, 0], minlength=len(points))
     # One step moves a value along an edge, or not at all. Its variance along each of the surface's two axes:
     step = 0.5 * float(np.median(square)) * (1.0 - 1.0 / float(np.median(degree)))
-    return int(np.clip(np.ceil(SMOOTH_MM**2 / max(step, 1e-12)), 1, _MAX_STEPS))
+    return int(np.clip(np.ceil(SMOOTHING_SIGMA_MM**2 / max(step, 1e-12)), 1, _MAX_STEPS))
 
 
 def draw(graph: Recorder, head: HeadGeometry, curvature: Curvature) -> None:

@@ -131,7 +131,7 @@ def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> di
 
 
 def _vertex_resources(device: Device, count: int) -> dict[str, Texture | Buffer]:
-    """Create the vertex resources: a buffer for GPUs or a texture for software, and a placeholder."""
+    """Create the vertex texture (for software), the vertex buffer (for GPUs) and the tangent lengths."""
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
@@ -202,7 +202,7 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """Return the tables of shape_vertices.wgsl by name: vertices, triangle corners and ranges of corners.
 
-    Corners are ordered by point and then by vertex, so that those of a vertex are a range.
+    Corners are ordered by point and then by vertex, so that the corners of a vertex are contiguous.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX_DTYPE)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from dermis.frame.features.surface.painting.paint import painting_constants, texture_names
+from dermis.frame.features.surface.painting.paint import painting_constants, painting_lists
 from dermis.frame.features.surface.record import eye_constants, lobe_constants, lobe_shaders
 from dermis.gpu.wgsl_source import ShaderListMember
 
@@ -13,5 +13,5 @@ def shader_constants() -> Mapping[str, float]:
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the names of lobes and of layers of painted skin, which `//#each` lines of shaders expand."""
-    return {"lobes": lobe_shaders, **texture_names()}
+    """Return the lobes, and the lists of painted skin such as noises, that `//#each` lines expand."""
+    return {"lobes": lobe_shaders, **painting_lists()}

@@ -46,7 +46,8 @@ def upload_maps(
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
     use_colour : False replaces the colour map by white, for profiles that contain the colour
-    decoded : False takes sRGB values of the colour map for linear ones, a mistake that the talk shows
+    decoded : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
+        [dEonLuebke2007]
     side : side of painted maps [texels]
     animated : whether expressions change painted maps
     """
@@ -75,7 +76,7 @@ def detail_bindings(device: Device, fine: bool) -> MutableBindings:
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps for which the head has no file; return them with their changes by expressions.
+    """Paint the maps for which the head has no file; return them, and the maps that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """

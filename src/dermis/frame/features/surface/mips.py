@@ -53,7 +53,7 @@ def upload_colours(device: Device, image: Floats) -> Texture:
 
 
 def upload_slopes(device: Device, image: Floats | None) -> Texture:
-    """Upload (h, w, 2) slopes and their squares with all mip levels, from which variances are filtered.
+    """Upload (h, w, 2) slopes and their squares with mip levels; shaders derive the slope variance.
 
     image : slopes along u and v, None for a flat texture
     """

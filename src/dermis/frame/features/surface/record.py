@@ -49,10 +49,10 @@ def eye_constants() -> dict[str, float]:
         "cornea_mm": CORNEA_MM,
         "apex_at": apex_mm(),
         "iris_at": iris_mm(),
-        "arch_mm": teeth.ARCH_MM,
-        "crown_mm": teeth.CROWN_MM,
-        "bite": teeth.BITE,
-        "middle": teeth.MIDDLE,
+        "arch_mm": teeth.MM_PER_U,
+        "crown_mm": teeth.MM_PER_V,
+        "bite": teeth.BITING_EDGE_V,
+        "middle": teeth.ARCH_MIDDLE_U,
     }
 
 
@@ -64,7 +64,7 @@ def fill_eye(record: UniformRecord, look: EyeLook) -> None:
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lobe.wgsl for a skin, apart from zeros, which are their defaults."""
+    """Return those pipeline constants of lobe.wgsl for a skin that differ from their default of 0."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
@@ -99,7 +99,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return the (3,) diffuse reflectance [-] and index of refraction of a half-space like the mean skin."""
+    """Return (3,) diffuse reflectance and index of refraction of a half-space of mean skin colour [-]."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -130,7 +130,7 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _relief_band(maps: Maps) -> float:
-    """Return the mip level at which the height map is as large as the normal map, -1 without both maps.
+    """Return the mip level of the height map that has the size of the normal map; -1 if there is none.
 
     Only relief finer than that level is taken from the height map and added to the normal map. With -1, all
     relief of the height map is added.

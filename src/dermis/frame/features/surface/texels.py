@@ -6,7 +6,7 @@ from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.programs import program
 from dermis.gpu import Device, Recorder, Texture, make_texture, mark_scratch
 
-SURFACE_BYTES = 32
+SURFACE_TEXEL_BYTES = 32
 """Size of a texel of the surface texture [bytes]."""
 
 

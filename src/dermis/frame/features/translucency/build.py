@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide_into_cells
 from dermis.base.progress import logged_step
-from dermis.frame.features.diffusion.pyramid import MIN_WEIGHT
+from dermis.frame.features.diffusion.pyramid import MIN_WEIGHT_SUM
 from dermis.frame.features.surface import record as surface_record
 from dermis.frame.features.translucency.pair_search.search import (
     PairTable,
@@ -72,9 +72,9 @@ def _level_tables(
     """
     reach = min(_REACH_DEVIATIONS * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
-    blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT)
-    scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT))[:, None]
-    lost = tables.lost * scale / np.maximum(blurred, MIN_WEIGHT)
+    blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT_SUM)
+    scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT_SUM))[:, None]
+    lost = tables.lost * scale / np.maximum(blurred, MIN_WEIGHT_SUM)
     return replace(tables, transmitted=tables.transmitted * scale * total, lost=lost)
 
 
@@ -102,7 +102,7 @@ def make_translucency(
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).for_width(widest_mm)
+    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).pairs_for_width(widest_mm)
     buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
     return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
 
@@ -117,7 +117,7 @@ class PairCache:
         self._device, self._surface, self._atlas = device, surface, atlas
         self._cache: dict[float, PairBuffers] = {}
 
-    def for_width(self, widest_mm: float) -> PairBuffers:
+    def pairs_for_width(self, widest_mm: float) -> PairBuffers:
         """Return the pairs that are near enough for the widest Gaussian.
 
         widest_mm : standard deviation of that Gaussian [mm]
@@ -199,7 +199,7 @@ def with_profile(
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
     tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
     """
-    fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT)
+    fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if tables is None else tables.transmitted
     lost = fraction if tables is None else tables.lost
     return replace(

@@ -213,7 +213,8 @@ def _transmittance_table(
 ) -> NDArray[np.float32]:
     """Return the (rows k, 4) transmittance by thickness and Gaussian, with the directionality as alpha.
 
-    Only the first Gaussian of each thickness holds the directionality. Without tables, it is a row of zeros.
+    Only the first Gaussian of each thickness holds the directionality. Without `tables`, the result is one
+    row of zeros.
     """
     if tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)

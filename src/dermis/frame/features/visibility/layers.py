@@ -37,7 +37,7 @@ _GROUP_TRIANGLES = (8, 128)  # least and most triangles of a workgroup of visibi
 _RUN_TRIANGLES = 16  # consecutive triangles per workgroup of a mesh with many small triangles
 _GROUPS_PER_ROW = 32768
 _TILE_PIXELS = (64, 32)  # width and height of a tile, as in tiles.wgsl
-_DEPTH, _TRIANGLE, _BOTH = 0, 1, 2  # modes of visibility_buffer.wgsl: what it records
+_RECORD_DEPTH, _RECORD_TRIANGLE, _RECORD_BOTH = 0, 1, 2  # modes of visibility_buffer.wgsl: what it records
 _MAX_DEPTH_STEP_MM = 0.1  # largest step of depth for which depth and triangle of a sample share one word
 
 
@@ -132,9 +132,9 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     record["sample"][: len(positions), :2] = positions
     across, down = positions.T.tolist()
     record["sample_bounds"] = min(across), min(down), max(across), max(down)
-    record["index_bits"] = triangles.bit_length() if passes == (_BOTH,) else 0
+    record["index_bits"] = triangles.bit_length() if passes == (_RECORD_BOTH,) else 0
     assert layers.nearness is not None and layers.triangle_ids is not None and layers.tiles is not None
-    if _TRIANGLE in passes and layers.triangle_ids.size < layers.nearness.size:
+    if _RECORD_TRIANGLE in passes and layers.triangle_ids.size < layers.nearness.size:
         layers.triangle_ids = _word_buffer(device, layers.nearness.size // 4)
     resources = {
         **head.resources,
@@ -160,10 +160,10 @@ def _pass_modes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int,
     clips : (k, 4, 4) matrices from world to clip space
     """
     if not layers.triangles:
-        return (_DEPTH,)
+        return (_RECORD_DEPTH,)
     steps = 2.0 ** (32 - triangles.bit_length())
     precise = max(map(_depth_range_mm, clips)) <= _MAX_DEPTH_STEP_MM * steps
-    return (_BOTH,) if precise else (_DEPTH, _TRIANGLE)
+    return (_RECORD_BOTH,) if precise else (_RECORD_DEPTH, _RECORD_TRIANGLE)
 
 
 def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> None:
@@ -192,7 +192,7 @@ def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: Head
 
 
 def _depth_range_mm(clip: Matrix) -> float:
-    """Return the range of distances of a view if every step of depth were as long as the longest one [mm].
+    """Return the length that depths 0 to 1 would span if all depth steps were as long as the longest [mm].
 
     Divided by the number of steps, it bounds the error of an integer depth.
 

@@ -50,13 +50,13 @@ from dermis.human.skin.textures import (
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import DEFAULT_RHO_S
 
-_LIST_NAMES: dict[str, Sequence[str]] = {
+_PAINTING_LISTS: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
     "dots": [dots.name for dots in DOT_LAYERS],
     "amounts": list(ZONE_AMOUNTS),
     "grounds": list(NOISE_REGIONS),
 }
-SKIN, OWNER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
+_SKIN_SHADER, _OWNER_SHADER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
 _MAX_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
 _PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _CACHE_FOLDER = "painted"
@@ -65,14 +65,14 @@ _MAP_NAMES = ("colour", "specular", "roughness")
 _FOLDING_FLOATS = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
 
 
-def texture_names() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the names of noises, dot layers, zone amounts and noise regions, in the order of shaders."""
-    return {name: _as_members(names) for name, names in _LIST_NAMES.items()}
+def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
+    """Return the names of noises, dot layers, zone amounts and noise regions, for lists in shaders."""
+    return {name: _as_members(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the painting shaders, by name."""
-    counts = {name: len(names) for name, names in _LIST_NAMES.items()} | table_sizes()
+    counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
     return sizes | counts | rows | {"folding": FOLD_MOVEMENTS, "wander_rows": ZONE_BORDER_NOISES}
@@ -107,7 +107,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInp
     if surface.count >= _MAX_TRIANGLES:
         actual = f"got {surface.count:,}"
         refuse("painted skin", f"fewer than {_MAX_TRIANGLES:,} triangles", actual, "Subdivide less")
-    text = _shader_text(SKIN)
+    text = _shader_text(_SKIN_SHADER)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
     paint = make_record(text, "Paint", side=side, **{name: getattr(look, name) for name in names})
     tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession))
@@ -116,7 +116,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInp
 
 def cache_key(inputs: PaintInputs, driver: str) -> str:
     """Return the disk cache key of painted maps, a hash of inputs, shaders and driver."""
-    source = "\n".join((driver, _shader_text(SKIN), _shader_text(OWNER)))
+    source = "\n".join((driver, _shader_text(_SKIN_SHADER), _shader_text(_OWNER_SHADER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
     return array_key([*records, inputs.colours, inputs.surface.vertices, inputs.surface.triangles], source)
 
@@ -193,7 +193,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
         "expression_deltas": deltas,
     }
     frame = CommandList(device, timed=False)
-    frame.compute("maps", program(device, SKIN), {**surface, **tables, **into}, (side, side))
+    frame.compute("maps", program(device, _SKIN_SHADER), {**surface, **tables, **into}, (side, side))
     frame.submit()
     return RestMaps(**maps, heights=heights, deltas=deltas)
 
@@ -212,7 +212,7 @@ def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str
         }
         frame = CommandList(device, timed=False)
         bound: Bindings = {"paint": inputs.paint, **buffers}
-        frame.dispatch("maps", program(device, OWNER), bound, workgroup_grid(surface.count))
+        frame.dispatch("maps", program(device, _OWNER_SHADER), bound, workgroup_grid(surface.count))
         frame.submit()
         sides[side] = buffers
     return sides[side]

@@ -17,12 +17,12 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import UV_FALLOFF, UV_RIM, EyeTextures
 from dermis.mesh.head import Head
 
-PICTURE_SIDE = 1024
+EYE_PICTURE_SIDE = 1024
 """Side of the pictures [texels]; a texel of the iris is 0.025 mm wide."""
 
 
-def paint_eye(device: Device, look: EyeLook, side: int = PICTURE_SIDE) -> EyeTextures:
-    """Paint pictures of an eye as seen along its axis through the cornea, for programs without its shader.
+def paint_eye(device: Device, look: EyeLook, side: int = EYE_PICTURE_SIDE) -> EyeTextures:
+    """Paint pictures of an eye along its axis through the cornea, for programs without the eye shader.
 
     side : side of the pictures [pixels]
     """

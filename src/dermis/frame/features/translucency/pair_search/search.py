@@ -119,7 +119,7 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
 
 
 def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tiles: Buffer) -> Buffer:
-    """Return a buffer with one bit for each two blocks of tiles: whether translucent pairs are possible.
+    """Return a buffer with a bit for each pair of blocks of tiles: whether translucent pairs are possible.
 
     tiles : buffer to fill with the bounding box and normal cone of each tile
     """
@@ -143,8 +143,9 @@ class CandidateCells:
 
     receiver : (r,) indices among the cells that receive light
     source : (s,) indices of cells that emit light, in the coarse atlas
-    first, end : (r,) range in `TilePairs.partners` of the tile of each receiver
-    sources_first, sources_end : (t,) range in `source` of each of the t tiles of the atlas
+    first, end : (r,) bounds of the range in `TilePairs.partners` that belongs to the tile of each receiver
+    sources_first, sources_end : (t,) bounds of the range in `source` that belongs to each of the t tiles of
+        the atlas
     """
 
     receiver: Index
