@@ -15,7 +15,7 @@ from dermis import Human, load_head
 from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
-from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.apps.export.targets.gltf.target import DRAFT_NOTICE, SCATTER_VARIANT, TARGET, TRANSMISSION_VARIANT
 from dermis.apps.export.targets.gltf.volume import (
     Volume,
     fit_volume,
@@ -40,7 +40,7 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     human = Human.drawn(7)
     write_person_glb(source, human, human.head(subdivide=0), roughness=0.3)
     subject = load_subject(source, colour=brown(folder), subdivide=0)
-    files = {variant: folder / f"{variant}.glb" for variant in (SCATTER, DIFFUSE)}
+    files = {variant: folder / f"{variant}.glb" for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT)}
     for variant, file in files.items():
         export_skin(subject, "gltf", file, variant=variant)
     return files
@@ -116,7 +116,7 @@ def test_what_one_would_type_is_worse(name: str) -> None:
 
 
 def test_nothing_spreads_without_scattering() -> None:
-    subject, target = load_subject("skin1"), TARGET.with_variant(DIFFUSE)
+    subject, target = load_subject("skin1"), TARGET.with_variant(TRANSMISSION_VARIANT)
     rows = target.parameters(subject, "2.0")
     found = curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
     assert found.cdf.min() > 0.9 and found.edge.min() > 0.4
@@ -134,7 +134,8 @@ def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 0.05, rtol=1e-5)
     assert set(tree["extensionsUsed"]) >= SCATTER_EXTENSIONS and "extensionsRequired" not in tree
     assert (
-        tree["asset"]["extras"]["draft"] == DRAFT == skin["extras"]["draft"] and DRAFT in report.limitations
+        tree["asset"]["extras"]["draft"] == DRAFT_NOTICE == skin["extras"]["draft"]
+        and DRAFT_NOTICE in report.limitations
     )
     assert skin["pbrMetallicRoughness"]["baseColorFactor"] == [1.0, 1.0, 1.0, 1.0]
     for row in report.parameters:
@@ -149,8 +150,8 @@ def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
 
     from PIL import Image
 
-    document = check_rules(person[SCATTER])
-    skin = skin_of(person[SCATTER])
+    document = check_rules(person[SCATTER_VARIANT])
+    skin = skin_of(person[SCATTER_VARIANT])
     scatter = skin["extensions"]["KHR_materials_scatter"]
     assert scatter["multiscatterColorFactor"] == [1.0, 1.0, 1.0]
     image = document.tree["images"][scatter["multiscatterColorTexture"]["index"]]
@@ -163,13 +164,13 @@ def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
 
 
 def test_diffuse_transmission_has_the_usual_colours(person: dict[str, Path]) -> None:
-    skin = skin_of(person[DIFFUSE])
+    skin = skin_of(person[TRANSMISSION_VARIANT])
     assert "baseColorTexture" in skin["pbrMetallicRoughness"] and TRANSMISSION in skin["extensions"]
     assert not SCATTER_EXTENSIONS & set(skin["extensions"]) and "draft" not in skin["extras"]
-    assert "draft" not in check_rules(person[DIFFUSE]).tree["asset"].get("extras", {})
+    assert "draft" not in check_rules(person[TRANSMISSION_VARIANT]).tree["asset"].get("extras", {})
 
 
-@pytest.mark.parametrize("variant", [SCATTER, DIFFUSE])
+@pytest.mark.parametrize("variant", [SCATTER_VARIANT, TRANSMISSION_VARIANT])
 def test_this_package_reads_the_same_head_back(person: dict[str, Path], variant: str) -> None:
     back = load_head(person[variant])
     assert back.maps.colour is not None and back.eyes is not None and "jawOpen" in back.targets
@@ -178,7 +179,7 @@ def test_this_package_reads_the_same_head_back(person: dict[str, Path], variant:
     assert back.eyes.look == Human.drawn(7).iris
 
 
-@pytest.mark.parametrize("variant", [SCATTER, DIFFUSE])
+@pytest.mark.parametrize("variant", [SCATTER_VARIANT, TRANSMISSION_VARIANT])
 def test_the_khronos_validator_finds_no_errors(person: dict[str, Path], variant: str) -> None:
     found = khronos_issues(person[variant])
     assert found["numErrors"] == 0
@@ -188,10 +189,10 @@ def test_the_khronos_validator_finds_no_errors(person: dict[str, Path], variant:
 
 def test_names_stay_words(person: dict[str, Path]) -> None:
     """The name of a head is a JSON string, and the file contains no path of its source."""
-    data = person[SCATTER].read_bytes()
+    data = person[SCATTER_VARIANT].read_bytes()
     tree = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
     assert tree["meshes"][0]["name"] == 'x"; import os; <script>'
-    assert str(person[SCATTER].parent).encode() not in data
+    assert str(person[SCATTER_VARIANT].parent).encode() not in data
 
 
 def test_the_same_export_is_the_same_file(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
-from dermis.apps.export.targets.openpbr.target import TARGET, fitted_path_mm, get_radii_mm
+from dermis.apps.export.targets.openpbr.target import TARGET, fitted_mean_free_path_mm, get_radii_mm
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.optics.media import albedo_from_colour
 
@@ -42,10 +42,12 @@ def test_all_light_is_what_the_formula_returns() -> None:
 def test_radii_grow_with_the_skin() -> None:
     subject = load_subject("skin1")
     np.testing.assert_allclose(
-        get_radii_mm(TARGET.parameters(subject, "1.1.1"), OPEN_PBR), fitted_path_mm(subject), rtol=1e-9
+        get_radii_mm(TARGET.parameters(subject, "1.1.1"), OPEN_PBR),
+        fitted_mean_free_path_mm(subject),
+        rtol=1e-9,
     )
     d = evaluate_export(subject, TARGET, "1.1.1").d_mm
-    ratio = fitted_path_mm(subject) / d
+    ratio = fitted_mean_free_path_mm(subject) / d
     # From other simulations: d over the mean free path is 0.434 at a colour of 0.43 and 0.34 at 0.2.
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
 

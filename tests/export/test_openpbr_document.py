@@ -13,7 +13,7 @@ from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, 
 from dermis.apps.export.targets.openpbr.document import build_document, standard_library
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
-    STANDARD,
+    STANDARD_SURFACE,
     OpenPbrMaterial,
     opaque_material,
     skin_material,
@@ -45,7 +45,7 @@ def read_back(document: Any) -> Any:
     return document_read
 
 
-@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
+@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD_SURFACE])
 def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
     document_read = read_back(build_document(materials(), shader, "a_"))
     nodes = {node.getName(): node for node in document_read.getNodes(shader)}
@@ -66,7 +66,7 @@ def test_pictures_have_their_colour_spaces() -> None:
 
 
 @pytest.mark.parametrize("language", GENERATORS)
-@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
+@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD_SURFACE])
 def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
     code = generated(build_document(materials(), shader, "a_"), GENERATORS[language].create())
     assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one

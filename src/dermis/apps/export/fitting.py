@@ -12,7 +12,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile
 from dermis.optics.half_space import HalfSpaceKind, half_space, tabulated_albedo
 from dermis.optics.media import Floats
-from dermis.optics.radial import TINY
+from dermis.optics.radial import SMALLEST_FLOAT
 
 _BURLEY_MEDIAN_RADIUS = 1.58  # of Burley's profile, in units of d: half of the light leaves within
 _LOG_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
@@ -66,9 +66,9 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return a cumulative profile whose radii are multiplied by one length per channel.
+    """Return a cumulative profile with the radii of each channel multiplied by one length.
 
-    unit : profile with radii in units of the length
+    unit : profile with radii in units of that length
     scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
     """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
@@ -130,11 +130,12 @@ def _fit_scale_near(
 def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
     """Return the lengths (3,) for which a scaled cumulative profile is closest to a reference profile.
 
-    A wider profile has less light within each radius, so its largest excess over the reference decreases and
-    its largest deficit increases with the length. The larger of the two is smallest where they are equal.
+    A wider profile has less light within each radius. With increasing length, the largest excess over the
+    reference therefore decreases, and the largest deficit increases. The larger of these two differences is
+    smallest where they are equal.
 
-    excess : function of log lengths (3,) that returns the fraction of light within each radius of the scaled
-        profile minus that of the reference, (n, 3)
+    excess : function that takes log lengths (3,) and returns the difference (n, 3) at each radius: the
+        fraction of light within the radius, scaled profile minus reference
     low, high : (3,) bounds of the log lengths
     """
     for _ in range(bisections):
@@ -146,12 +147,13 @@ def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Float
 
 
 def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[[Floats], Floats]) -> float:
-    """Return the length by which the radii of a profile are multiplied to match one channel of `curve` [mm].
+    """Return the length that multiplies a profile's radii to match one channel of `curve` [mm].
 
     The sum of squared differences is minimised, at radii spaced evenly in log r.
 
     channel : index of the channel, 0 for red
-    unit_cdf : function that returns the cumulative profile for a length of 1 at radii (n,)
+    unit_cdf : the profile for a length of 1: a function that takes radii (n,) and returns the fraction of
+        light within each
     """
     from scipy.optimize import minimize_scalar
 
@@ -170,10 +172,10 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
 
 @dataclass(frozen=True)
 class CurveError:
-    """Differences of the profile that a program renders from the reference profile, for red, green and blue.
+    """Errors of the profile that a program renders, relative to the reference profile; red, green and blue.
 
     cdf : (3,) largest difference of the fraction of light within a radius [-]
-    edge : (3,) largest difference beside a straight edge of light, such as a shadow edge [-]
+    edge : (3,) largest difference of the diffused light beside a straight edge, such as a shadow edge [-]
     energy : (3,) relative error of the total energy [-]
     """
 
@@ -197,5 +199,5 @@ def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> Curve
     return CurveError(
         cdf=np.abs(curve.fraction_within(reference.radii_mm) - reference.fraction).max(axis=0),
         edge=edge,
-        energy=curve.energy / np.maximum(reference.energy, TINY) - 1.0,
+        energy=curve.energy / np.maximum(reference.energy, SMALLEST_FLOAT) - 1.0,
     )

@@ -9,23 +9,23 @@ from dermis.base.registry import Registry
 if TYPE_CHECKING:
     from dermis.apps.export.target import Target
 
-_HOME = "dermis.apps.export.targets"
+_TARGETS_PACKAGE = "dermis.apps.export.targets"
 TARGETS: Registry[Target] = Registry(
     "target",
     {
-        "arnold": f"{_HOME}.arnold:TARGET",
-        "babylon": f"{_HOME}.babylon.target:TARGET",
-        "blender": f"{_HOME}.blender.target:TARGET",
-        "gltf": f"{_HOME}.gltf.target:TARGET",
-        "maps": f"{_HOME}.maps:TARGET",
-        "mitsuba": f"{_HOME}.mitsuba.target:TARGET",
-        "openpbr": f"{_HOME}.openpbr.target:TARGET",
-        "pbrt": f"{_HOME}.pbrt.target:TARGET",
-        "renderman": f"{_HOME}.renderman:TARGET",
-        "three": f"{_HOME}.three.target:TARGET",
-        "unity": f"{_HOME}.unity.target:TARGET",
-        "unreal": f"{_HOME}.unreal.target:TARGET",
-        "usd": f"{_HOME}.usd.target:TARGET",
-        "web": f"{_HOME}.web.target:TARGET",
+        "arnold": f"{_TARGETS_PACKAGE}.arnold:TARGET",
+        "babylon": f"{_TARGETS_PACKAGE}.babylon.target:TARGET",
+        "blender": f"{_TARGETS_PACKAGE}.blender.target:TARGET",
+        "gltf": f"{_TARGETS_PACKAGE}.gltf.target:TARGET",
+        "maps": f"{_TARGETS_PACKAGE}.maps:TARGET",
+        "mitsuba": f"{_TARGETS_PACKAGE}.mitsuba.target:TARGET",
+        "openpbr": f"{_TARGETS_PACKAGE}.openpbr.target:TARGET",
+        "pbrt": f"{_TARGETS_PACKAGE}.pbrt.target:TARGET",
+        "renderman": f"{_TARGETS_PACKAGE}.renderman:TARGET",
+        "three": f"{_TARGETS_PACKAGE}.three.target:TARGET",
+        "unity": f"{_TARGETS_PACKAGE}.unity.target:TARGET",
+        "unreal": f"{_TARGETS_PACKAGE}.unreal.target:TARGET",
+        "usd": f"{_TARGETS_PACKAGE}.usd.target:TARGET",
+        "web": f"{_TARGETS_PACKAGE}.web.target:TARGET",
     },
 )

@@ -18,15 +18,15 @@ from dermis.base.errors import refuse
 from dermis.optics.media import Floats
 
 _NOTABLE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
-_CHANNELS = "red", "green", "blue"
-_ERRORS = {
+_CHANNEL_NAMES = "red", "green", "blue"
+_ERROR_MEANINGS = {
     "cdf": "largest fraction of the light that leaves at the wrong radius",
     "edge": "largest error beside an edge of light",
     "energy": "relative error of the total light",
 }
 REPORT_FILE = "export.json"
-_PAGE_FILE = "README.md"
-_MAP_SIDE = 2048
+_REPORT_PAGE = "README.md"
+_DEFAULT_MAP_SIDE = 2048
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ class ExportReport:
         lines += ["", *_parameter_lines(self.parameters)]
         if naive:
             lines += ["", "naive parameters", *_parameter_lines(self.naive_parameters)]
-        lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
+        lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNEL_NAMES)]
         lines.append(f"{'d [mm]':12}{_format_channels(self.d_mm)}  width of the fitted Burley profile")
-        for name, meaning in _ERRORS.items():
+        for name, meaning in _ERROR_MEANINGS.items():
             lines.append(f"{name:12}{_format_channels(getattr(self.error, name))}  {meaning}")
             lines.append(
                 f"{'  naive':12}{_format_channels(getattr(self.naive_error, name))}  of naive parameters"
@@ -106,7 +106,9 @@ class ExportReport:
         error = float(self.error.cdf[worst])
         if error < _NOTABLE_ERROR:
             return [self.limitations]
-        text = f"No parameters reproduce this profile: {error:.0%} of the {_CHANNELS[worst]} light leaves"
+        text = (
+            f"No parameters reproduce this profile: {error:.0%} of the {_CHANNEL_NAMES[worst]} light leaves"
+        )
         return [f"{text} at another radius.", self.limitations]
 
     def markdown(self) -> str:
@@ -148,7 +150,7 @@ def export_skin(
     model: ModelName | None = None,
     profile: str | Path | None = None,
     library: str | Path | None = None,
-    side: int = _MAP_SIDE,
+    side: int = _DEFAULT_MAP_SIDE,
     adapter: str = "auto",
     **head: Any,
 ) -> ExportReport:
@@ -173,7 +175,7 @@ def export_skin(
     profile : str or Path, optional
         Skin of a head; by default a person's own pigments, or the default skin.
     library : str or Path, optional
-        The folder node_modules into which npm has installed the library of a page, which is then embedded.
+        Folder node_modules of npm with the JavaScript library of a page; the page then embeds the library.
     side : int, default 2048
         Side of painted maps [texel].
     adapter : str, default "auto"
@@ -279,7 +281,7 @@ def _move_into_place(source: Path, target: Path) -> None:
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
     """Write the report as Markdown and JSON beside the output file or into the folder; return both paths."""
     single = bool(output.suffix)
-    page = output.with_name(f"{output.name}.md") if single else output / _PAGE_FILE
+    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
     numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
     page.write_text(report.markdown(), encoding="utf-8")
     numbers.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")

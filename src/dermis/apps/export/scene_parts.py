@@ -12,10 +12,10 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights with each unsupported one replaced by a point or directional light, with a note.
+    """Return the lights, with unsupported ones replaced by point or directional lights; warn of each.
 
     supported : kinds of light that the program supports, including point and directional
-    program : name of the program for the note
+    program : name of the program for the warnings
     """
     return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
 

@@ -37,11 +37,11 @@ BALL_MM = 100.0
 """Diameter of the ball that replaces the head of a skin without one [mm]."""
 
 ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
-MODELS: tuple[ModelName, ...] = get_args(ModelName)
-_PHOTONS = 1_000_000
+PROFILE_MODELS: tuple[ModelName, ...] = get_args(ModelName)
+_PHOTON_COUNT = 1_000_000
 _MAP_ROLES = "colour", "normal", "roughness", "specular", "height"
 _MIN_ALBEDO = 1e-9
-_MESHES = ".glb", ".gltf", ".obj", ".ply"
+_MESH_SUFFIXES = ".glb", ".gltf", ".obj", ".ply"
 _MAX_NAME_LENGTH = 40
 
 
@@ -91,9 +91,10 @@ class Subject:
         return np.clip(self.albedo, low, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return a program's profile with the reference energy, times the program's error in reflectance.
+        """Return a program's profile with its total energy expressed relative to the reference profile.
 
-        That error is the ratio of the light that the program returns for the albedo to the albedo itself.
+        The energy becomes that of the reference, times the ratio of the light that the program returns to the
+        albedo for which it returns this light.
 
         curve : profile that the program renders, with the energy that it returns for the subject's albedo
         """
@@ -108,7 +109,9 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, side: int, adapter: str) -> Subject:
-        """Return the subject with procedural maps of its head painted as arrays; itself if there are none.
+        """Return a copy in which the head's procedural maps are painted as arrays.
+
+        If the head has no procedural maps, the subject itself is returned.
 
         side : side of the maps, a power of two from 256 to 4096 [texel]
         adapter : adapter that paints the maps
@@ -137,7 +140,7 @@ class Subject:
 def load_subject(
     source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
-    """Return the skin or head with a name or in a file, with its reference profile.
+    """Load a skin or a head by name or from a file, and return it with its reference profile.
 
     source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
@@ -149,7 +152,7 @@ def load_subject(
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
-    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in _MESHES):
+    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in _MESH_SUFFIXES):
         return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(source, **head)
     if profile is not None:
@@ -178,8 +181,10 @@ def reference_curve(
 
     DermisError : for an unknown model, or a model requested for a table of Gaussians
     """
-    if model is not None and model not in MODELS:
-        refuse("model", f"one of {', '.join(MODELS)}", f"got {format_value(model)}", "Choose one of them")
+    if model is not None and model not in PROFILE_MODELS:
+        refuse(
+            "model", f"one of {', '.join(PROFILE_MODELS)}", f"got {format_value(model)}", "Choose one of them"
+        )
     table = None if skin.overrides_tissue else find_gaussians(skin.profile)
     if table is not None:
         if model is not None:
@@ -199,4 +204,4 @@ def _model_profile(tissue: Tissue, model: ModelName) -> RadialProfile:
         return tissue.profile(model)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
-    return monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS)
+    return monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTON_COUNT)

@@ -74,8 +74,8 @@ def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Pat
 class Target(ABC):
     """Export target: a program for which skins and heads are written.
 
-    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. They state the parameters of a skin,
-    the profile that the program renders with them, and write the files.
+    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. They convert a skin to parameters of
+    the program, predict the profile that the program renders with these parameters, and write the files.
 
     Parameters
     ----------

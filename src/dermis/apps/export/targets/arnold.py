@@ -1,8 +1,7 @@
-"""Export to Arnold's standard_surface as a JSON file of parameters, by published documentation.
+"""Export to Arnold's standard_surface as a JSON file of parameters, following the published documentation.
 
-The radius is the mean free path per channel in scene units, times the scale. The colour is converted to a
-single-scattering albedo by the same formula as in OpenPBR. The random walk is assumed to be in an
-index-matched medium.
+The mean free path of a channel is the parameter subsurface_radius times subsurface_scale, in scene units. The
+colour is converted to a single-scattering albedo by tabulated random walks in an index-matched medium.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.half_space import half_space, tabulated_albedo
 from dermis.optics.media import Floats
 
-_COLOUR, _RADIUS, _SCALE = "subsurface_color", "subsurface_radius", "subsurface_scale"
+_COLOUR_NAME, _RADIUS_NAME, _SCALE_NAME = "subsurface_color", "subsurface_radius", "subsurface_scale"
 _MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
@@ -42,8 +41,12 @@ class Arnold(JsonTarget):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of a random walk whose single-scattering albedo is derived from the colour."""
-        path = _MM_PER_CM * np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)
-        colour = np.array(get_numbers(parameters, _COLOUR))
+        path = (
+            _MM_PER_CM
+            * np.array(get_numbers(parameters, _RADIUS_NAME))
+            * get_numbers(parameters, _SCALE_NAME)
+        )
+        colour = np.array(get_numbers(parameters, _COLOUR_NAME))
         curve = half_space("walk", tabulated_albedo("walk", colour), path)
         return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
@@ -52,9 +55,9 @@ def _parameters(colour: Floats, path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
-        Parameter(_COLOUR, flat_tuple(colour), "-", "diffuse reflectance"),
-        Parameter(_RADIUS, flat_tuple(path_mm / _MM_PER_CM), "cm", "mean free path"),
-        Parameter(_SCALE, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
+        Parameter(_COLOUR_NAME, flat_tuple(colour), "-", "diffuse reflectance"),
+        Parameter(_RADIUS_NAME, flat_tuple(path_mm / _MM_PER_CM), "cm", "mean free path"),
+        Parameter(_SCALE_NAME, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
         Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),
     )
 

@@ -35,13 +35,13 @@ Ranges = dict[str, str | float | list[float]]
 NormalY = Literal["up", "down"]
 MAP_SIDES = tuple(1 << k for k in range(8, 14))
 """Supported sides of the maps [texel]."""
-_MAX_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
+_MAX_PNG_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
 _LOGGER = logging.getLogger("dermis")
 PngEncoding = Literal["colour", "light", "normal", "fraction", "range", "root", "none"]
 """Encoding of a map as PNG: 8-bit sRGB; 8-bit sRGB of light divided by its 99.9th percentile; a normal n as
 (n + 1) / 2 in 16 bits; a fraction in 16 bits; the range from minimum to maximum in 16 bits; the square root
 in 16 bits; no PNG."""
-_SCATTERED = "scattered"
+_SCATTERED_NAME = "scattered"
 _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
 
@@ -97,17 +97,17 @@ class MapFolder(Target):
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter("normal_green", self._green, "-", "direction of green: towards row 0, or away from it"),
-            Parameter(_SCATTERED, True, "-", "the light to display is the diffused one, scattered.exr"),
+            Parameter(_SCATTERED_NAME, True, "-", "the light to display is the diffused one, scattered.exr"),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters for an ordinary light map, without diffusion."""
-        return replace_values(self.parameters(subject, version), {_SCATTERED: False})
+        return replace_values(self.parameters(subject, version), {_SCATTERED_NAME: False})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of the renderer's sum of Gaussians, or a step at radius 0 without diffusion."""
         energy = subject.curve.energy
-        if not get_value(parameters, _SCATTERED) or subject.scene is None:
+        if not get_value(parameters, _SCATTERED_NAME) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
         profile = SkinProfiles().profile(subject.scene.skin)
         return gaussian_curve(profile.variance_mm2, profile.weight, energy)
@@ -164,7 +164,7 @@ def orient_green(normal: Floats, normal_y: NormalY) -> Floats:
 
 
 def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
-    return np.rint(np.clip(fraction, 0.0, 1.0) * _MAX_LEVEL).astype(np.uint16)
+    return np.rint(np.clip(fraction, 0.0, 1.0) * _MAX_PNG_LEVEL).astype(np.uint16)
 
 
 def check_side(side: object) -> int:

@@ -1,8 +1,8 @@
 """Export to RenderMan: parameters of PxrSurface by its published documentation, not tested in RenderMan.
 
-The subsurface DMFP is the diffuse mean free path in mm times the unit length. In [ChristensenBurley2015], by
-the authors of the material, the Burley profile has the width d = dmfp / s(A), where A is the albedo and s
-Burley's factor for diffuse mean free paths.
+The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. In
+[ChristensenBurley2015], by the authors of the material, the Burley profile has the width d = dmfp / s(A),
+where A is the albedo and s Burley's factor for diffuse mean free paths.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import shape_factor_diffuse
 from dermis.optics.media import Floats
 
-_COLOUR, _UNIT = "subsurfaceColor", "unitLength"
-_PATH, _PATH_COLOUR = "subsurfaceDmfp", "subsurfaceDmfpColor"
+_COLOUR_NAME, _UNIT_NAME = "subsurfaceColor", "unitLength"
+_DMFP_NAME, _DMFP_COLOUR_NAME = "subsurfaceDmfp", "subsurfaceDmfpColor"
 _MIN_ALBEDO = 1e-3
 
 
@@ -44,7 +44,8 @@ class RenderMan(JsonTarget):
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile whose width follows from the diffuse mean free paths."""
         path, path_colour, unit, colour = (
-            np.array(get_numbers(parameters, name)) for name in (_PATH, _PATH_COLOUR, _UNIT, _COLOUR)
+            np.array(get_numbers(parameters, name))
+            for name in (_DMFP_NAME, _DMFP_COLOUR_NAME, _UNIT_NAME, _COLOUR_NAME)
         )
         return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
 
@@ -53,12 +54,12 @@ def _parameters(albedo: Floats, path_mm: Floats) -> Parameters:
     longest = float(path_mm.max())
     return (
         Parameter("subsurfaceGain", 1.0, "-", "all diffuse light is scattered below the surface"),
-        Parameter(_COLOUR, flat_tuple(albedo), "-", "diffuse reflectance A"),
-        Parameter(_PATH, longest, "mm", "largest diffuse mean free path, s(A) d, of the channels"),
+        Parameter(_COLOUR_NAME, flat_tuple(albedo), "-", "diffuse reflectance A"),
+        Parameter(_DMFP_NAME, longest, "mm", "largest diffuse mean free path, s(A) d, of the channels"),
         Parameter(
-            _PATH_COLOUR, flat_tuple(path_mm / longest), "-", "each channel's relative to that, no gamma"
+            _DMFP_COLOUR_NAME, flat_tuple(path_mm / longest), "-", "each channel's relative to that, no gamma"
         ),
-        Parameter(_UNIT, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
+        Parameter(_UNIT_NAME, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
     )
 
 

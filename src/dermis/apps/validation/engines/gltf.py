@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dermis.apps.export.fitting import curve_error
 from dermis.apps.export.subject import load_subject
-from dermis.apps.export.targets.gltf.target import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.apps.export.targets.gltf.target import DRAFT_NOTICE, SCATTER_VARIANT, TARGET, TRANSMISSION_VARIANT
 from dermis.apps.export.targets.gltf.volume import fit_volume, volume_curve
 from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 
 RESULTS_FILE = RESULTS / "engines_gltf.json"
-SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
+COMPARED_SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
 VERSION = TARGET.versions[-1]
 
 
@@ -28,7 +28,7 @@ def skin_results(name: str) -> JsonObject:
         "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
         "albedo_as_colour": curve_error(subject.curve, coloured).as_json(),
     }
-    for variant in (SCATTER, DIFFUSE):
+    for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT):
         target = TARGET.with_variant(variant)
         best, naive = (
             curve_error(subject.curve, target.predicted_curve(rows, subject, VERSION)).as_json()
@@ -40,5 +40,9 @@ def skin_results(name: str) -> JsonObject:
 
 def gltf() -> None:
     """Predict the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
-    figures = {"version": VERSION, "draft": DRAFT, "skins": {name: skin_results(name) for name in SKINS}}
+    figures = {
+        "version": VERSION,
+        "draft": DRAFT_NOTICE,
+        "skins": {name: skin_results(name) for name in COMPARED_SKINS},
+    }
     write_results(RESULTS_FILE, figures, 4)

@@ -14,14 +14,14 @@ from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.openpbr import target as openpbr_target
 from dermis.apps.export.targets.openpbr.materials import OPEN_PBR
-from dermis.apps.export.targets.openpbr.target import fitted_path_mm, materialx_profile
+from dermis.apps.export.targets.openpbr.target import fitted_mean_free_path_mm, materialx_profile
 from dermis.apps.export.targets.pbrt import target as pbrt_target
 from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
 from dermis.base.extras import import_extra
 
 RESULTS_FILE = RESULTS / "engines_openpbr.json"
-SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
+COMPARED_SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
 _MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core does not include
 
 
@@ -32,11 +32,11 @@ def skin_errors() -> JsonObject:
     width of a Burley profile.
     """
     results: JsonObject = {}
-    for name in SKINS:
+    for name in COMPARED_SKINS:
         subject = load_subject(name)
         walk = evaluate_export(subject, openpbr_target.TARGET, "1.1.1")
         pbrt = evaluate_export(subject, pbrt_target.TARGET, "4")
-        as_profile = curve_error(subject.curve, materialx_profile(fitted_path_mm(subject), subject))
+        as_profile = curve_error(subject.curve, materialx_profile(fitted_mean_free_path_mm(subject), subject))
         results[name] = {
             "model": subject.model,
             "d_mm": float_list(walk.d_mm),

@@ -26,11 +26,11 @@ SAMPLE_COUNT = 40
 """Samples of a pixel if the profile covers at least 160 pixels."""
 WIDTH_ERROR = 2.0
 """Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
-_GOLDEN = 1.618033988749895
-_PROFILE = "subSurface.scatteringDiffusionProfile"
-_SCALE = "subSurfaceConfiguration.metersPerUnit"
-_CORE = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
-_LOADERS = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
+_GOLDEN_RATIO = 1.618033988749895
+_PROFILE_NAME = "subSurface.scatteringDiffusionProfile"
+_SCALE_NAME = "subSurfaceConfiguration.metersPerUnit"
+_CORE_SHA384 = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
+_LOADERS_SHA384 = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
 
 class Babylon(EnginePage):
@@ -49,8 +49,8 @@ class Babylon(EnginePage):
     )
     library_files: ClassVar = {
         "9.28.0": (
-            LibraryFile("babylonjs", "9.28.0", "babylon.js", _CORE),
-            LibraryFile("babylonjs-loaders", "9.28.0", "babylonjs.loaders.min.js", _LOADERS),
+            LibraryFile("babylonjs", "9.28.0", "babylon.js", _CORE_SHA384),
+            LibraryFile("babylonjs-loaders", "9.28.0", "babylonjs.loaders.min.js", _LOADERS_SHA384),
         )
     }
 
@@ -70,7 +70,7 @@ class Babylon(EnginePage):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
-        profile, (metres,) = get_numbers(parameters, _PROFILE), get_numbers(parameters, _SCALE)
+        profile, (metres,) = get_numbers(parameters, _PROFILE_NAME), get_numbers(parameters, _SCALE_NAME)
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
@@ -84,8 +84,10 @@ class Babylon(EnginePage):
 
 def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
     return (
-        Parameter(_PROFILE, flat_tuple(profile), "-", "inverse widths: smaller numbers diffuse farther"),
-        Parameter(_SCALE, metres, "m", "widths are 2 mm / (metersPerUnit colour), not a length of the scene"),
+        Parameter(_PROFILE_NAME, flat_tuple(profile), "-", "inverse widths: smaller numbers diffuse farther"),
+        Parameter(
+            _SCALE_NAME, metres, "m", "widths are 2 mm / (metersPerUnit colour), not a length of the scene"
+        ),
         *material_parameters(subject),
     )
 
@@ -104,13 +106,13 @@ def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floa
     width = float(s.max())
     r = width * radius[:, None]
     weight = s * (np.exp(-r * s / 3.0) + np.exp(-r * s)) * (area * width)[:, None]
-    return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN) % 1.0), weight / weight.sum(axis=0)
+    return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN_RATIO) % 1.0), weight / weight.sum(axis=0)
 
 
 def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the radii r that contain given fractions of a Burley profile of width 1, and 1 / (r p(r)).
+    """Return radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
 
-    p(r) is the density of the light per radius; its inverse weights samples at these radii.
+    p(r) is the density of the light per radius; 1 / (r p(r)) is a factor of the weights of samples at r.
     """
     u = 1.0 - np.asarray(fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
@@ -120,7 +122,7 @@ def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of the shader's samples, as if their spiral were turned to all angles.
+    """Return the cumulative profile of the shader's samples, averaged over all rotations of their spiral.
 
     colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     metres : value of metersPerUnit

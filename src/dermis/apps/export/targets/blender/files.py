@@ -33,14 +33,16 @@ from dermis.scene.settings import Settings
 Floats = NDArray[np.float64]
 VersionRange = tuple[list[int], list[int] | None]
 """First version for which the parameters are valid, and the first for which they are not, or None."""
-SCRIPT, HEAD, PANORAMA = "skin.py", "head.glb", "panorama.npy"
+SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
 _UNIT_M = UNIT_MM * METRES_PER_MM
-_UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+_Y_UP_TO_Z_UP = np.array(
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
 _BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # camera in front of a ball
 _LENGTH_FIELDS = ("shadow_soft_size", "size", "size_y")
-_TASK = BlenderTask(
+_BLENDER_TASK = BlenderTask(
     "Blender",
     "to create the scene",
     "Set it to a Python whose bpy has the requested version, or export a folder and run the script in it",
@@ -50,7 +52,7 @@ _GGX_RATIO = 0.5
 """GGX roughness over the renderer's Beckmann roughness, by least squares of the square roots of the lobes."""
 _MAX_NAME_LENGTH = 60  # characters; Blender keeps 63
 _DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
-_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
+_HELPER_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
 _TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
 _MAIN_GUARD = 'if __name__ == "__main__":'
 
@@ -58,21 +60,22 @@ _MAIN_GUARD = 'if __name__ == "__main__":'
 def write_scene(
     subject: Subject, parameters: Parameters, output: Path, method: str, versions: VersionRange
 ) -> list[Path]:
-    """Write the script or .blend of a subject to the output of `Target.write`, and return the paths.
+    """Write a subject as a script or .blend, as `Target.write` does, and return the paths of all files.
 
     method : subsurface method of the Principled BSDF, or "EEVEE"
-    versions : versions of Blender in which the parameters are valid: first one, and the first one after them
+    versions : first version of Blender in which the parameters are valid, and the first later version in
+        which they are not, or None
     """
     skin = _describe_skin(subject, parameters, method, versions)
     if output.suffix == ".blend":
         python = blender_python()
         with TemporaryDirectory(prefix="dermis-blender-") as name:
-            script = _write_script_files(subject, skin, Path(name) / SCRIPT, HEAD)[0]
-            run_blender(python, script, ["--", "--save", str(output)], _TIMEOUT_S, _TASK)
+            script = _write_script_files(subject, skin, Path(name) / SCRIPT_FILE, HEAD_FILE)[0]
+            run_blender(python, script, ["--", "--save", str(output)], _TIMEOUT_S, _BLENDER_TASK)
         return [output]
     if output.suffix == ".py":
         return _write_script_files(subject, skin, output, f"{output.stem}.glb")
-    return _write_script_files(subject, skin, output / SCRIPT, HEAD)
+    return _write_script_files(subject, skin, output / SCRIPT_FILE, HEAD_FILE)
 
 
 def _describe_skin(
@@ -108,7 +111,7 @@ def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head: s
         files.append(script.with_name(head))
         files[-1].write_bytes(_encode_head(subject, scene))
     if panorama is not None:
-        files.append(script.with_name(PANORAMA))
+        files.append(script.with_name(PANORAMA_FILE))
         np.save(files[-1], panorama)
     script.write_text(script_text(skin | scene_dict), encoding="utf-8")
     return files
@@ -141,7 +144,7 @@ def script_text(export: Mapping[str, object]) -> str:
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
     functions = {node.name: node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
-    imported = _IMPORT.search(text)
+    imported = _HELPER_IMPORT.search(text)
     assert imported is not None
     names = imported[1].split(", ")
     for name in names:  # grows by the functions that are called
@@ -149,7 +152,7 @@ def script_text(export: Mapping[str, object]) -> str:
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
     literal = pformat(dict(export), width=110, sort_dicts=False)
-    text = _IMPORT.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
+    text = _HELPER_IMPORT.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
     text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
     return text.replace(_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 
@@ -172,17 +175,17 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
     camera = cycles_camera(scene)
     world, panorama = cycles_world(scene.environment)
     if "turn" in world:
-        world["turn"] = (np.array(world["turn"]) @ _UPRIGHT[:3, :3].T).tolist()
-        world["panorama"] = PANORAMA
-    camera |= {"to_world": _upright_transform(camera["to_world"], centre)}
+        world["turn"] = (np.array(world["turn"]) @ _Y_UP_TO_Z_UP[:3, :3].T).tolist()
+        world["panorama"] = PANORAMA_FILE
+    camera |= {"to_world": _convert_transform(camera["to_world"], centre)}
     return {"lights": lights, "camera": camera, "world": world}, panorama.get("panorama")
 
 
-def _upright_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
+def _convert_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
     """Convert a transformation from Y up in mm to Blender's coordinates: Z up, in metres."""
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
-    return [[float(value) for value in row] for row in _UPRIGHT @ matrix]
+    return [[float(value) for value in row] for row in _Y_UP_TO_Z_UP @ matrix]
 
 
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
@@ -191,9 +194,11 @@ def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
     fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":
         fields["energy"] *= _UNIT_M**2  # radiant power is irradiance times area
-    converted = lamp | {"set": fields, "to_world": _upright_transform(lamp["to_world"], centre)}
+    converted = lamp | {"set": fields, "to_world": _convert_transform(lamp["to_world"], centre)}
     if "stripe" in lamp:
         stripe = lamp["stripe"]
-        axes = {name: _UPRIGHT[:3, :3] @ np.array(stripe[name]) for name in ("forward", "across", "along")}
+        axes = {
+            name: _Y_UP_TO_Z_UP[:3, :3] @ np.array(stripe[name]) for name in ("forward", "across", "along")
+        }
         converted["stripe"] = stripe | {name: axis.tolist() for name, axis in axes.items()}
     return converted

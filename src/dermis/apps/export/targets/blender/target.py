@@ -31,18 +31,18 @@ MIN_ALBEDO, MAX_ALBEDO = 0.2, 0.999999
 _BISECTIONS = 12
 _MIN_COLOUR, _MAX_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
 Cdf = Callable[[Floats], Floats]
-_RADIUS, _SCALE = "Subsurface Radius", "Subsurface Scale"
+_RADIUS_NAME, _SCALE_NAME = "Subsurface Radius", "Subsurface Scale"
 _METRES_PER_MM = 1e-3
 _4_PI = 4.0 * np.pi
 JENSEN_DMFP_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
 _FIRST_VERSION = 4, 5
 _MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
-_FAR_RADIUS = 1e9
+_INFINITE_RADIUS = 1e9
 
 
 def burley_cdf(radius: ArrayLike) -> Floats:
-    """Return the fraction of light within radii of Burley's profile as truncated by Cycles [-].
+    """Return the fraction of light within given radii, for Burley's profile as Cycles truncates it [-].
 
     radius : radii in units of the profile's width d
 
@@ -53,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(colour: ArrayLike) -> Floats:
-    """Return Burley's factor s(A) (3,), by which EEVEE divides the radius for the profile's width [-].
+    """Return Burley's factor s(A) (3,); EEVEE divides the radius by it to get the profile's width [-].
 
     colour : (3,) base colour; A is the colour divided by its brightest channel
 
@@ -81,10 +81,10 @@ def hulst_albedo(colour: ArrayLike) -> Floats:
 
 
 def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
-    """Return the mean free path divided by the radius, for the method RANDOM_WALK_SKIN of Cycles [-].
+    """Return the ratio of mean free path to radius in the method RANDOM_WALK_SKIN of Cycles [-].
 
-    Cycles takes the radius as a diffuse mean free path, and the albedo whose dipole reflectance is the
-    colour.
+    Cycles interprets the radius as a diffuse mean free path. It chooses the albedo for which the reflectance
+    of a dipole equals the colour.
 
     colour : base colour
     eta : value of Subsurface IOR
@@ -117,7 +117,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
     entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, within = _interpolate_albedo(round(walk_albedo, 7), entry)
+    radii, within = _interpolate_walk_table(round(walk_albedo, 7), entry)
     r = np.asarray(radius, np.float64)
     fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
@@ -125,10 +125,10 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
 
 
 @cache
-def _interpolate_albedo(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
+def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each [-], for one albedo.
 
-    The table is interpolated to this albedo and to radii that are eight times as dense.
+    The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -173,7 +173,7 @@ class RandomWalk(NamedTuple):
     @property
     def total(self) -> float:
         """Return the light that leaves along the normal, per incident light."""
-        return float(walk_cdf(np.array([_FAR_RADIUS]), self.albedo, self.entry)[0])
+        return float(walk_cdf(np.array([_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
@@ -204,7 +204,7 @@ class Blender(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile by the formulas of Cycles' kernel and EEVEE's shader."""
-        metres = np.array(get_numbers(parameters, _RADIUS)) * get_numbers(parameters, _SCALE)[0]
+        metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
 
@@ -223,7 +223,7 @@ class Blender(Target):
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
     def _valid_versions(self, version: str) -> VersionRange:
-        """Return the first version in which the parameters are valid, and the next that changes them."""
+        """Return the first version with valid parameters, and the first later one without, or None."""
         if self.variant != "random-walk":
             return list(_FIRST_VERSION), None
         return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
@@ -233,8 +233,8 @@ class Blender(Target):
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
-            Parameter(_RADIUS, radius, "mm, times the scale", self._radius_meaning(version)),
-            Parameter(_SCALE, _METRES_PER_MM, "m", "metres per millimetre"),
+            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_meaning(version)),
+            Parameter(_SCALE_NAME, _METRES_PER_MM, "m", "metres per millimetre"),
             Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]
         if self.variant.startswith("random"):

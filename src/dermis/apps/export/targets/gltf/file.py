@@ -16,8 +16,8 @@ from dermis.mesh.head import Head
 from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
-_MULTISCATTER = "multiscatter"
-_STEPS = 1024
+_MULTISCATTER_ROLE = "multiscatter"
+_TABLE_STEPS = 1024
 
 
 def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
@@ -53,9 +53,9 @@ def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft:
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft}
     if head.maps.colour is None:
         return SkinAdditions(white, extensions, extras)
-    steps = np.linspace(0.0, 1.0, _STEPS)
+    steps = np.linspace(0.0, 1.0, _TABLE_STEPS)
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
-    scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER}
+    scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}
     extensions = {**extensions, "KHR_materials_scatter": scatter}
-    return SkinAdditions(white, extensions, extras, {_MULTISCATTER: colours_png(scattered)})
+    return SkinAdditions(white, extensions, extras, {_MULTISCATTER_ROLE: colours_png(scattered)})

@@ -14,18 +14,20 @@ from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_cu
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA, Floats
 
-SCATTER, DIFFUSE = "scatter", "diffuse-transmission"
-DRAFT = "KHR_materials_scatter: draft of 2026-06-22 (KhronosGroup/glTF pull request 2579), not ratified"
-_DISTANCE = "KHR_materials_volume.attenuationDistance"
-_COLOUR = "KHR_materials_volume.attenuationColor"
-_MULTISCATTER = "KHR_materials_scatter.multiscatterColorFactor"
-_FACTOR = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
-_TRANSMISSION_COLOUR = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
-_BASE = "pbrMetallicRoughness.baseColorFactor"
-_IOR = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
-_THICKNESS_M = 0.1  # of a head; used as path length by programs that trace no rays
-_EAR_MM = 4.0  # thickness at which the transmitted light is computed
-_NAIVE_FACTOR = 0.5  # middle of the slider
+SCATTER_VARIANT, TRANSMISSION_VARIANT = "scatter", "diffuse-transmission"
+DRAFT_NOTICE = (
+    "KHR_materials_scatter: draft of 2026-06-22 (KhronosGroup/glTF pull request 2579), not ratified"
+)
+_DISTANCE_NAME = "KHR_materials_volume.attenuationDistance"
+_COLOUR_NAME = "KHR_materials_volume.attenuationColor"
+_MULTISCATTER_NAME = "KHR_materials_scatter.multiscatterColorFactor"
+_TRANSMISSION_FACTOR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
+_TRANSMISSION_COLOUR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
+_BASE_COLOUR_NAME = "pbrMetallicRoughness.baseColorFactor"
+_IOR_PARAMETER = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
+_HEAD_THICKNESS_M = 0.1  # of a head; used as path length by programs that trace no rays
+_EAR_THICKNESS_MM = 4.0  # thickness at which the transmitted light is computed
+_NAIVE_TRANSMISSION = 0.5  # middle of the slider
 
 
 class Gltf(Target):
@@ -35,33 +37,33 @@ class Gltf(Target):
     title = "glTF"
     suffixes = (".glb",)
     versions = ("2.0",)
-    variants = (SCATTER, DIFFUSE)
+    variants = (SCATTER_VARIANT, TRANSMISSION_VARIANT)
     needs_maps = True
     limitations = (
-        f"{DRAFT}. Ray tracers that support it show the errors of this table. Programs that support only"
-        " transmission and volume show dark glass. Rasterisers use the multiscatter colour as base colour, so"
-        f" the skin is too light. The variant {DIFFUSE} looks like skin in all programs, but light is not"
-        " diffused: shadow edges stay sharp."
+        f"{DRAFT_NOTICE}. Ray tracers that support it show the errors of this table. Programs that support"
+        " only transmission and volume show dark glass. Rasterisers use the multiscatter colour as base"
+        f" colour, so the skin is too light. The variant {TRANSMISSION_VARIANT} looks like skin in all"
+        " programs, but light is not diffused: shadow edges stay sharp."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the volume whose random walk is closest to the reference, or the transmission of an ear."""
-        if self.variant == DIFFUSE:
+        if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for every colour, and the mean exit radius of light for the distance."""
-        if self.variant == DIFFUSE:
-            return _diffuse_parameters(subject, _NAIVE_FACTOR, subject.albedo)
+        """Return the skin's colour for all colours, and the mean exit radius of light as the distance."""
+        if self.variant == TRANSMISSION_VARIANT:
+            return _diffuse_parameters(subject, _NAIVE_TRANSMISSION, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
         colour = np.clip(subject.albedo, 1e-3, 1.0 - 1e-3)
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume; for transmission only, light leaves where it enters."""
-        if self.variant == DIFFUSE:
-            reflected = (1.0 - get_numbers(parameters, _FACTOR)[0]) * subject.curve.energy
+        """Return the profile of the volume; in the transmission variant, all light leaves where it enters."""
+        if self.variant == TRANSMISSION_VARIANT:
+            reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
@@ -75,7 +77,9 @@ class Gltf(Target):
             if extension.startswith("KHR_"):
                 value = list(one.value) if isinstance(one.value, tuple) else one.value
                 extensions.setdefault(extension, {})[member] = value
-        output.write_bytes(encode_glb(subject, extensions, DRAFT if self.variant != DIFFUSE else ""))
+        output.write_bytes(
+            encode_glb(subject, extensions, DRAFT_NOTICE if self.variant != TRANSMISSION_VARIANT else "")
+        )
         return [output]
 
 
@@ -83,15 +87,20 @@ def _scatter_parameters(volume: Volume) -> Parameters:
     multiscatter = flat_tuple(volume.multiscatter)
     return (
         Parameter("KHR_materials_transmission.transmissionFactor", 1.0, "-", "all light enters the volume"),
-        Parameter("KHR_materials_volume.thicknessFactor", _THICKNESS_M, "m", "above 0 enables the volume"),
-        Parameter(_DISTANCE, volume.distance_m, "m", "the largest mean free path"),
         Parameter(
-            _COLOUR, flat_tuple(volume.colour), "-", "fraction of the light without an event on that path"
+            "KHR_materials_volume.thicknessFactor", _HEAD_THICKNESS_M, "m", "above 0 enables the volume"
+        ),
+        Parameter(_DISTANCE_NAME, volume.distance_m, "m", "the largest mean free path"),
+        Parameter(
+            _COLOUR_NAME,
+            flat_tuple(volume.colour),
+            "-",
+            "fraction of the light without an event on that path",
         ),
         Parameter("KHR_materials_scatter.scatterStrengthFactor", 1.0, "-", "factor of the colour below"),
-        Parameter(_MULTISCATTER, multiscatter, "-", "by van de Hulst's formula, or a map"),
+        Parameter(_MULTISCATTER_NAME, multiscatter, "-", "by van de Hulst's formula, or a map"),
         Parameter("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean free paths are reduced ones"),
-        _IOR,
+        _IOR_PARAMETER,
     )
 
 
@@ -102,28 +111,46 @@ def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Para
     colour : (3,) colour of the transmitted light
     """
     return (
-        Parameter(_BASE, flat_tuple(subject.albedo), "-", "diffuse reflectance; the mean of a colour map"),
-        Parameter(_FACTOR, float(factor), "-", f"transmitted fraction at {_EAR_MM:g} mm, as of an ear"),
-        Parameter(_TRANSMISSION_COLOUR, flat_tuple(colour), "-", "colour of the transmitted light"),
-        _IOR,
+        Parameter(
+            _BASE_COLOUR_NAME,
+            flat_tuple(subject.albedo),
+            "-",
+            "diffuse reflectance; the mean of a colour map",
+        ),
+        Parameter(
+            _TRANSMISSION_FACTOR_NAME,
+            float(factor),
+            "-",
+            f"transmitted fraction at {_EAR_THICKNESS_MM:g} mm, as of an ear",
+        ),
+        Parameter(_TRANSMISSION_COLOUR_NAME, flat_tuple(colour), "-", "colour of the transmitted light"),
+        _IOR_PARAMETER,
     )
 
 
 def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
-    """Return which fraction of the light leaving an ear does so on its far face [-], and its colour (3,).
+    """Return the fraction [-] and the colour (3,) of the light that leaves an ear on its far face.
+
+    The fraction is relative to the light that leaves on both faces.
 
     Source: [ChristensenBurley2015], integrated over a plane at a depth.
     """
     d = fit_burley_width(subject.curve)
-    transmitted = 0.25 * subject.albedo * (np.exp(-_EAR_MM / d) + 3.0 * np.exp(-_EAR_MM / (3.0 * d)))
+    transmitted = (
+        0.25
+        * subject.albedo
+        * (np.exp(-_EAR_THICKNESS_MM / d) + 3.0 * np.exp(-_EAR_THICKNESS_MM / (3.0 * d)))
+    )
     largest = float(transmitted.max())
     reflected = float(subject.albedo[int(transmitted.argmax())])
     return largest / max(largest + reflected, 1e-9), transmitted / max(largest, 1e-9)
 
 
 def _parameter_volume(parameters: Parameters) -> Volume:
-    colour, multiscatter = (np.array(get_numbers(parameters, name)) for name in (_COLOUR, _MULTISCATTER))
-    return Volume(get_numbers(parameters, _DISTANCE)[0], colour, multiscatter)
+    colour, multiscatter = (
+        np.array(get_numbers(parameters, name)) for name in (_COLOUR_NAME, _MULTISCATTER_NAME)
+    )
+    return Volume(get_numbers(parameters, _DISTANCE_NAME)[0], colour, multiscatter)
 
 
 TARGET = Gltf()

@@ -49,9 +49,9 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
 class SubdividedTriangles(NamedTuple):
     """Triangles of a mesh, each divided evenly into smaller ones.
 
-    triangle : (n,) index of the original triangle in which each new vertex is
+    triangle : (n,) index of the original triangle that contains each new vertex
     weights : (n, 3) barycentric weights of each new vertex in that original triangle
-    corners : (m, 3) indices of the new vertices in each new triangle
+    corners : (m, 3) vertex indices of the new triangles, among the new vertices
     """
 
     triangle: NDArray[np.int64]

@@ -69,8 +69,8 @@ def scene_files(
     size : width and height of the picture [pixel]
     samples : samples per pixel
 
-    Raises DermisError for what Mitsuba does not support: lights without shadows, cameras with shifted lenses,
-    and skin that does not enclose a volume.
+    Raises DermisError if the scene has lights without shadows, a camera with a shifted lens, or skin that
+    does not enclose a volume, which Mitsuba does not support.
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
@@ -108,7 +108,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_description(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return Mitsuba's description of the skin's surface, which for index-matched skin is the outer layer.
+    """Return Mitsuba's description of the skin's surface; of index-matched skin, only its outer layer.
 
     boundary : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for 1
@@ -127,7 +127,9 @@ def surface_description(
 
 
 def _lower_surface(dimmed: bool) -> SceneDict:
-    """Return the inner layer of an index-matched surface, which absorbs leaving light where skin is darker.
+    """Return Mitsuba's description of the inner layer of an index-matched surface.
+
+    This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
 
     dimmed : whether the skin has a texture of the absorbed fraction
     """

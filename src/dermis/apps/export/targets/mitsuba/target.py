@@ -38,12 +38,18 @@ from dermis.optics.media import Floats
 from dermis.scene.model import Scene
 from dermis.scene.skin import DEFAULT_ROUGHNESS
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 _BRIGHT_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
 _MAX_SAMPLED_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
-_SIGMA, _ALBEDO, _TRANSMITTANCE, _INDEX, _ALPHA = "sigma_t", "albedo", "passing", "int_ior", "alpha"
-_SIZE, _SAMPLES = (512, 512), 256
+_SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _INDEX_NAME, _ALPHA_NAME = (
+    "sigma_t",
+    "albedo",
+    "passing",
+    "int_ior",
+    "alpha",
+)
+_PICTURE_SIZE, _SAMPLES_PER_PIXEL = (512, 512), 256
 
 
 class Mitsuba(Target):
@@ -62,16 +68,20 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium closest to the reference for the lightest skin, which textures then darken."""
+        """Return the medium fitted to the reference and to the lightest skin; textures darken it."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
         return (
-            Parameter(_SIGMA, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"),
-            Parameter(_ALBEDO, medium.albedo, "-", "of single scattering: not the skin's colour"),
-            Parameter(_TRANSMITTANCE, transmittance, "-", "mean transmittance of the textures, both ways"),
-            Parameter(_INDEX, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
-            Parameter(_ALPHA, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"),
+            Parameter(_SIGMA_NAME, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"),
+            Parameter(_ALBEDO_NAME, medium.albedo, "-", "of single scattering: not the skin's colour"),
+            Parameter(
+                _TRANSMITTANCE_NAME, transmittance, "-", "mean transmittance of the textures, both ways"
+            ),
+            Parameter(_INDEX_NAME, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
+            Parameter(
+                _ALPHA_NAME, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"
+            ),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
@@ -80,13 +90,13 @@ class Mitsuba(Target):
             flat_tuple(1.0 / fit_burley_width(subject.curve)),
             flat_tuple(subject.clipped_albedo()),
         )
-        values = {_SIGMA: extinction, _ALBEDO: albedo, _TRANSMITTANCE: (1.0,) * 3}
+        values = {_SIGMA_NAME: extinction, _ALBEDO_NAME: albedo, _TRANSMITTANCE_NAME: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light incident along the normal."""
         boundary = self._boundary
-        names = _SIGMA, _ALBEDO, _TRANSMITTANCE
+        names = _SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
         curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
         matched = boundary == "matched"
@@ -102,7 +112,9 @@ class Mitsuba(Target):
         appearance = SkinAppearance(
             media, *skin_textures(subject, colours), _opaque_meshes(scene, self.adapter)
         )
-        return write_files(output, scene_files(scene, appearance, self._boundary, _SIZE, _SAMPLES))
+        return write_files(
+            output, scene_files(scene, appearance, self._boundary, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
+        )
 
     @property
     def _boundary(self) -> Boundary:
@@ -112,8 +124,8 @@ class Mitsuba(Target):
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
     """Return the medium whose profile under a surface is closest to `curve`, as bright as the lightest skin.
 
-    Heads are lit from all directions. Under an index-matched surface, oblique light returns up to a quarter
-    more light than light along the normal; refraction removes this difference.
+    Heads are lit from all directions. Under an index-matched surface, skin returns up to a quarter more of
+    oblique light than of light along the normal; under a refracting surface, both are equal.
 
     curve : reference profile
     boundary : surface model of the skin
@@ -148,21 +160,21 @@ def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
 class SkinColours:
     """Colours of a skin: the medium gets the brightest one, and textures dim it to the others.
 
-    mean, peak : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
+    mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
     lightness_ratio : luminance of the lightest texels relative to the mean [-]
     """
 
     mean: Floats
-    peak: Floats
+    brightest: Floats
     lightness_ratio: float
 
     def medium_colour(self, boundary: Boundary) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
-        Under an index-matched surface, textures can only change lightness, so the colour is the mean at peak
-        luminance.
+        Under an index-matched surface, textures can only change lightness, so the colour is the mean colour
+        at the luminance of the lightest texels.
         """
-        return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.peak, 0.97)
+        return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.brightest, 0.97)
 
     def transmittance(self, boundary: Boundary) -> tuple[float, ...]:
         """Return the mean factor (3,) by which the textures dim light that enters and leaves the skin [-]."""
@@ -178,9 +190,11 @@ def skin_colours(subject: Subject) -> SkinColours:
     stride = max(min(texels.shape[:2]) // _MAX_SAMPLED_SIDE, 1)
     samples = texels[::stride, ::stride].reshape(-1, 3).astype(np.float64)
     samples = samples[samples.sum(axis=1) > 0.0]
-    mean, peak = samples.mean(axis=0), np.percentile(samples, _BRIGHT_PERCENTILE, axis=0)
-    ratio = float(np.percentile(samples @ _LUMINANCE, _BRIGHT_PERCENTILE) / (mean @ _LUMINANCE))
-    return SkinColours(mean, np.maximum(peak, mean), max(ratio, 1.0))
+    mean, brightest = samples.mean(axis=0), np.percentile(samples, _BRIGHT_PERCENTILE, axis=0)
+    ratio = float(
+        np.percentile(samples @ _LUMINANCE_WEIGHTS, _BRIGHT_PERCENTILE) / (mean @ _LUMINANCE_WEIGHTS)
+    )
+    return SkinColours(mean, np.maximum(brightest, mean), max(ratio, 1.0))
 
 
 def mean_roughness(subject: Subject) -> float:
@@ -201,7 +215,7 @@ def skin_textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, 
         return roughness, None, None
     texels = maps.colour
     transmittance = np.sqrt(np.clip(texels / colours.medium_colour("rough"), 0.0, 1.0))
-    lightness = texels @ (_LUMINANCE / (colours.medium_colour("matched") @ _LUMINANCE))
+    lightness = texels @ (_LUMINANCE_WEIGHTS / (colours.medium_colour("matched") @ _LUMINANCE_WEIGHTS))
     dimming = 1.0 - np.clip(lightness, 0.0, 1.0)
     return roughness, transmittance.astype(np.float32), dimming.astype(np.float32)
 

@@ -11,9 +11,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-VERSION = "3.0.0"
+SCENE_FORMAT_VERSION = "3.0.0"
 _POINT_KEYS, _VECTOR_KEYS = ("position", "center"), ("direction",)
-_KINDS = {
+_PLUGINS_BY_KIND = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
     "shape": ("rectangle", "sphere", "disk", "ply"),
     "bsdf": ("null", "diffuse", "principled", "dielectric", "roughdielectric", "mask", "roughconductor"),
@@ -26,17 +26,20 @@ _KINDS = {
     "film": ("hdrfilm",),
     "rfilter": ("box", "gaussian"),
 }
-_PLUGIN_KINDS = {plugin: kind for kind, plugins in _KINDS.items() for plugin in plugins}
+_KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() for plugin in plugins}
 
 
 class Transform:
-    """Affine transformation with Mitsuba's convention: a method call applies before the earlier ones."""
+    """Affine transformation, composed as in Mitsuba: each call adds a step that is applied first."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return this transformation after one that puts a camera at `origin`, with +Z towards `target`."""
+        """Return this transformation, preceded by one that moves a camera to `origin`.
+
+        The camera's +Z points towards `target`.
+        """
         forward = _unit(np.subtract(target, origin))
         left = _unit(np.cross(np.asarray(up, np.float64), forward))
         matrix = np.eye(4)
@@ -44,7 +47,7 @@ class Transform:
         return Transform(self.matrix @ matrix)
 
     def scale(self, factors: ArrayLike) -> Transform:
-        """Return this transformation after a scaling along the axes.
+        """Return this transformation, preceded by a scaling along the axes.
 
         factors : one factor, or (3,) factors of x, y and z
         """
@@ -98,7 +101,7 @@ def object_element(description: Mapping[str, object], name: str, backend: XmlBac
     backend : collector of the images that the description contains
     """
     plugin = str(description["type"])
-    node = ET.Element(_PLUGIN_KINDS[plugin], {"type": plugin, **_name_attributes(name, description)})
+    node = ET.Element(_KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(name, description)})
     for key, value in description.items():
         if key not in ("type", "id"):
             node.append(_property_element(key, value, backend))
@@ -115,7 +118,7 @@ def bitmap_path(index: int) -> str:
 
 def scene_document(parts: list[ET.Element]) -> bytes:
     """Return an XML file with a scene of the given elements."""
-    root = ET.Element("scene", {"version": VERSION})
+    root = ET.Element("scene", {"version": SCENE_FORMAT_VERSION})
     root.extend(parts)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)

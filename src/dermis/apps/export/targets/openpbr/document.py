@@ -20,7 +20,7 @@ from dermis.base.errors import refuse
 def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
     """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
 
-    shader : node category of the surfaces, `OPEN_PBR` or `STANDARD`
+    shader : node category of the surfaces, `OPEN_PBR` or `STANDARD_SURFACE`
     prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()

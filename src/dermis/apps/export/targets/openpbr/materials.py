@@ -26,8 +26,8 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 InputValue = float | tuple[float, ...]
 
-OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
-_STANDARD_NAMES: Mapping[str, str] = {
+OPEN_PBR, STANDARD_SURFACE = "open_pbr_surface", "standard_surface"
+_STANDARD_SURFACE_NAMES: Mapping[str, str] = {
     "base_color": "base_color",
     "subsurface_weight": "subsurface",
     "subsurface_color": "subsurface_color",
@@ -42,7 +42,7 @@ _STANDARD_NAMES: Mapping[str, str] = {
 _METRES_PER_MM = 1e-3
 _MAX_NAME_LENGTH = 40
 _EYE_IOR = 1.376
-_ROUGHNESS = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
+_ROUGHNESS_BY_KIND = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
 _DEFAULT_ROUGHNESS = 0.8
 MAP_INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
@@ -58,9 +58,9 @@ LENGTH_INPUTS = ("subsurface_radius",)
 def input_name(shader: str, name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
-    shader : `OPEN_PBR` or `STANDARD`
+    shader : `OPEN_PBR` or `STANDARD_SURFACE`
     """
-    return name if shader == OPEN_PBR else _STANDARD_NAMES[name]
+    return name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[name]
 
 
 class MapType(NamedTuple):
@@ -126,7 +126,9 @@ def skin_material(
 def opaque_material(material: Material) -> OpenPbrMaterial:
     """Return the OpenPBR material of teeth, tongue, lashes or another material of the head except skin."""
     name = material.name.casefold()
-    roughness = next((value for part, value in _ROUGHNESS.items() if part in name), _DEFAULT_ROUGHNESS)
+    roughness = next(
+        (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_ROUGHNESS
+    )
     values: dict[str, InputValue] = {
         "base_color": flat_tuple(material.colour),
         "specular_roughness": roughness,
@@ -137,7 +139,10 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
 
 def eye_material(name: str) -> OpenPbrMaterial:
     """Return the OpenPBR material of an eyeball with a colour map."""
-    values: dict[str, InputValue] = {"specular_roughness": _ROUGHNESS["eye"], "specular_ior": _EYE_IOR}
+    values: dict[str, InputValue] = {
+        "specular_roughness": _ROUGHNESS_BY_KIND["eye"],
+        "specular_ior": _EYE_IOR,
+    }
     return OpenPbrMaterial(name, values, {"base_color": "eye"})
 
 

@@ -16,7 +16,7 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
-    STANDARD,
+    STANDARD_SURFACE,
     file_prefix,
     input_name,
     mesh_materials,
@@ -29,11 +29,11 @@ from dermis.optics.media import Floats, Layer, albedo_from_colour
 from dermis.specular.fresnel import SKIN_ETA
 
 _METRES_PER_MM = 1e-3
-_SHADERS = {
+_SHADER_BY_VARIANT = {
     "open-pbr": OPEN_PBR,
-    "standard-surface": STANDARD,
+    "standard-surface": STANDARD_SURFACE,
     "open-pbr-profile": OPEN_PBR,
-    "standard-surface-profile": STANDARD,
+    "standard-surface-profile": STANDARD_SURFACE,
 }
 
 
@@ -48,7 +48,7 @@ class OpenPbr(Target):
     title = "OpenPBR (MaterialX 1.39)"
     suffixes: ClassVar[tuple[str, ...]] = (".mtlx", "")
     versions = ("1.1.1",)
-    variants = tuple(_SHADERS)
+    variants = tuple(_SHADER_BY_VARIANT)
     needs_maps = True
     limitations = (
         "Correct in renderers with random walks as OpenPBR specifies, and, in the variants for a profile, in "
@@ -61,7 +61,7 @@ class OpenPbr(Target):
     @property
     def shader(self) -> str:
         """Return the node category of the surface: OpenPBR or Standard Surface."""
-        return _SHADERS[self.variant or "open-pbr"]
+        return _SHADER_BY_VARIANT[self.variant or "open-pbr"]
 
     @property
     def is_profile(self) -> bool:
@@ -73,14 +73,14 @@ class OpenPbr(Target):
         if self.is_profile:
             d = fit_burley_width(subject.curve)
             return surface_parameters(subject, self.shader, d, "largest d of the profiles")
-        path = fitted_path_mm(subject)
+        path = fitted_mean_free_path_mm(subject)
         meaning = f"largest mean free path; {profile_error_text(path, subject)}"
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return published diffuse mean free paths as the radius, which is a mean free path in OpenPBR."""
         meaning = "diffuse mean free path, as published"
-        return surface_parameters(subject, self.shader, published_path_mm(subject), meaning)
+        return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the random walk, or MaterialX's Burley profile, for the radii."""
@@ -107,7 +107,7 @@ class OpenPbr(Target):
 def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:
     """Return the parameters of a surface with given subsurface radii.
 
-    shader : node category of the surface, `OPEN_PBR` or `STANDARD`
+    shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
     meaning : meaning of the largest radius, for the report
     """
@@ -141,15 +141,16 @@ def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
     return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
 
 
-def fitted_path_mm(subject: Subject) -> Floats:
+def fitted_mean_free_path_mm(subject: Subject) -> Floats:
     """Return the mean free paths (3,) of the random walk closest to the subject's profile [mm]."""
     return fit_homogeneous_medium(subject.curve, subject.albedo, "walk").mfp_mm
 
 
-def published_path_mm(subject: Subject) -> Floats:
-    """Return the diffuse mean free paths (3,) of the tissue, or its Burley widths if that is unknown [mm].
+def published_mean_free_path_mm(subject: Subject) -> Floats:
+    """Return the diffuse mean free paths (3,) of the tissue by the dipole model [mm].
 
-    The mean free paths are 1 / sigma_tr of the lowest layer, [Jensen2001].
+    They are 1 / sigma_tr of the lowest layer, [Jensen2001]. If its coefficients are not given for RGB, the
+    widths of the closest Burley profiles are returned instead.
     """
     layer = lowest_layer(subject)
     if layer is None:
@@ -168,8 +169,8 @@ def lowest_layer(subject: Subject) -> Layer | None:
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
-    The albedo is given by van de Hulst's formula. The energy is the subject's, times the error of that
-    formula.
+    The albedo is given by van de Hulst's formula. The energy is set by `Subject.rescale_energy`, so that it
+    includes the error of this formula.
 
     colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]
@@ -178,7 +179,7 @@ def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativePr
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the cumulative Burley profile by MaterialX's specification, in which the radius is its width d.
+    """Return the cumulative profile by MaterialX's specification, where the radius is Burley's width d.
 
     mfp_mm : (3,) exported radii [mm]
     """

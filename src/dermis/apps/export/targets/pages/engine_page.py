@@ -29,11 +29,11 @@ Json = dict[str, object]
 _CDN_URL = "https://cdn.jsdelivr.net/npm"
 _MAX_SCRIPT_BYTES = 32 << 20
 _METRES_PER_MM = 1e-3
-_SHADOW_SIDE = 2048
+_SHADOW_MAP_SIDE = 2048
 _WARM_FRAMES = 4  # frames until all shaders are compiled
 _LOAD_ERROR = "{} could not be loaded from {}. Check the network, or export again with --library."
 _TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
-_HERE = Path(__file__).parent
+_PAGE_FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,9 @@ class EnginePage(Target):
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page with the head, its parameters, camera and lights."""
         libraries, sources = self.library_elements(version)
-        script = (_HERE / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")
+        script = (_PAGE_FOLDER / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")
         text = render_page(
-            _HERE,
+            _PAGE_FOLDER,
             title=f"{subject.name} in {self.title}",
             note=f"{self.title} {version} ({self.licence}). {self.limitations}",
             script=escape_script(script),
@@ -131,7 +131,7 @@ class EnginePage(Target):
             "camera": page_camera(scene, centre_mm),
             "lights": [page_light(light) for light in scene.lights],
             "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
-            "shadow_side": _SHADOW_SIDE,
+            "shadow_side": _SHADOW_MAP_SIDE,
             "warm_frames": _WARM_FRAMES,
             "smooth": True,
             "no_library": _LOAD_ERROR.format(self.title, self.library_files[version][0].url),
@@ -180,7 +180,7 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light(light: Light) -> Json:
-    """Return a light as JSON: a directional light with the irradiance that the light has at the head."""
+    """Return a light as the JSON of a directional light that has the same irradiance at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

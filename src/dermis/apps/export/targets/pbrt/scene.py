@@ -28,7 +28,7 @@ from dermis.scene.lights import (
 
 DirectiveParameters = Mapping[str, ArrayLike]
 Lines = list[str]
-SIDE, SAMPLES = 1024, 256
+PICTURE_SIDE, SAMPLES_PER_PIXEL = 1024, 256
 _MAX_BOUNCES = 100
 
 
@@ -61,14 +61,14 @@ def camera_lines(camera: Camera, file: str) -> Lines:
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
     film: DirectiveParameters = {
         "string filename": file,
-        "integer xresolution": SIDE,
-        "integer yresolution": SIDE,
+        "integer xresolution": PICTURE_SIDE,
+        "integer yresolution": PICTURE_SIDE,
     }
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
         f"LookAt {_text(vectors)}",
         directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
-        directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES}),
+        directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES_PER_PIXEL}),
         directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
         directive("Film", "rgb", film),
     ]
@@ -77,11 +77,11 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """Return the directives of lights and environment, omitting with a note those that pbrt lacks."""
     lines = Lines()
-    for number, light in enumerate(supported_lights(lights, PBRT, "pbrt"), start=1):
-        if PBRT[light.kind] is _unsupported:
+    for number, light in enumerate(supported_lights(lights, PBRT_LIGHTS, "pbrt"), start=1):
+        if PBRT_LIGHTS[light.kind] is _unsupported:
             notify(f"pbrt has no {light.kind} light, so light {number} is omitted")
             continue
-        lines += ["AttributeBegin", *PBRT[light.kind](light), "AttributeEnd"]
+        lines += ["AttributeBegin", *PBRT_LIGHTS[light.kind](light), "AttributeEnd"]
     if environment is not None and environment.name != UNIFORM:
         notify(f"the panorama {environment.name} is omitted, as pbrt uses another projection")
     elif environment is not None:
@@ -156,7 +156,7 @@ def _unsupported(light: StripeLight) -> Lines:
     return []
 
 
-PBRT: Registry[Callable[[Any], Lines]] = Registry(
+PBRT_LIGHTS: Registry[Callable[[Any], Lines]] = Registry(
     "light of pbrt",
     {
         "point": _point,

@@ -13,7 +13,7 @@ from dermis.apps.export.fitting import fit_scale, scale_lengths
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
 from dermis.apps.export.targets.openpbr.materials import encode_map_files, file_prefix, map_arrays
-from dermis.apps.export.targets.openpbr.target import published_path_mm
+from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
 from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -26,12 +26,18 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float64]
 
 _ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
-_FIRST_RADIUS, _GROWTH = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
+_FIRST_RADIUS, _RADIUS_RATIO = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
 _ALBEDO_DENSITY = 8.0
-_TEXTURES = {"colour": ("spectrum", "sRGB", "reflectance"), "roughness": ("float", "linear", "roughness")}
-_REFLECTANCE, _PATH = "reflectance", "mfp"
+_TEXTURES_BY_ROLE = {
+    "colour": ("spectrum", "sRGB", "reflectance"),
+    "roughness": ("float", "linear", "roughness"),
+}
+_REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
 _OPAQUE_ROUGHNESS = 0.3  # materials other than skin
-_BALL_DISTANCE, _BALL_FRAME = 10.0, 1.4  # camera distance and visible height, relative to the ball
+_RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
+    10.0,
+    1.4,
+)  # camera distance and visible height, relative to the ball
 
 
 class DiffusionTable(NamedTuple):
@@ -40,7 +46,7 @@ class DiffusionTable(NamedTuple):
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
     reflectance : (n,) diffuse reflectance at each albedo
-    reflectance_within : (n, m) part of the diffuse reflectance that leaves within each radius
+    reflectance_within : (n, m) part of `reflectance` that is due to light leaving within each radius
     """
 
     albedo: Floats
@@ -49,7 +55,7 @@ class DiffusionTable(NamedTuple):
     reflectance_within: Floats
 
     def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Return the reflectance within radii for the albedo whose total reflectance is `reflectance`.
+        """Return the part of `reflectance` that is due to light leaving within given radii [-].
 
         radius : radii [mean free paths]
         """
@@ -68,7 +74,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
     """
-    radius = np.concatenate([[0.0], _FIRST_RADIUS * _GROWTH ** np.arange(_RADIUS_COUNT - 1)])
+    radius = np.concatenate([[0.0], _FIRST_RADIUS * _RADIUS_RATIO ** np.arange(_RADIUS_COUNT - 1)])
     steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)
     albedo = np.expm1(-_ALBEDO_DENSITY * steps) / np.expm1(-_ALBEDO_DENSITY)
     multiple = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
@@ -86,7 +92,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
     decay = np.sqrt((1.0 - albedo) / D)
     first, second = internal_moment(1, eta), internal_moment(2, eta)
     boundary = -2.0 * D * (1.0 + 3.0 * second) / (1.0 - 2.0 * first)
-    real = _depths()[:, None]
+    real = _sample_depths()[:, None]
     image = 2.0 * boundary - real
     near, far = np.hypot(radius, real), np.hypot(radius, image)
     fluence = (np.exp(-decay * near) / near - np.exp(-decay * far) / far) / D
@@ -105,7 +111,7 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
     critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
-    depth = critical_depth + _depths()[:, None]
+    depth = critical_depth + _sample_depths()[:, None]
     path = np.hypot(radius, depth)
     cosine = depth / path
     transmitted = 1.0 - fresnel(cosine, 1.0 / eta)
@@ -113,7 +119,7 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
     return np.asarray(exitance.mean(axis=0) / (4.0 * np.pi))
 
 
-def _depths() -> Floats:
+def _sample_depths() -> Floats:
     return np.asarray(-np.log1p(-(np.arange(_DEPTH_COUNT) + 0.5) / _DEPTH_COUNT))
 
 
@@ -155,12 +161,12 @@ class Pbrt(Target):
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour, and published diffuse mean free paths in place of mean free paths."""
-        return _parameters(subject, published_path_mm(subject), "as published, 1 / sigma_tr")
+        return _parameters(subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
-        reflectance = np.array(get_numbers(parameters, _REFLECTANCE))
-        curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _PATH))
+        reflectance = np.array(get_numbers(parameters, _REFLECTANCE_NAME))
+        curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _MFP_NAME))
         return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -188,8 +194,8 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
 def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
-        Parameter(_REFLECTANCE, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_PATH, flat_tuple(path_mm), "mm", meaning),
+        Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
+        Parameter(_MFP_NAME, flat_tuple(path_mm), "mm", meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
@@ -202,7 +208,11 @@ def _ball_scene(ball: Head) -> Scene:
     """Return a scene that shows a ball in the middle of the picture, for a skin without a head."""
     x, y, z = (float(one) for one in -np.array(ball.centre_mm))
     size = float(ball.mesh.size_mm[1])
-    camera = Camera(position=(x, y, z + _BALL_DISTANCE * size), target=(x, y, z), frame_mm=_BALL_FRAME * size)
+    camera = Camera(
+        position=(x, y, z + _RELATIVE_BALL_DISTANCE * size),
+        target=(x, y, z),
+        frame_mm=_RELATIVE_BALL_FRAME * size,
+    )
     return Scene(ball, camera=camera)
 
 
@@ -238,7 +248,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 
     material_textures : type and texture or file of each material parameter with a map, see `SkinTextures`
     """
-    types = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
+    types = {_REFLECTANCE_NAME: "rgb", _MFP_NAME: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
     for one in parameters:
         input_type, value = material_textures.get(one.name, (types.get(one.name, "float"), one.value))
@@ -285,7 +295,7 @@ def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
         if role == "normal":
             textures.material_textures["normalmap"] = "string", file
             continue
-        texture_type, encoding, parameter = _TEXTURES[role]
+        texture_type, encoding, parameter = _TEXTURES_BY_ROLE[role]
         options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
         textures.lines.append(directive(f'Texture "{role}" "{texture_type}"', "imagemap", options))
         textures.material_textures[parameter] = "texture", role

@@ -28,12 +28,17 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
 
-_COLOUR, _MULTIPLIER, _SCALE, _IOR = "scatteringDistance", "scatteringDistanceMultiplier", "worldScale", "ior"
-_TRANSMISSION, _THICKNESS = "transmissionTint", "thicknessRemap"
-_SKIN_IOR, _MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
+_COLOUR_NAME, _MULTIPLIER_NAME, _SCALE_NAME, _IOR_NAME = (
+    "scatteringDistance",
+    "scatteringDistanceMultiplier",
+    "worldScale",
+    "ior",
+)
+_TRANSMISSION_NAME, _THICKNESS_NAME = "transmissionTint", "thicknessRemap"
+_SKIN_IOR, _RELATIVE_MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
 _NAIVE_MULTIPLIER_MM = 1.0
-_BEFORE_14 = "12"
-_FILE_VERSIONS = {_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multiplier
+_VERSION_BEFORE_14 = "12"
+_FILE_VERSIONS = {_VERSION_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multiplier
 
 
 class Unity(Target):
@@ -55,22 +60,30 @@ class Unity(Target):
         d = fit_burley_width(subject.curve)
         return (
             *_scattering_distances(d, version),
-            Parameter(_SCALE, 1.0, "m", "metres per scene unit"),
-            Parameter(_IOR, _SKIN_IOR, "-", "of the specular reflection"),
-            Parameter(_TRANSMISSION, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
-            Parameter(_THICKNESS, (0.0, _MAX_THICKNESS * float(d.max())), "mm", "range of a thickness map"),
+            Parameter(_SCALE_NAME, 1.0, "m", "metres per scene unit"),
+            Parameter(_IOR_NAME, _SKIN_IOR, "-", "of the specular reflection"),
+            Parameter(_TRANSMISSION_NAME, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
+            Parameter(
+                _THICKNESS_NAME,
+                (0.0, _RELATIVE_MAX_THICKNESS * float(d.max())),
+                "mm",
+                "range of a thickness map",
+            ),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
         colour = flat_tuple(subject.clipped_albedo())
-        values: dict[str, ParameterValue] = {_COLOUR: colour, _MULTIPLIER: _NAIVE_MULTIPLIER_MM}
+        values: dict[str, ParameterValue] = {_COLOUR_NAME: colour, _MULTIPLIER_NAME: _NAIVE_MULTIPLIER_MM}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that HDRP derives from scattering colour and multiplier."""
-        colour, scale = np.array(get_numbers(parameters, _COLOUR)), get_numbers(parameters, _SCALE)[0]
-        multiplier = 1.0 if version == _BEFORE_14 else get_numbers(parameters, _MULTIPLIER)[0]
+        colour, scale = (
+            np.array(get_numbers(parameters, _COLOUR_NAME)),
+            get_numbers(parameters, _SCALE_NAME)[0],
+        )
+        multiplier = 1.0 if version == _VERSION_BEFORE_14 else get_numbers(parameters, _MULTIPLIER_NAME)[0]
         return burley_curve(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -86,21 +99,23 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 
     d_mm : (3,) widths of the Burley profiles [mm]
     """
-    if version == _BEFORE_14:
-        return (Parameter(_COLOUR, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
+    if version == _VERSION_BEFORE_14:
+        return (Parameter(_COLOUR_NAME, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
     profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
-        Parameter(_COLOUR, profile.scattering_colour, "-", "d relative to its largest channel, linear"),
-        Parameter(_MULTIPLIER, profile.multiplier_mm, "mm", "largest d of the channels"),
+        Parameter(_COLOUR_NAME, profile.scattering_colour, "-", "d relative to its largest channel, linear"),
+        Parameter(_MULTIPLIER_NAME, profile.multiplier_mm, "mm", "largest d of the channels"),
     )
 
 
 def asset_text(name: str, parameters: Parameters, version: str) -> str:
     """Return the YAML of the asset; the editor adds the profile's hash when it first opens it."""
     values = {one.name: one.value for one in parameters}
-    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR, _TRANSMISSION))
-    low, high = get_numbers(parameters, _THICKNESS)
-    multiplier = f"    {_MULTIPLIER}: {values[_MULTIPLIER]:.6g}\n" if _MULTIPLIER in values else ""
+    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
+    low, high = get_numbers(parameters, _THICKNESS_NAME)
+    multiplier = (
+        f"    {_MULTIPLIER_NAME}: {values[_MULTIPLIER_NAME]:.6g}\n" if _MULTIPLIER_NAME in values else ""
+    )
     template = Template(Path(__file__).with_name("profile.asset").read_text("utf-8"))
     return template.substitute(
         name=json.dumps(name),
@@ -109,8 +124,8 @@ def asset_text(name: str, parameters: Parameters, version: str) -> str:
         tint=tint,
         low=f"{low:.6g}",
         high=f"{high:.6g}",
-        scale=f"{values[_SCALE]:.6g}",
-        ior=f"{values[_IOR]:.6g}",
+        scale=f"{values[_SCALE_NAME]:.6g}",
+        ior=f"{values[_IOR_NAME]:.6g}",
         form=_FILE_VERSIONS[version],
     )
 

@@ -28,13 +28,13 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
 
-ALBEDO, COLOUR, DISTANCE = "surface_albedo", "mean_free_path_color", "mean_free_path_distance"
-SCALE, DEPTH_SCALE = "world_unit_scale", "distance_scale"
+ALBEDO_NAME, COLOUR_NAME, DISTANCE_NAME = "surface_albedo", "mean_free_path_color", "mean_free_path_distance"
+SCALE_NAME, DEPTH_SCALE_NAME = "world_unit_scale", "distance_scale"
 _MIN_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
 _MIN_ENGINE_COLOUR = 0.009  # lower limit that the engine applies
 _MM_PER_CM = 10.0
-_IMPORTED = "colour", "normal", "roughness"
-_BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
+_IMPORTED_MAPS = "colour", "normal", "roughness"
+_VERSIONS_BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
 class Unreal(Target):
@@ -43,7 +43,7 @@ class Unreal(Target):
     name = "unreal"
     title = "Unreal Engine"
     suffixes = ("", ".py")
-    versions = (*_BEFORE_58, "5.8")
+    versions = (*_VERSIONS_BEFORE_58, "5.8")
     needs_maps = True
     limitations = (
         "The base colour of the material, not the profile, colours the light. Before 5.8, thicknesses are "
@@ -68,16 +68,21 @@ class Unreal(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that the engine's screen-space pass renders."""
-        colour = np.maximum(get_numbers(parameters, COLOUR), _MIN_ENGINE_COLOUR)
-        path = _MM_PER_CM * colour * get_numbers(parameters, DISTANCE)[0] * get_numbers(parameters, SCALE)[0]
-        albedo = np.array(get_numbers(parameters, ALBEDO))
+        colour = np.maximum(get_numbers(parameters, COLOUR_NAME), _MIN_ENGINE_COLOUR)
+        path = (
+            _MM_PER_CM
+            * colour
+            * get_numbers(parameters, DISTANCE_NAME)[0]
+            * get_numbers(parameters, SCALE_NAME)[0]
+        )
+        albedo = np.array(get_numbers(parameters, ALBEDO_NAME))
         return burley_curve(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the editor script, and the maps of a head beside it."""
         file, maps = self.main_file(output, subject), subject.encode_maps()
         names = {role: f"{file.stem}_{role}.png" for role in maps}
-        imported = {role: name for role, name in names.items() if role in _IMPORTED}
+        imported = {role: name for role, name in names.items() if role in _IMPORTED_MAPS}
         file.write_text(_editor_script(subject, parameters, imported, version), encoding="utf-8")
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
@@ -85,17 +90,19 @@ class Unreal(Target):
 def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     distance = float(np.clip(path_cm.max(), 0.1, _MAX_DISTANCE_CM))
     colour = np.clip(path_cm / distance, _MIN_COLOUR, 1.0)
-    depth = Parameter(DEPTH_SCALE, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1")
+    depth = Parameter(
+        DEPTH_SCALE_NAME, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1"
+    )
     return (
         Parameter("enable_burley", True, "-", "Burley's profile instead of six Gaussians"),
         Parameter("enable_mean_free_path", True, "-", "else the editor converts these values on loading"),
-        Parameter(ALBEDO, flat_tuple(albedo), "-", "A of s(A); does not affect the colour"),
+        Parameter(ALBEDO_NAME, flat_tuple(albedo), "-", "A of s(A); does not affect the colour"),
         Parameter(
-            COLOUR, flat_tuple(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"
+            COLOUR_NAME, flat_tuple(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"
         ),
-        Parameter(DISTANCE, distance, "cm", "mean free path at a colour of 1"),
-        Parameter(SCALE, 1.0, "-", "1 for a scene in centimetres"),
-        *(() if version in _BEFORE_58 else (depth,)),
+        Parameter(DISTANCE_NAME, distance, "cm", "mean free path at a colour of 1"),
+        Parameter(SCALE_NAME, 1.0, "-", "1 for a scene in centimetres"),
+        *(() if version in _VERSIONS_BEFORE_58 else (depth,)),
         Parameter("ior", 1.4, "-", "of the specular reflection"),
     )
 

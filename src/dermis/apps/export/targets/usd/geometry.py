@@ -48,7 +48,7 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Return (p,) the index of the first vertex at each point; vertices on uv seams share points."""
+    """Return the index of the first vertex at each point (p,); vertices on a uv seam share points."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
@@ -176,7 +176,7 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """Return rest transforms from each bone to its parent, and bind transforms to the head; (b, 4, 4) [m]."""
+    """Return each bone's rest transform to its parent, and bind transform to the head, (b, 4, 4) [m]."""
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))

@@ -15,7 +15,7 @@ from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_mot
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.head import Head
 
-_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
+_IMAGE_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
 _PREVIEW_INPUTS = {
     "base_color": "diffuseColor",
     "subsurface_color": "diffuseColor",
@@ -23,7 +23,7 @@ _PREVIEW_INPUTS = {
     "specular_ior": "ior",
     "geometry_normal": "normal",
 }
-_UV = "st"
+_UV_PRIMVAR = "st"
 
 
 def build_stage(head: Head, name: str, definitions: Mapping[int, OpenPbrMaterial], prefix: str) -> Usd.Stage:
@@ -105,12 +105,12 @@ def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, pref
         _set_input(surface, key, value)
     if definition.maps:
         uv_node = _add_shader(material, "place", "ND_geompropvalue_vector2")
-        uv_node.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV)
+        uv_node.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV_PRIMVAR)
         uv = uv_node.CreateOutput("out", Sdf.ValueTypeNames.Float2)
     for key, role in definition.maps.items():
         map_type, types = MAP_TYPES[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[map_type.type]
-        image = _add_shader(material, f"{role}_image", _NODES[map_type.type])
+        image = _add_shader(material, f"{role}_image", _IMAGE_NODES[map_type.type])
         file = image.CreateInput("file", types.Asset)
         file.Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
         file.GetAttr().SetColorSpace(map_type.space or "raw")
@@ -141,7 +141,7 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
             continue
         if uv is None:
             uv_node = _add_shader(material, "preview_place", "UsdPrimvarReader_float2")
-            uv_node.CreateInput("varname", types.String).Set(_UV)
+            uv_node.CreateInput("varname", types.String).Set(_UV_PRIMVAR)
             uv = uv_node.CreateOutput("result", types.Float2)
         texture = _add_shader(material, f"preview_{role}", "UsdUVTexture")
         texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{role}.png"))

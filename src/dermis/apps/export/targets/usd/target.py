@@ -19,7 +19,7 @@ from dermis.apps.export.targets.openpbr.target import OpenPbr, get_radii_mm
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
 
-_PACKAGE, _BINARY = ".usdz", ".usdc"
+_PACKAGE_SUFFIX, _BINARY_SUFFIX = ".usdz", ".usdc"
 _UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
 
 
@@ -28,7 +28,7 @@ class Usd(OpenPbr):
 
     name = "usd"
     title = "USD with OpenPBR"
-    suffixes = (".usda", _BINARY, ".usd", _PACKAGE, "")
+    suffixes = (".usda", _BINARY_SUFFIX, ".usd", _PACKAGE_SUFFIX, "")
     variants = ()
     limitations = (
         "Correct in renderers that support the MaterialX nodes and random walks as OpenPBR specifies. Others "
@@ -47,14 +47,14 @@ class Usd(OpenPbr):
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the stage, with the maps beside it or in the package."""
         import_extra("pxr", "writing USD")
-        file = self.main_file(output, subject, _BINARY)
+        file = self.main_file(output, subject, _BINARY_SUFFIX)
         prefix = file_prefix(file, subject)
-        if file.suffix.lower() != _PACKAGE:
+        if file.suffix.lower() != _PACKAGE_SUFFIX:
             return [file, *_write_stage(subject, parameters, file, prefix)]
         from pxr import UsdUtils
 
         with TemporaryDirectory(prefix="dermis-") as folder:
-            stage = Path(folder) / f"{prefix}stage{_BINARY}"
+            stage = Path(folder) / f"{prefix}stage{_BINARY_SUFFIX}"
             _write_stage(subject, parameters, stage, prefix)
             if not UsdUtils.CreateNewUsdzPackage(str(stage), str(file)):
                 refuse(output.name, "a package that USD can write", "it failed", "Write a .usdc instead")

@@ -115,8 +115,8 @@ class PageRequest:
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : called for each kind of adapter with its renderer, scene and settings, when the renderer has
-        the maps that the page will decode; tests compare its pictures with the page's
+    on_renderer : called for each kind of adapter with its renderer, scene and settings, after the renderer's
+        maps were replaced by those that the page will decode; tests compare its pictures with the page's
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -166,7 +166,7 @@ def _frame_changes(
     base: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
-    """Return by slider how the records and buffers of a frame differ at each of its nodes.
+    """Return, by slider, the changes of a frame's records and buffers at each node of the slider.
 
     base : inputs of the frame with all sliders at their defaults
     """
@@ -191,7 +191,7 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the index of the colour map, and by slider the pictures that replace it at the nodes."""
+    """Return the index of the colour map and, by slider, the pictures that replace it at the nodes."""
     number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if number is None:
         return {}

@@ -168,21 +168,22 @@ def _camel_case(name: str) -> str:
 
 
 def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
-    """Return the sorted indices of resources that a frame reads before writing, whose data the page stores.
+    """Return the sorted indices of the resources that a frame reads before it writes them.
 
-    Views are replaced by their textures, so that a texture counts as written if any part of it is.
+    The page stores the data of these resources. Views are replaced by their textures, so that a texture
+    counts as written if any part of it is.
     """
     found: set[int] = set()
     for frame in frames:
         written: set[int] = set()
         for one in frame.passes:
-            found |= {base_resource(capture, k) for k in read_resources(capture, one)} - written
-            written |= {base_resource(capture, k) for k in written_resources(capture, one)}
+            found |= {base_resource(capture, k) for k in resources_read_by(capture, one)} - written
+            written |= {base_resource(capture, k) for k in resources_written_by(capture, one)}
     return sorted(found)
 
 
 def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
-    """Return the resources that shaders bind under one of the given names: that name by resource index."""
+    """Return, by resource index, the name under which shaders bind a resource, if it is one of `names`."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
@@ -191,14 +192,14 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
 
 
 def base_resource(capture: FrameCapture, number: int) -> int:
-    """Return the index of the texture of a texture view; any other resource index is returned unchanged.
+    """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
     number : resource index
     """
     return int(capture.resources[number].get("of", number))
 
 
-def read_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_read_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
     one : the pass
@@ -208,7 +209,7 @@ def read_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
         yield int(one.raster["indices"])
 
 
-def written_resources(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_written_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
     one : the pass

@@ -21,10 +21,10 @@ from dermis.mesh.maps import Maps
 Halves = NDArray[np.float16]
 PictureKey = tuple[str, int, int]
 """Role, mip level and layer of a picture."""
-MIN_SIDE = 64
+MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
-_STEPS = 256
+_VALUE_LEVELS = 256
 _COLOUR_CHANNELS = 3
 
 
@@ -69,7 +69,7 @@ def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     limits = np.array([values.min(), values.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
-    root = np.linspace(first, last, _STEPS)
+    root = np.linspace(first, last, _VALUE_LEVELS)
     return np.asarray(np.sign(root) * root * root)
 
 
@@ -123,16 +123,18 @@ class MapPictures:
         for number, role in _picture_textures(capture, frames).items():
             texture, description = capture.resource_at(number), capture.resources[number]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
-            mips = 1 if storable else sum(side >> mip >= MIN_SIDE for mip in range(description["mips"]))
-            levels = [self._decoded_layers(capture, number, role, mip) for mip in range(mips)]
+            mips = (
+                1 if storable else sum(side >> mip >= MIN_PICTURE_SIDE for mip in range(description["mips"]))
+            )
+            levels = [self._add_pictures(capture, number, role, mip) for mip in range(mips)]
             small_mips = range(mips, description["mips"] if mips > 1 else 0)
             levels += [read_texels(capture, number, mip) for mip in small_mips]
             update_map(renderer, texture, levels)
             maps[number] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
         return maps
 
-    def _decoded_layers(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
-        """Return the (l, h, w, c) texels of a mip level as decoded from its pictures, which are added.
+    def _add_pictures(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
+        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
 
         number : resource index
         mip : mip level
@@ -191,5 +193,5 @@ def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
         number: role
         for number, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
         if capture.resources[number].get("format", "").endswith("16float")
-        and min(capture.resources[number]["size"][:2]) >= MIN_SIDE
+        and min(capture.resources[number]["size"][:2]) >= MIN_PICTURE_SIDE
     }

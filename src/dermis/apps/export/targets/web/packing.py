@@ -15,13 +15,14 @@ ByteRun = tuple[int, int, int, int, int, tuple[float, ...]]
 """Offset and size of a run of bytes, bytes per word, words per row, order of the differences between rows,
 and the step of each float in a row. With 0 bytes per word, the last entry has the indices of runs that are
 concatenated instead."""
-_ESCAPED = frozenset({0, 13, ord("<")})  # characters that HTML changes in, or that end, a script element
-_ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
-_ORDERS = (0, 1, 2)
+_ESCAPED_CHARACTERS = frozenset({0, 13, ord("<")})
+"""Characters that HTML changes in a script element, or that end it."""
+_ROW_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+_DIFFERENCE_ORDERS = (0, 1, 2)
 _SAMPLE_BYTES, _SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
 _SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
-_FAST_LEVEL = 4  # zlib level for the comparison of layouts
-_WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
+_TRIAL_ZLIB_LEVEL = 4  # zlib level for the comparison of layouts
+_WORD_TYPES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
 class Packer:
@@ -58,7 +59,7 @@ class Packer:
         steps : (c,) steps, powers of two
         """
         words = np.rint(values / np.array(steps)).astype(np.int32)
-        layouts = [(4, len(steps), order) for order in _ORDERS]
+        layouts = [(4, len(steps), order) for order in _DIFFERENCE_ORDERS]
         return self._add(words.view(np.uint8).reshape(-1), layouts, steps)
 
     def _add(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
@@ -93,7 +94,7 @@ def encode_seven_bits(data: bytes) -> str:
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
     codes = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
-    return codes.tobytes().decode("ascii").translate({code: code + 256 for code in _ESCAPED})
+    return codes.tobytes().decode("ascii").translate({code: code + 256 for code in _ESCAPED_CHARACTERS})
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
@@ -103,7 +104,7 @@ def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
     word, row : bytes per word and words per row
     order : number of times that rows are replaced by their differences from the previous rows
     """
-    words = raw.view(_WORDS[word]).copy()
+    words = raw.view(_WORD_TYPES[word]).copy()
     for _ in range(order):
         words[row:] -= words[:-row].copy()
     return words.view(np.uint8).reshape(-1, word * row).T.tobytes()
@@ -111,8 +112,10 @@ def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
 
 def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
     yield 1, 1, 0
-    for word, row in ((word, row) for word in _WORDS for row in _ROWS if size % (word * row) == 0):
-        yield from ((word, row, order) for order in _ORDERS)
+    for word, row in (
+        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if size % (word * row) == 0
+    ):
+        yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)
 
 
 def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
@@ -125,4 +128,6 @@ def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, 
         starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) for k in range(_SAMPLE_COUNT)]
         aligned = [start // _SAMPLE_ALIGNMENT * _SAMPLE_ALIGNMENT for start in starts]
         sample = np.concatenate([raw[start : start + _SAMPLE_BYTES] for start in aligned])
-    return min(layouts, key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _FAST_LEVEL)))
+    return min(
+        layouts, key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _TRIAL_ZLIB_LEVEL))
+    )

@@ -21,7 +21,7 @@ from dermis.mesh.pose import Pose
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float32]
-_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
+_SLIDER_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown": "full-frown"}
 """Expression at the upper end of a slider, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
@@ -139,7 +139,7 @@ def _roughness_slider(scene: Scene) -> Slider:
 
 def _expression_sliders(scene: Scene) -> list[Slider]:
     targets = set(scene.head.targets)
-    weights = {slider: expression(name) for slider, name in _EXPRESSIONS.items()}
+    weights = {slider: expression(name) for slider, name in _SLIDER_EXPRESSIONS.items()}
     return [
         Slider(name, (0.0, 1.0), 0.0, (None, replace(scene, pose=Pose(end))), changes_pose_only=True)
         for name, end in weights.items()

@@ -42,9 +42,9 @@ PLAYER_MODULES = (
     "page",
 )
 """Modules of the player, each after the modules that it imports."""
-_HERE = Path(__file__).parent
-_IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
-_EXPORT = re.compile(r"^export ", re.MULTILINE)
+_PAGE_FOLDER = Path(__file__).parent
+_IMPORT_STATEMENT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
+_EXPORT_KEYWORD = re.compile(r"^export ", re.MULTILINE)
 _ATLAS_SIDE = 512
 _MAX_MAP_SIDE = 1024
 
@@ -62,7 +62,7 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
     }
     assert content.poster is not None
     return render_page(
-        _HERE,
+        _PAGE_FOLDER,
         title=title,
         note=note,
         script=escape_script(player_script()),
@@ -76,8 +76,8 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
 
 def player_script() -> str:
     """Return the JavaScript modules of the player joined into one script."""
-    texts = ((_HERE / f"{name}.js").read_text("utf-8") for name in PLAYER_MODULES)
-    return "".join(_EXPORT.sub("", _IMPORT.sub("", text)) for text in texts)
+    texts = ((_PAGE_FOLDER / f"{name}.js").read_text("utf-8") for name in PLAYER_MODULES)
+    return "".join(_EXPORT_KEYWORD.sub("", _IMPORT_STATEMENT.sub("", text)) for text in texts)
 
 
 def _webp(picture: NDArray[np.uint8]) -> bytes:
