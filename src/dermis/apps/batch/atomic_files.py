@@ -17,7 +17,7 @@ _UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
-    """Return an unused hidden path beside a target, where its content is written before it is renamed."""
+    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to it."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 

@@ -14,10 +14,10 @@ from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera
 
-_SENSOR_MM = 24.0
-_MARGIN = 0.96  # largest distance of the face from the picture's centre; 1 is the edge
+_SENSOR_HEIGHT_MM = 24.0
+_MAX_FACE_EXTENT = 0.96  # largest distance of the face from the picture's centre; 1 is the edge
 _BISECTIONS = 12
-_FACE_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
+_FACE_BOX_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
 """Bounding box of a face: its two corners, relative to the head's centre at rest."""
 Doubles = NDArray[np.float64]
 AimOffset = tuple[float, float]
@@ -31,7 +31,7 @@ def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
     count : number of directions in which an extreme point is searched
     """
     positions = head.control.positions_mm - np.array(head.centre_mm, np.float32)
-    low, high = np.array(_FACE_MM, np.float32)
+    low, high = np.array(_FACE_BOX_MM, np.float32)
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
         inside = np.arange(len(positions))
@@ -54,12 +54,12 @@ def sampled_camera(
     face = head.control.pose_points(points, motion) - np.array(head.centre_mm)
     values = table_numbers(parameters, "camera")
     distance = values["distance_mm"]
-    frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]
+    frame = values.get("frame_mm") or distance * _SENSOR_HEIGHT_MM / values["focal_mm"]
     centre = 0.5 * (face.min(axis=0) + face.max(axis=0))
     axes = _camera_axes(values["yaw_deg"], values["pitch_deg"], values["roll_deg"])
     in_view = (face - centre) @ axes.T  # right, up and towards the camera, relative to the face's centre
     offset = values["offset_x"] * aspect, values["offset_y"]
-    frame *= max(_max_extent(in_view, distance, (0.0, 0.0), frame, aspect) / _MARGIN, 1.0)
+    frame *= max(_max_extent(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_EXTENT, 1.0)
 
     def aim(fraction: float) -> AimOffset:
         """Return the aim offset that moves the face by a fraction of its sampled offset in the picture."""
@@ -67,7 +67,7 @@ def sampled_camera(
 
     fraction, low, high = 1.0, 0.0, 1.0
     for _ in range(_BISECTIONS):  # the first step tries the full offset
-        inside = _max_extent(in_view, distance, aim(fraction), frame, aspect) <= _MARGIN
+        inside = _max_extent(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_EXTENT
         low, high = (fraction, high) if inside else (low, fraction)
         fraction = 0.5 * (low + high)
     return _aim_camera(centre, axes, distance, frame, aim(low))
@@ -78,9 +78,9 @@ def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float
 
     centre : (3,) centre of the face [mm]
     axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
-    distance : distance of the camera from the centre [mm]
-    frame_mm : visible height at the centre if the camera were aimed there [mm]
-    aim : offset of the point to the right and upwards [mm]
+    distance : distance of the camera from the centre of the face [mm]
+    frame_mm : visible height at the centre of the face, for a camera that looks at it [mm]
+    aim : offset of the point from the centre of the face, to the right and upwards [mm]
     """
     scale = math.hypot(distance, *aim) / distance  # keeps the angle of view
     return Camera(

@@ -16,10 +16,10 @@ from multiprocessing.context import SpawnProcess
 
 from dermis.base.errors import DermisError
 
-_CONTEXT = multiprocessing.get_context("spawn")
+_SPAWN_CONTEXT = multiprocessing.get_context("spawn")
 _CAN_BLOCK_SIGNALS = hasattr(signal, "pthread_sigmask")
-_PARENT_EXIT_S = 1.0  # wait for the parent's exit after the pipe has broken
-_BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
+_PARENT_EXIT_TIMEOUT_S = 1.0  # wait for the parent's exit after the pipe has broken
+_BLAS_THREAD_VARIABLES = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
 class LostProcessError(DermisError):
@@ -56,8 +56,8 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
 
     The child ignores Ctrl-C, which a terminal sends to all processes, and uses one thread for linear algebra.
     """
-    parent_pipe, child_pipe = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
+    parent_pipe, child_pipe = _SPAWN_CONTEXT.Pipe()
+    process = _SPAWN_CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
     with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
         process.start()
     child_pipe.close()  # only the child holds it now, so that the parent's end reports its death
@@ -66,7 +66,7 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
 
 def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
     """Return memory that a process started by `start_process` shares; it is freed with the processes."""
-    return _CONTEXT.RawArray(ctypes.c_ubyte, size)
+    return _SPAWN_CONTEXT.RawArray(ctypes.c_ubyte, size)
 
 
 def _run_in_child(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
@@ -76,7 +76,7 @@ def _run_in_child(target: Callable[..., None], pipe: Connection, args: tuple[obj
     try:
         target(pipe, *args)
     except (EOFError, ConnectionError):
-        if connection.wait([parent.sentinel], _PARENT_EXIT_S):
+        if connection.wait([parent.sentinel], _PARENT_EXIT_TIMEOUT_S):
             os._exit(1)  # the pipe broke because the parent exited
         raise
 
@@ -107,7 +107,7 @@ def _single_threaded_blas() -> Iterator[None]:
     By default each process starts a thread per core, and for small linear systems these threads spend most of
     the processor time on waiting.
     """
-    unset = [name for name in _BLAS_THREADS if name not in os.environ]
+    unset = [name for name in _BLAS_THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     try:
         yield

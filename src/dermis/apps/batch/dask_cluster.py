@@ -76,7 +76,10 @@ class DaskCluster:
 
 @contextmanager
 def _shared_marker(out: Path) -> Iterator[Path]:
-    """Create a marker file in the output folder during the block, which shows what workers share the disk."""
+    """Yield a new marker file in the output folder, which every worker that shares the disk can see.
+
+    The file is removed at the end of the block.
+    """
     marker = out.resolve() / f".dermis-{secrets.token_hex(6)}"
     marker.touch()
     try:

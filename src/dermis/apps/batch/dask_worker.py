@@ -24,7 +24,7 @@ from dermis.base.errors import DermisError, DermisWarning
 from dermis.base.private import cache_folder, make_private_folder
 from dermis.gpu.adapters import similar_adapters
 
-_TRIM = "MALLOC_TRIM_THRESHOLD_"
+_TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 """Variable by which dask's nannies return freed memory at once, which makes large arrays slow to allocate."""
 
 
@@ -74,7 +74,7 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: object) -> None:
         """Initialise the state; dask calls this when the plugin is registered with a worker."""
-        os.environ.pop(_TRIM, None)
+        os.environ.pop(_TRIM_VARIABLE, None)
         self._state = _PluginState()
 
     def teardown(self, worker: object) -> None:

@@ -22,13 +22,13 @@ from dermis.formats.samples import SAMPLES
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import read_landmark_table
 from dermis.human.landmarks.sets import LANDMARK_SETS
-from dermis.human.model import CREDIT
+from dermis.human.model import MAKEHUMAN_CREDIT
 from dermis.scene.outputs import OUTPUTS
 
 README_FILE, DESCRIPTION_FILE = "README.md", "dataset.json"
 _MAX_LISTED = 50
 _LABEL_OUTPUTS = "label", "label_face_synthetics"
-_BUILT_IN = {"none", "uniform", "human"}
+_NAMES_WITHOUT_FILES = {"none", "uniform", "human"}
 
 TableRows = Iterable[Sequence[object]]
 
@@ -45,7 +45,7 @@ def write_datasheet(out: Path, spec: Spec) -> None:
         "count": spec.count,
         "seed": spec.seed,
         "size": list(spec.size),
-        "outputs": output_facts(spec),
+        "outputs": output_formats(spec),
         "labels": label_names(spec),
         "landmarks": {name: landmark_names(name, spec) for name in spec.landmarks},
     }
@@ -83,7 +83,7 @@ def _files_table(spec: Spec) -> str:
     alpha = ", with alpha" if "none" in spec.background.kind.support else ""
     outputs = [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
-        for name, one in output_facts(spec).items()
+        for name, one in output_formats(spec).items()
     ]
     rows = [
         ("png", f"picture, sRGB{alpha}", "", "8-bit PNG", ""),
@@ -132,7 +132,7 @@ def _table(columns: Sequence[str], rows: TableRows) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 
 
-class OutputFacts(TypedDict):
+class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
     A value is (level - zero) * step; a step of 1 and a zero of 0 mean that values are stored unscaled.
@@ -147,9 +147,9 @@ class OutputFacts(TypedDict):
     background: float
 
 
-def output_facts(spec: Spec) -> dict[str, OutputFacts]:
+def output_formats(spec: Spec) -> dict[str, OutputFormat]:
     """Return the file format of each output of a spec."""
-    facts: dict[str, OutputFacts] = {}
+    facts: dict[str, OutputFormat] = {}
     for name in spec.outputs:
         output, file = OUTPUTS[name], file_format(name, spec.encoding)
         step, zero = (1.0, 0) if output.quantisation is None or file != "png" else output.quantisation
@@ -185,13 +185,13 @@ def landmark_names(name: str, spec: Spec) -> list[str]:
 
 def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
     """Yield asset, author and licence of every head, person and environment that the spec can render."""
-    author, _, licence = CREDIT.rpartition(", ")
+    author, _, licence = MAKEHUMAN_CREDIT.rpartition(", ")
     yield "people: the parametric human", author, licence
     for parameter in ("person.head", "environment.name"):
         distribution = spec.distributions.get(parameter)
         for name in () if distribution is None else map(str, distribution.support):
             if name in SAMPLES:
                 yield f"{parameter} {name}", SAMPLES[name].attribution, SAMPLES[name].licence
-            elif name not in _BUILT_IN and not name.startswith("human:"):
+            elif name not in _NAMES_WITHOUT_FILES and not name.startswith("human:"):
                 yield f"{parameter} {name}", "a file of the spec", "set by its owner: state it here"
     yield "light, skin and pictures", "computed by dermis (Apache-2.0)", "none is claimed"

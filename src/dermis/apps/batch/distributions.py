@@ -131,17 +131,18 @@ class TruncatedNormal(Distribution):
         """Check the standard deviation and the limits."""
         require(self.sd > 0, "a standard deviation above 0")
         require(self.low < self.high, "a lower limit that is less than the upper limit")
-        below, above = self._tail_probabilities
+        below, above = self._limit_probabilities
         require(
             above - below >= _MIN_PROBABILITY,
             f"limits that contain at least {_MIN_PROBABILITY:g} of the normal distribution",
         )
 
     @property
-    def _tail_probabilities(self) -> tuple[float, float]:
+    def _limit_probabilities(self) -> tuple[float, float]:
         """Return the cumulative probabilities of the untruncated normal at both limits.
 
-        They are mirrored about the mean if both limits exceed it, as they would cancel near 1.
+        If both limits exceed the mean, they are mirrored about it first: the probabilities are then the upper
+        tails. Near 1, differences of cumulative probabilities would cancel.
         """
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))
@@ -153,7 +154,7 @@ class TruncatedNormal(Distribution):
 
     def quantile(self, probability: float) -> float:
         """Return the number at a cumulative probability between 0 and 1."""
-        below, above = self._tail_probabilities
+        below, above = self._limit_probabilities
         if self.low > self.mean:
             deviation = -float(ndtri(above - probability * (above - below)))
         else:
@@ -244,7 +245,7 @@ _EXPECTED_FORMS = (
     "{normal = [mean, sd]}, {truncated = [mean, sd, low, high]}, {choice = [...], weights = [...]} "
     "and {files = PATTERN}"
 )
-_NUMBERS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
+_NUMERIC_FORMS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
     "uniform": (2, Uniform),
     "log_uniform": (2, lambda low, high: Uniform(low, high, True)),
     "normal": (2, Normal),
@@ -267,8 +268,8 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
         return Constant(float(value))
     table: Mapping[str, object] = value if isinstance(value, Mapping) else {}
     kind = next(iter(table), "")
-    if kind in _NUMBERS and len(table) == 1:
-        count, make = _NUMBERS[kind]
+    if kind in _NUMERIC_FORMS and len(table) == 1:
+        count, make = _NUMERIC_FORMS[kind]
         return make(*_number_list(table[kind], f"{count} numbers in {kind}", count))
     if nested:
         raise ValueError(_EXPECTED_FORMS)

@@ -22,7 +22,8 @@ class EncoderPool:
     """Pool of processes to which images are assigned in turn, to be encoded as files.
 
     count : number of processes; with 0, the calling process encodes
-    encode : function, called with the arguments in a job, that returns an image's number and files; picklable
+    encode : picklable function that takes the arguments in a job and returns the number and the files of an
+        image
     """
 
     def __init__(self, count: int, encode: Callable[..., EncodedImage]) -> None:
@@ -34,7 +35,7 @@ class EncoderPool:
 
         jobs : arguments of `encode` for each image
 
-        Raises LostProcessError if one of the processes dies, and DermisError if `encode` does.
+        Raises LostProcessError if a process dies, and every DermisError that `encode` raises.
         """
         if not self._count:
             yield from (self._encode(*job) for job in jobs)

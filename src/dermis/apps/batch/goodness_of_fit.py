@@ -22,8 +22,8 @@ from dermis.human.expressions import expand_targets
 
 MIN_P_VALUE = 1e-6
 """p-value below which a test fails."""
-_MEAN_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
-_QUANTILES = 10_000  # for the moments of a distribution
+_MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
+_QUANTILE_COUNT = 10_000  # for the moments of a distribution
 _ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
 _MAX_LISTED = 12  # texts
 _MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
@@ -40,7 +40,7 @@ class FitTest(NamedTuple):
     expected, observed : mean and standard deviation of numbers, or probabilities of texts, in the
         distribution and in the samples
     distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
-    expected_distance : mean distance for correct samples of this number; 0 if there is none [-]
+    expected_distance : mean distance of as many samples that follow the distribution; 0 for a single text [-]
     p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 
@@ -140,18 +140,20 @@ def _parameter_test(name: str, distribution: Distribution, values: Samples, spec
 
 
 def _number_test(name: str, distribution: Distribution, values: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted samples, allowing for their rounding to six digits."""
+    """Return the Kolmogorov-Smirnov test of sorted samples that were rounded to six digits."""
     count, error = len(values), _ROUNDING_ERROR * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
     below = np.searchsorted(values, values, "left") / count
     above = up_to - cumulative_probability(distribution, values + error, closed=True)
     under = cumulative_probability(distribution, values - error, closed=False) - below
     distance = float(max(above.max(), under.max(), 0.0))
-    probabilities = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
+    probabilities = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     quantiles: Array = np.array([distribution.quantile(p) for p in probabilities.tolist()], np.float64)
     p_value = float(kolmogorov(sqrt(count) * distance))
     expected, observed = _format_moments(quantiles), _format_moments(values)
-    return FitTest(name, count, expected, observed, distance, float(_MEAN_DISTANCE / sqrt(count)), p_value)
+    return FitTest(
+        name, count, expected, observed, distance, float(_MEAN_SCALED_DISTANCE / sqrt(count)), p_value
+    )
 
 
 def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
@@ -195,7 +197,7 @@ def _format_moments(values: Array) -> str:
 
 
 def _index_column(name: str) -> str:
-    """Return the column of the index with a parameter's samples.
+    """Return the name of the index column that holds a parameter's samples.
 
     A parameter that sets a left and a right morph target has two equal columns, of which this is the first.
     """

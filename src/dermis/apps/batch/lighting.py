@@ -17,7 +17,7 @@ from dermis.scene.lights import Light, RectangleLight, preset_lights
 _PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
 _WHITE_K = 6500.0
 _VECTOR_FIELDS = "position", "target", "direction", "up"
-_LAMPS = "key", "fill", "rim"
+_LAMP_NAMES = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
 
@@ -28,14 +28,14 @@ def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     if not strength:
         return ()
     if parameters["light.kind"] == LAMP_RIG:
-        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMPS)
+        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMP_NAMES)
         return tuple(_area_lamp(lamp, turn_deg, strength) for lamp in lamps)
     presets = _preset_lights(str(parameters["light.kind"]))
     return tuple(_rotate_light(light, turn_deg, strength) for light in presets)
 
 
 def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
-    """Return the unit vector at a yaw from the head's front towards its left, and a pitch upwards."""
+    """Return the unit vector for two angles: yaw from the head's front to its left, and pitch upwards."""
     yaw, pitch = radians(yaw_deg), radians(pitch_deg)
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 

@@ -20,7 +20,7 @@ SHEET_IMAGES = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED = 20_000
 """Number of images from which the statistics of the parameter table are computed."""
-_COLUMNS, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
+_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
 _MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
 _MAX_COLUMN_WIDTH = 60  # characters
 _PERSON_IDS = "person.number", "person.seed"
@@ -83,7 +83,7 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_SIDES.items()}
     spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
     count = min(spec.count, SHEET_IMAGES)
-    columns = min(count, _COLUMNS)
+    columns = min(count, _COLUMN_COUNT)
     rows = -(-count // columns)
     size = columns * (width + _GAP) - _GAP, rows * (height + _GAP) - _GAP
     sheet = Image.new("RGB", size, (20, 20, 20))

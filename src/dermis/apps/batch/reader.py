@@ -34,7 +34,7 @@ Image = dict[str, Any]
 """Ground truth of an image by name, see `read_dataset`."""
 FileReaders = dict[str, Callable[[], bytes]]
 """Functions that read the files of an image, by name or suffix."""
-_RESTORE = "Copy or download it again, or render the shard again"
+_RESTORE_ADVICE = "Copy or download it again, or render the shard again"
 _MAX_SHARD_NUMBER = 10**9
 _FILE_NAME = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_NAME = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
@@ -140,7 +140,7 @@ def read_record(data: bytes, culprit: object) -> Record:
     if len(data) > MAX_TEXT_BYTES:
         refuse(culprit, "a record of an image", f"it has {len(data):,} bytes", "Copy or download it again")
     record: Record = parse_json(data, culprit, "a record of an image")
-    with _record_errors(culprit):
+    with _refuse_malformed_record(culprit):
         if type(record["number"]) is not int:
             raise ValueError("its number is not an integer")
         for name, value in record["parameters"].items():
@@ -171,7 +171,7 @@ def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
 
 def _group_by_image(path: Path, files: FileReaders) -> dict[str, FileReaders]:
     if MANIFEST_NAME not in files:
-        refuse(path, SHARD_DESCRIPTION, "its end is missing", _RESTORE)
+        refuse(path, SHARD_DESCRIPTION, "its end is missing", _RESTORE_ADVICE)
     images: dict[str, FileReaders] = {}
     for name, read in files.items():
         match = _FILE_NAME.fullmatch(name)
@@ -194,7 +194,7 @@ def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
     file.seek(member.offset)
     data = file.read(member.size)
     if len(data) != member.size:
-        refuse(path, SHARD_DESCRIPTION, "it is truncated", _RESTORE)
+        refuse(path, SHARD_DESCRIPTION, "it is truncated", _RESTORE_ADVICE)
     return data
 
 
@@ -235,7 +235,7 @@ def _iterate_images(shards: list[Path], rng: Random | None) -> Iterator[Image]:
                 image = decode_image({suffix: read() for suffix, read in images[key].items()}, path / key)
                 if image["number"] != int(key):
                     actual = f"got that of {image['number']}"
-                    refuse(path / key, f"the record of image {int(key)}", actual, _RESTORE)
+                    refuse(path / key, f"the record of image {int(key)}", actual, _RESTORE_ADVICE)
                 yield image
 
 
@@ -248,7 +248,7 @@ def _pop_file(files: dict[str, object], suffix: str, culprit: object) -> bytes:
 
 def _decode_record(data: bytes, culprit: object) -> Image:
     record = read_record(data, culprit)
-    with _record_errors(culprit):
+    with _refuse_malformed_record(culprit):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
     return image | _decode_pose(record) | {"landmarks": landmarks}
@@ -286,7 +286,7 @@ def _to_array(values: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float
     return array.reshape(shape)
 
 
-def _record_errors(culprit: object) -> AbstractContextManager[None]:
+def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
     """Return a context that turns errors of a malformed record into a DermisError."""
     return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
@@ -300,4 +300,4 @@ def _decode_picture(culprit: object, name: str, kind: str, data: object) -> Arra
         raise DermisError(f"{culprit}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         actual = f"it cannot be decoded ({error_text(fault)})"
-        refuse(culprit, f"a picture as {kind}", actual, _RESTORE)
+        refuse(culprit, f"a picture as {kind}", actual, _RESTORE_ADVICE)

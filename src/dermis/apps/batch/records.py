@@ -20,7 +20,7 @@ NestedNumbers = list[Union["NestedNumbers", float, None]]
 """Array as nested lists; null where a number is not finite."""
 _PIXEL_DIGITS = 3
 _MM_DIGITS = 4
-_UNIT_DIGITS = 8  # rotations and directions
+_DIRECTION_DIGITS = 8  # rotations and directions
 
 
 class CameraRecord(TypedDict):
@@ -79,11 +79,11 @@ def _record(number: int, observation: Observation, parameters: Parameters, spec:
         "parameters": dict(parameters),
         "camera": {
             "K": _rounded_list(camera.K, _MM_DIGITS),
-            "R": _rounded_list(camera.R, _UNIT_DIGITS),
+            "R": _rounded_list(camera.R, _DIRECTION_DIGITS),
             "t": _rounded_list(camera.t, _MM_DIGITS),
         },
-        "head_pose": _rounded_list(observation.head_pose, _UNIT_DIGITS),
-        "gaze": None if gaze is None else _rounded_list(gaze, _UNIT_DIGITS),
+        "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DIGITS),
+        "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DIGITS),
         "landmarks": {
             names.get(path, path): {
                 "pixels": _rounded_list(one.pixels, _PIXEL_DIGITS),

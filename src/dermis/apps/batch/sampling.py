@@ -22,19 +22,19 @@ from dermis.base.tables import read_rows
 from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand_targets
 
 Parameters = dict[str, float | int | str]
-_JAW = "jawOpen"
+_JAW_TARGET = "jawOpen"
 _WEIGHT_POWER = 1.5  # random weights are a uniform number to this power, so that small ones are more frequent
-_BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
+_HASH_BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
 _VARIATION_KEYS = "intensity", "asymmetry", "variation"
-_LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
-_COLOUR = "background.red", "background.green", "background.blue"
-_CONDITIONAL: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
-    (_LAMPS, lambda found: found["light.kind"] == LAMP_RIG),
+_LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
+_BACKGROUND_CHANNELS = "background.red", "background.green", "background.blue"
+_CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
+    (_LAMP_PREFIXES, lambda found: found["light.kind"] == LAMP_RIG),
     (("gaze.yaw_deg", "gaze.pitch_deg"), lambda found: found["gaze.at"] == GAZE_ANGLES),
     (("environment.turn", "environment.strength"), lambda found: found["environment.name"] != NO_ENVIRONMENT),
-    (_COLOUR, lambda found: found["background.kind"] == "colour"),
+    (_BACKGROUND_CHANNELS, lambda found: found["background.kind"] == "colour"),
     ("background.blur", lambda found: found["background.kind"] == "environment"),
     ("camera.frame_mm", lambda found: "camera.focal_mm" not in found),
 )
@@ -52,14 +52,14 @@ def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> di
 def hashed_uniform(seed: int, number: int, name: str) -> float:
     """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
 
-    It is a BLAKE2b hash of the three arguments as text, so that no random number depends on another.
+    It is a BLAKE2b hash of the three arguments as text. Each number is therefore independent of all others.
 
     number : number of the image, or of the person for parameters of people
     name : name of the parameter
     """
     digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
-    step = int.from_bytes(digest, "little") >> (64 - _BITS)
-    return (step + 0.5) / float(1 << _BITS)
+    step = int.from_bytes(digest, "little") >> (64 - _HASH_BITS)
+    return (step + 0.5) / float(1 << _HASH_BITS)
 
 
 def round_significant(value: float) -> float:
@@ -113,8 +113,8 @@ def random_expression(uniform: Callable[[str], float]) -> dict[str, float]:
                 weights |= {name: scale * weight for name, weight in movement.target_weights.items()}
                 jaw_factor *= 1.0 - movement.jaw_closing * amount
             remaining -= movement.probability
-    if _JAW in weights:
-        weights[_JAW] *= jaw_factor
+    if _JAW_TARGET in weights:
+        weights[_JAW_TARGET] *= jaw_factor
     return weights
 
 
@@ -175,7 +175,7 @@ class Sampler:
                 found[name] = self._sample(k, name, distribution)
         if found["background.kind"] == "environment" and found["environment.name"] == NO_ENVIRONMENT:
             found["background.kind"] = "gradient"
-        for prefixes, applies in _CONDITIONAL:
+        for prefixes, applies in _CONDITIONAL_PARAMETERS:
             if not applies(found):
                 found = {name: value for name, value in found.items() if not name.startswith(prefixes)}
         return found | {f"pose.{name}": weight for name, weight in self._target_weights(k, found).items()}

@@ -33,12 +33,12 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_ALL_HAIRS_PIXELS = 1000  # side of pictures with all hairs; a close-up shows 230 mm
+_FULL_HAIR_SIDE = 1000  # side of pictures with all hairs; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
-_SEED, _HEAD = "person.seed", "person.head"
+_SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
 _CACHED_SAMPLED_PEOPLE, _CACHED_FILE_HEADS = 1, 8  # a sampled person is not used again, a named head is
-_NOT_FIELDS = "number", "seed", "head"  # parameters that are not fields of `Human`
+_NON_HUMAN_FIELDS = "number", "seed", "head"  # parameters that are not fields of `Human`
 
 
 @dataclass(frozen=True)
@@ -96,17 +96,19 @@ class SceneBuilder:
         if key not in self._people:
             self._people[key] = self._build_person(parameters)
         self._people.move_to_end(key)
-        while len(self._people) > (_CACHED_FILE_HEADS if _HEAD in parameters else _CACHED_SAMPLED_PEOPLE):
+        while len(self._people) > (
+            _CACHED_FILE_HEADS if _HEAD_PARAMETER in parameters else _CACHED_SAMPLED_PEOPLE
+        ):
             self._people.popitem(last=False)
         return self._people[key]
 
     def _build_person(self, parameters: Parameters) -> _Person:
         size = self.spec.size
-        if _HEAD not in parameters:
+        if _HEAD_PARAMETER not in parameters:
             human = sampled_person(parameters)
             head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_fraction(size))
             skin = skin_of(human)
-        elif Path(name := self._resolve_file(parameters[_HEAD])).suffix.lower() == ".toml":
+        elif Path(name := self._resolve_file(parameters[_HEAD_PARAMETER])).suffix.lower() == ".toml":
             scene, _ = load_scene(name, size=size)
             head, skin = scene.head, scene.skin
         else:
@@ -143,9 +145,9 @@ def sampled_person(parameters: Parameters) -> Human:
         part, _, field = name.partition(".")
         if field:
             appearance.setdefault(part, {})[field] = value
-        elif name not in _NOT_FIELDS:
+        elif name not in _NON_HUMAN_FIELDS:
             fields[name] = value
-    return Human.drawn(int(parameters[_SEED]), **fields, **appearance)
+    return Human.drawn(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
 
 
 @cache
@@ -159,7 +161,7 @@ def _subdivision_levels(size: tuple[int, int]) -> int:
 
 def _hair_fraction(size: tuple[int, int]) -> float:
     """Return the fraction of all hairs to generate: those that a picture of this size [pixel] can resolve."""
-    return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _ALL_HAIRS_PIXELS))
+    return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _FULL_HAIR_SIDE))
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:

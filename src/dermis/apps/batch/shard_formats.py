@@ -81,9 +81,9 @@ def software_versions(adapter: str) -> dict[str, str]:
     return {"adapter": adapter, **versions}
 
 
-_BLOCK = 512
-_END = bytes(2 * _BLOCK)
-_CHUNK = 1 << 20
+_TAR_BLOCK_BYTES = 512
+_END_OF_ARCHIVE = bytes(2 * _TAR_BLOCK_BYTES)
+_CHUNK_BYTES = 1 << 20
 
 
 class TarWriter:
@@ -106,7 +106,7 @@ class TarWriter:
     def finish(self, manifest: bytes) -> None:
         """Append the manifest, flush the archive to the disk and close it."""
         self.add(MANIFEST_NAME, manifest)
-        self._file.write(_END)
+        self._file.write(_END_OF_ARCHIVE)
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
@@ -132,11 +132,11 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
     length, offset = file.seek(0, os.SEEK_END), 0
     while True:
         file.seek(offset)
-        block = file.read(_BLOCK)
-        if block == bytes(_BLOCK):
+        block = file.read(_TAR_BLOCK_BYTES)
+        if block == bytes(_TAR_BLOCK_BYTES):
             return
         member = _parse_header(block, offset)
-        offset = member.offset + member.size + -member.size % _BLOCK
+        offset = member.offset + member.size + -member.size % _TAR_BLOCK_BYTES
         if offset > length:
             raise ValueError("it is truncated")
         yield member
@@ -148,15 +148,15 @@ def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
     Raises ValueError if there is no manifest, or if other bytes follow it.
     """
     length = file.seek(0, os.SEEK_END)
-    start = max(0, length - MAX_MANIFEST_BYTES - 3 * _BLOCK)
+    start = max(0, length - MAX_MANIFEST_BYTES - 3 * _TAR_BLOCK_BYTES)
     file.seek(start)
     tail = file.read()
     header = tail.rfind(MANIFEST_NAME.encode() + b"\0")
-    if header < 0 or (start + header) % _BLOCK:
+    if header < 0 or (start + header) % _TAR_BLOCK_BYTES:
         raise ValueError("it is truncated")
-    member = _parse_header(tail[header : header + _BLOCK], start + header)
+    member = _parse_header(tail[header : header + _TAR_BLOCK_BYTES], start + header)
     manifest = tail[member.offset - start :][: member.size]
-    if tail[header:] != b"".join(_tar_entry(MANIFEST_NAME, manifest)) + _END:
+    if tail[header:] != b"".join(_tar_entry(MANIFEST_NAME, manifest)) + _END_OF_ARCHIVE:
         raise ValueError("it is truncated or damaged")
     return start + header, manifest
 
@@ -165,7 +165,7 @@ def tar_sha256(file: BinaryIO, stop: int) -> str:
     """Return the SHA-256 of a tar file up to an offset, where its manifest starts."""
     digest = hashlib.sha256()
     file.seek(0)
-    while stop > 0 and (piece := file.read(min(_CHUNK, stop))):
+    while stop > 0 and (piece := file.read(min(_CHUNK_BYTES, stop))):
         digest.update(piece)
         stop -= len(piece)
     return digest.hexdigest()
@@ -175,7 +175,7 @@ def _tar_entry(name: str, data: bytes) -> tuple[bytes, bytes, bytes]:
     """Return header, content, and padding to the block size, of a file in a tar archive."""
     head = tarfile.TarInfo(name)
     head.size = len(data)
-    return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _BLOCK)
+    return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _TAR_BLOCK_BYTES)
 
 
 def _parse_header(block: bytes, offset: int) -> TarMember:
@@ -185,7 +185,7 @@ def _parse_header(block: bytes, offset: int) -> TarMember:
         raise ValueError(f"its header at byte {offset} is damaged") from fault
     if head.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or head.size < 0:
         raise ValueError(f"it contains {head.name[:60]!r}, which is not a regular file")
-    return TarMember(head.name, offset + _BLOCK, head.size)
+    return TarMember(head.name, offset + _TAR_BLOCK_BYTES, head.size)
 
 
 class FolderWriter:

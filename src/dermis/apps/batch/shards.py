@@ -49,7 +49,7 @@ def shard_index(path: Path) -> int | None:
 
 
 def image_key(number: int) -> str:
-    """Return the image number as 9 digits, with which the names of all files of the image begin."""
+    """Return the image number as 9 digits; the names of all files of the image begin with it."""
     return f"{number:09d}"
 
 

@@ -30,13 +30,17 @@ from dermis.scene.toml_text import key_text, table_text
 MAX_IMAGES = 10**9
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
-_BACKGROUND = "[background]"
-OUTSIDE_RENDER = {"size": "size, above all tables", "background": _BACKGROUND, "background_blur": _BACKGROUND}
+_BACKGROUND_TABLE = "[background]"
+NON_RENDER_SETTINGS = {
+    "size": "size, above all tables",
+    "background": _BACKGROUND_TABLE,
+    "background_blur": _BACKGROUND_TABLE,
+}
 """Settings that are not keys of [render], and where a spec states them instead."""
 _Weight = Annotated[float, Field(ge=0, le=1)]
-_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
-_MAX_FILES = 100_000
-_MAX_BYTES = 4 << 30
+_TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
+_MAX_MATCHING_FILES = 100_000
+_MAX_HASHED_BYTES = 4 << 30
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
@@ -140,9 +144,9 @@ class Spec(FrozenModel):
         """Return the canonical TOML with all values, which `parse_spec` converts to an equal spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
-        values["render"] = self.render.model_dump(exclude=set(OUTSIDE_RENDER), exclude_none=True)
+        values["render"] = self.render.model_dump(exclude=set(NON_RENDER_SETTINGS), exclude_none=True)
         del values["folder"]
-        return "\n".join([_HEADER, *_toml_lines("", values)])
+        return "\n".join([_TOML_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
         """Return the SHA-256 of the canonical TOML, which identifies the data set."""
@@ -209,8 +213,8 @@ def example_toml() -> str:
 def _parse_render(size: object, table: object) -> Settings:
     if not isinstance(table, Mapping):
         return _build_model(Settings, "render", table)
-    for key in OUTSIDE_RENDER.keys() & table.keys():
-        advice = f"Write it as {OUTSIDE_RENDER[key]}"
+    for key in NON_RENDER_SETTINGS.keys() & table.keys():
+        advice = f"Write it as {NON_RENDER_SETTINGS[key]}"
         refuse(f"render: {key}", "no such key in [render]", "it is given here", advice)
     return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 
@@ -279,13 +283,13 @@ def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
         for path in folder.glob(pattern):
             if is_file(path):
                 names.append(Path(os.path.relpath(path, folder)).as_posix())
-            if len(names) > _MAX_FILES:
+            if len(names) > _MAX_MATCHING_FILES:
                 break
     except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
         actual = f"got {pattern!r} ({fault or type(fault).__name__})"
         refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", actual, "Correct it")
-    if not 0 < len(names) <= _MAX_FILES:
-        actual = f"more than {_MAX_FILES:,} match" if names else "none matches"
+    if not 0 < len(names) <= _MAX_MATCHING_FILES:
+        actual = f"more than {_MAX_MATCHING_FILES:,} match" if names else "none matches"
         refuse(key, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern")
     return FileChoice(pattern, tuple(sorted(names)))
 
@@ -295,7 +299,7 @@ def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
     found = {}
     for name in sorted(set(names)):
         if is_file(folder / name):
-            data = read_file(folder / name, "a file that the spec names", _MAX_BYTES)
+            data = read_file(folder / name, "a file that the spec names", _MAX_HASHED_BYTES)
             found[name] = hashlib.sha256(data).hexdigest()
     return found
 

@@ -25,10 +25,10 @@ from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
 from dermis.scene.skin import Skin
 
-_NOT_SAMPLED = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
-_SEED = "seed"  # an integer that follows from the person
-_LOOKS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
-_ANCESTRY = "person.african", "person.asian", "person.caucasian"
+_UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
+_SEED_FIELD = "seed"  # an integer that follows from the person
+_LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
+_ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 HEAD_NAME = "person.head"
 _MAX_NAME_LENGTH = 100  # characters
 
@@ -71,7 +71,7 @@ def _check_person(sampled: Mapping[str, Distribution]) -> None:
     person_keys = [name for name in sampled if name.startswith("person.") and name != HEAD_NAME]
     if HEAD_NAME in sampled and person_keys:
         refuse(person_keys[0], "sampled people", f"{HEAD_NAME} names heads", "Remove one of the two keys")
-    ancestries = [sampled[name] for name in _ANCESTRY if name in sampled]
+    ancestries = [sampled[name] for name in _ANCESTRY_PARAMETERS if name in sampled]
     if ancestries and not any(min(one.support) > 0 for one in ancestries):  # type: ignore[operator]
         actual = "all of them can be 0 at once"
         advice = "Raise the lower limit of one"
@@ -128,11 +128,11 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
 
 def _check_looks(sampled: Mapping[str, Distribution]) -> None:
     """Refuse parameters of people, skins and morph targets with unknown names or invalid values."""
-    for part, kind in _LOOKS.items():
-        known = [one.name for one in fields(kind) if one.name != _SEED]
+    for part, kind in _LOOK_MODELS.items():
+        known = [one.name for one in fields(kind) if one.name != _SEED_FIELD]
         _check_table(f"person.{part}", sampled, known, kind)
     _check_table("person.targets", sampled, human_targets(), lambda **values: Human(targets=values))
-    known = [name for name in Skin.model_fields if name not in _NOT_SAMPLED]
+    known = [name for name in Skin.model_fields if name not in _UNSAMPLED_SKIN_FIELDS]
     _check_table("skin", sampled, known, Skin)
     for name, distribution in table_values(sampled, "pose").items():
         if any(isinstance(bound, str) or abs(bound) > MAX_WEIGHT for bound in distribution.support):

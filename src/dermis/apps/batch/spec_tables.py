@@ -10,7 +10,7 @@ from pydantic import Field, GetCoreSchemaHandler, model_validator
 from pydantic_core import core_schema
 
 from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution, require
-from dermis.human.makehuman import OLD, YOUNG
+from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.lights import light_presets
 
@@ -69,7 +69,7 @@ class NumberField(DistributionField):
 
 
 class NameField(DistributionField):
-    """Annotation of a field whose samples are names from a list, or any names or files without a list."""
+    """Annotation of a field whose samples are names of a list; without a list, any names or files."""
 
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known
@@ -84,15 +84,16 @@ class NameField(DistributionField):
             raise ValueError(f"one of {', '.join(names)}, no files")
 
 
-_MAX_NAMES = 50
+_MAX_GROUP_SIZE = 50
 _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
 class CorrelationGroup(FrozenModel):
     """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
 
-    Parameters are sampled at the probabilities of correlated normal numbers; a larger normal number gives a
-    larger sample, or a later alternative of a choice.
+    Each parameter gets a standard normal number; these numbers are correlated. The sample is the parameter's
+    quantile at the cumulative probability of its number, so a larger number gives a larger sample, or a later
+    alternative of a choice.
     """
 
     of: tuple[str, ...]
@@ -103,7 +104,9 @@ class CorrelationGroup(FrozenModel):
     @model_validator(mode="after")
     def _check_matrix(self) -> CorrelationGroup:
         count = len(self.of)
-        require(2 <= len(set(self.of)) == count <= _MAX_NAMES, f"2 to {_MAX_NAMES} names, each once")
+        require(
+            2 <= len(set(self.of)) == count <= _MAX_GROUP_SIZE, f"2 to {_MAX_GROUP_SIZE} names, each once"
+        )
         if isinstance(self.correlation, tuple):
             square = [len(row) for row in self.correlation] == [count] * count
             require(square, f"a correlation matrix of {count} rows of {count} numbers")
@@ -123,10 +126,10 @@ class CorrelationGroup(FrozenModel):
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
-        """Return the rows of the Cholesky factor of the correlation matrix by parameter.
+        """Return the row of the correlation matrix's Cholesky factor for each parameter.
 
-        A row has the weights with which independent normal numbers, by name, are summed to the correlated
-        one.
+        A row holds weights by parameter name. The weighted sum of the independent normal numbers of these
+        parameters is the correlated normal number of the row's parameter.
         """
         lower = np.linalg.cholesky(self.matrix)
         return {
@@ -147,40 +150,40 @@ def table_values(values: Mapping[str, T], table: str) -> dict[str, T]:
     return {name.removeprefix(start): one for name, one in values.items() if name.startswith(start)}
 
 
-_ANY_ANGLE = NumberField(-180, 180, "degrees")
-_ELEVATION = NumberField(-85, 85, "degrees: straight above, the yaw is undefined")
-_FRACTION = NumberField(0, 1)
-_AGE = NumberField(YOUNG, OLD, "years: the ages that the human model covers")
-_SIGNED = NumberField(-1, 1, "0 is the average")
-_MELANIN = NumberField(0, 10, "0.3 is blond, 8 black")
-_DISTANCE = NumberField(150, 20_000, "mm: from close-up to telephoto")
-_STRENGTH = NumberField(0, 100, "light cannot be negative")
+_ANGLE_FIELD = NumberField(-180, 180, "degrees")
+_ELEVATION_FIELD = NumberField(-85, 85, "degrees: straight above, the yaw is undefined")
+_FRACTION_FIELD = NumberField(0, 1)
+_AGE_FIELD = NumberField(YOUNG_AGE, OLD_AGE, "years: the ages that the human model covers")
+_SIGNED_FIELD = NumberField(-1, 1, "0 is the average")
+_MELANIN_FIELD = NumberField(0, 10, "0.3 is blond, 8 black")
+_DISTANCE_FIELD = NumberField(150, 20_000, "mm: from close-up to telephoto")
+_STRENGTH_FIELD = NumberField(0, 100, "light cannot be negative")
 _Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(FrozenModel):
-    """Spec table of people: random ones, or heads by name; random seeds determine all omitted keys."""
+    """Spec table of people: random people, whose seed determines all omitted keys, or heads by name."""
 
     head: Annotated[Distribution | None, NameField()] = None
     """Heads in place of sampled people: names as in `dermis render`, or files of people (.json), meshes
     (.glb, .obj, .ply) or scenes (.toml), of which head and skin are used."""
-    age: Annotated[Distribution | None, _AGE] = None
+    age: Annotated[Distribution | None, _AGE_FIELD] = None
     """Age, which also determines skin and hair [years]."""
-    sex: Annotated[Distribution | None, _FRACTION] = None
+    sex: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Sex, from 0 (female) to 1 (male)."""
-    african: Annotated[Distribution | None, _FRACTION] = None
+    african: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of African ancestry; the three ancestries are normalised, and omitted ones are 0."""
-    asian: Annotated[Distribution | None, _FRACTION] = None
+    asian: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of Asian ancestry."""
-    caucasian: Annotated[Distribution | None, _FRACTION] = None
+    caucasian: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of Caucasian ancestry."""
-    weight: Annotated[Distribution | None, _SIGNED] = None
+    weight: Annotated[Distribution | None, _SIGNED_FIELD] = None
     """Body weight, from -1 (lowest) to 1 (highest)."""
-    muscle: Annotated[Distribution | None, _SIGNED] = None
+    muscle: Annotated[Distribution | None, _SIGNED_FIELD] = None
     """Muscle mass, from -1 (lowest) to 1 (highest)."""
-    hair_eumelanin: Annotated[Distribution | None, _MELANIN] = None
+    hair_eumelanin: Annotated[Distribution | None, _MELANIN_FIELD] = None
     """Eumelanin of the hair before greying: 0.3 is blond, 1.3 brown, 8 black."""
-    hair_pheomelanin: Annotated[Distribution | None, _MELANIN] = None
+    hair_pheomelanin: Annotated[Distribution | None, _MELANIN_FIELD] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
     skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
@@ -202,7 +205,7 @@ class ExpressionTable(FrozenModel):
     """Factor of all weights."""
     asymmetry: Annotated[Distribution, NumberField(-1, 1, "1 stills the right side")] = Constant(0.0)
     """Relative increase of the left side's weights and decrease of the right side's [-]."""
-    variation: Annotated[Distribution, _FRACTION] = Constant(0.0)
+    variation: Annotated[Distribution, _FRACTION_FIELD] = Constant(0.0)
     """Random variation of each movement: standard deviation of the logarithm of its weight [-]."""
 
 
@@ -231,36 +234,36 @@ class GazeTable(FrozenModel):
 class CameraTable(FrozenModel):
     """Spec table of the camera; the complete face is always in the picture."""
 
-    distance_mm: Annotated[Distribution, _DISTANCE] = Constant(1100.0)
+    distance_mm: Annotated[Distribution, _DISTANCE_FIELD] = Constant(1100.0)
     """Distance to the centre of the face [mm]."""
-    yaw_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Angle around the head, to its left [degrees]."""
-    pitch_deg: Annotated[Distribution, _ELEVATION] = Constant(0.0)
+    pitch_deg: Annotated[Distribution, _ELEVATION_FIELD] = Constant(0.0)
     """Angle above the head [degrees]."""
-    roll_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    roll_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Rotation of the camera about its axis, clockwise as seen from behind it [degrees]."""
     frame_mm: Annotated[Distribution, NumberField(50, 10_000, "mm: from a nose to a crowd")] = Constant(340.0)
     """Visible height at the head [mm]."""
     focal_mm: Annotated[Distribution | None, NumberField(8, 1200, "mm")] = None
     """Focal length for a sensor 24 mm high, in place of frame_mm [mm]."""
-    offset_x: Annotated[Distribution, _SIGNED] = Constant(0.0)
+    offset_x: Annotated[Distribution, _SIGNED_FIELD] = Constant(0.0)
     """Offset of the face to the right of the picture's centre, relative to half its width [-]."""
-    offset_y: Annotated[Distribution, _SIGNED] = Constant(0.0)
+    offset_y: Annotated[Distribution, _SIGNED_FIELD] = Constant(0.0)
     """Offset of the face above the picture's centre, relative to half its height [-]."""
 
 
 class LampTable(FrozenModel):
     """Spec table of a lamp of the rig: a uniform square area light that faces the head."""
 
-    yaw_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Angle around the head, from its front to its left [degrees]."""
-    pitch_deg: Annotated[Distribution, _ELEVATION] = Constant(0.0)
+    pitch_deg: Annotated[Distribution, _ELEVATION_FIELD] = Constant(0.0)
     """Angle above the head [degrees]."""
     distance_mm: Annotated[Distribution, NumberField(400, 20_000, "mm: outside the face")] = Constant(1300.0)
     """Distance to the centre of the head [mm]."""
     size_mm: Annotated[Distribution, NumberField(10, 3000, "mm: from a torch to a wall")] = Constant(500.0)
     """Side length [mm]."""
-    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
+    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
     """Irradiance at the head, divided by pi."""
     kelvin: Annotated[Distribution, NumberField(1700, 20_000, "K: candle to blue sky")] = Constant(6500.0)
     """Colour temperature; 6500 is white [K]."""
@@ -271,9 +274,9 @@ class LightTable(FrozenModel):
 
     kind: Annotated[Distribution, NameField(lambda: [LAMP_RIG, *light_presets()])] = Constant("studio")
     """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""
-    turn_deg: Annotated[Distribution, _ANY_ANGLE] = Constant(0.0)
+    turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Rotation of all lamps about the upward axis, to the head's left [degrees]."""
-    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
+    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
     """Factor of all lamps' irradiance."""
     key: LampTable = LampTable(yaw_deg=Uniform(-70, 70), pitch_deg=Uniform(-5, 60))
     """Key lamp, the main light."""
@@ -289,9 +292,9 @@ class EnvironmentTable(FrozenModel):
     name: Annotated[Distribution, NameField()] = Constant(NO_ENVIRONMENT)
     """Environment: "none", "uniform", a sample (royal_esplanade, lebombo; downloaded once), or files (.hdr,
     .exr)."""
-    turn_deg: Annotated[Distribution, _ANY_ANGLE] = Uniform(-180, 180)
+    turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Uniform(-180, 180)
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
-    strength: Annotated[Distribution, _STRENGTH] = Constant(1.0)
+    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
     """Factor of its radiance."""
 
 
@@ -300,11 +303,11 @@ class BackgroundTable(FrozenModel):
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUNDS)] = Constant("gradient")
     """"none" for alpha, "gradient", "colour", or "environment", which is a gradient in images without one."""
-    red: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    red: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Red of the colour, linear Rec. 709."""
-    green: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    green: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Green of the colour, linear Rec. 709."""
-    blue: Annotated[Distribution, _FRACTION] = Uniform(0, 0.6)
+    blue: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Blue of the colour, linear Rec. 709."""
-    blur: Annotated[Distribution, _FRACTION] = Constant(0.0)
+    blur: Annotated[Distribution, _FRACTION_FIELD] = Constant(0.0)
     """Roughness with which the environment behind the head is blurred."""

@@ -29,7 +29,7 @@ from dermis.gpu.failures import DeviceError
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_CACHE_FRAMES = 16  # occlusion stays cached for this many images without an environment
+_CACHED_FRAMES = 16  # occlusion stays cached for this many images without an environment
 
 
 class Failure(NamedTuple):
@@ -108,7 +108,7 @@ class Worker:
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
         self._options = options
-        self._renderer = Renderer(adapter, cache_ttl=_CACHE_FRAMES)
+        self._renderer = Renderer(adapter, cache_ttl=_CACHED_FRAMES)
         self._builder = SceneBuilder(options.spec)
         self._encoders = EncoderPool(options.encoders, partial(_encode, options.spec))
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
@@ -206,7 +206,7 @@ class Worker:
             )
 
     def _previous_scene(self, number: int) -> Scene | None:
-        """Return the scene of the image before, if it shows the same person, for motion vectors; or None."""
+        """Return the previous image's scene, for motion vectors, if it shows the same person; else None."""
         spec = self._options.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None

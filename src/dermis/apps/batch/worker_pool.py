@@ -17,7 +17,7 @@ from dermis.gpu.adapters import Adapter, similar_adapters
 
 MAX_ATTEMPTS = 3
 """Attempts to render a shard before the run fails."""
-_MAX_ENCODERS = 8  # per worker: more would wait for the renderer
+_MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 
 
 @dataclass(frozen=True)
@@ -50,15 +50,16 @@ class SlotRequest:
     def slots(self) -> tuple[list[WorkerSlot], int]:
         """Return one slot per worker, with adapters in turn, and the number of encoder processes per worker.
 
-        A software adapter shares the processor cores with Python and the encoders: by default it has one
-        worker per two cores, with as many threads, and the worker encodes its images itself.
+        A software adapter shares the processor cores with Python and the encoders. By default it gets one
+        worker for every two cores, the workers share all cores as threads, and each encodes its images
+        itself.
         """
         adapters, cores = self.adapters(), available_cores()
         software = adapters[0].kind == "CPU"
         default = max(1, cores // 2) if software else len(adapters) * self.workers_per_gpu
         workers = self.workers or default
         threads = max(1, cores // workers) if software else 0
-        encoders = 0 if software else min(_MAX_ENCODERS, max(1, cores // workers - 1))
+        encoders = 0 if software else min(_MAX_ENCODERS_PER_WORKER, max(1, cores // workers - 1))
         slots = [WorkerSlot(f"#{adapters[k % len(adapters)].number}", threads) for k in range(workers)]
         return slots, encoders if self.encoders is None else self.encoders
 
