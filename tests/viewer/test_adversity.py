@@ -12,7 +12,7 @@ import pytest
 import wgpu
 from offscreen_input import InputDriver
 
-from dermis.apps.viewer.state import ATLAS
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME
 from dermis.apps.viewer.windows import _raise_failure
 from dermis.base.errors import DermisError
 from dermis.frame import renderer as renderer_module
@@ -73,7 +73,7 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
     assert allocated_bytes() <= FEW_BYTES * held
 
 
-@pytest.mark.parametrize("how", ["picture", "split", ATLAS, "normals"])
+@pytest.mark.parametrize("how", ["picture", "split", ATLAS_VIEW_NAME, "normals"])
 def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) -> None:
     session = driver.viewer.session
     if how == "split":
@@ -92,7 +92,7 @@ def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) 
     assert np.array_equal(driver.settled(), before)
 
 
-@pytest.mark.parametrize("how", ["split", ATLAS, "minimised"])
+@pytest.mark.parametrize("how", ["split", ATLAS_VIEW_NAME, "minimised"])
 def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDriver], how: str) -> None:
     driver = make_driver()
     session = driver.viewer.session
@@ -100,8 +100,8 @@ def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDrive
         session.split.freeze(session.state)
         session.split.divider_position = 0.2  # away from the hand
         session.change(session.state.with_skin(mix=0.0))
-    elif how == ATLAS:
-        session.change(session.state.with_view(ATLAS))
+    elif how == ATLAS_VIEW_NAME:
+        session.change(session.state.with_view(ATLAS_VIEW_NAME))
     driver.settled()
     move(driver, ON_HEAD[0], kind="pointer_down")
     move(driver, ON_HEAD[0] - 20.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER, InputDriver
 
-from dermis.apps.viewer.state import ATLAS, AtlasView, ViewerState
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, AtlasView, ViewerState
 from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.gpu import download
 
@@ -31,7 +31,7 @@ def test_panning_carries_the_place_along() -> None:
 
 def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
-    shown = state.with_view(ATLAS).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
+    shown = state.with_view(ATLAS_VIEW_NAME).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     image = view_renderer.render_image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), moving=True)
     found = view_renderer.read(image).astype(float)
     assert np.array_equal(found[::2, ::2], found[1::2, 1::2])
@@ -48,7 +48,7 @@ def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -
 
 def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
-    shown = state.with_view(ATLAS).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
+    shown = state.with_view(ATLAS_VIEW_NAME).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     fine, coarse = (
         view_renderer.read(
             view_renderer.render_image(shown, state.scene.camera, (side, side), moving=False)
@@ -61,7 +61,7 @@ def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
 
 def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
-    shown = state.with_view(ATLAS)
+    shown = state.with_view(ATLAS_VIEW_NAME)
     first = view_renderer.read(view_renderer.render_image(shown, state.scene.camera, (64, 64), moving=False))
     rendered = view_renderer.rendered
     near = shown.with_atlas_view(AtlasView(span=0.2))
@@ -77,7 +77,7 @@ def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
 
 def test_wheel_and_drag_move_the_atlas_and_not_the_camera(driver: InputDriver) -> None:
     session = driver.viewer.session
-    driver.choose("show", ATLAS)
+    driver.choose("show", ATLAS_VIEW_NAME)
     whole, camera = driver.settled(), session.state.scene.camera
     assert whole[60, 202:230].max() == whole[60, 202:230].min() == 33  # beside the atlas
     driver.event("wheel", x=350.0, y=240.0, dx=0.0, dy=-1000.0)

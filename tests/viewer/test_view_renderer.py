@@ -12,7 +12,7 @@ import pytest
 from offscreen_input import ADAPTER, SETTINGS
 
 from dermis.apps.viewer.navigation import orbit
-from dermis.apps.viewer.state import ATLAS, ViewerState
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, ViewerState
 from dermis.apps.viewer.view_renderer import QUALITY_LEVELS, ViewRenderer
 from dermis.apps.viewer.views import VIEW_NAMES
 from dermis.frame.renderer import Renderer
@@ -167,7 +167,9 @@ def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState
     assert np.allclose(below + over, whole, atol=1e-5)
 
 
-@pytest.mark.parametrize("view", [view for view in VIEW_NAMES if view not in ("picture", "blur 6", ATLAS)])
+@pytest.mark.parametrize(
+    "view", [view for view in VIEW_NAMES if view not in ("picture", "blur 6", ATLAS_VIEW_NAME)]
+)
 def test_each_view_shows_the_head_and_another_picture(
     view: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:

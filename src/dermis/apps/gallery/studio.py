@@ -78,12 +78,12 @@ class Studio:
         scale : side of the image over that of a panel [-]
         settings : fields of `Settings`
         """
-        from dermis.apps.viewer.state import PARTS
+        from dermis.apps.viewer.state import PART_VIEWS
         from dermis.apps.viewer.views import IntermediateViews
         from dermis.gpu import download
 
-        if view in ("picture", *PARTS):
-            return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)
+        if view in ("picture", *PART_VIEWS):
+            return self.render(scene, scale, parts=PART_VIEWS.get(view, "all"), **settings)
 
         def draw_view() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)

@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dermis.apps.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
-from dermis.apps.viewer.state import ATLAS, AtlasView, UndoHistory, ViewerState
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, AtlasView, UndoHistory, ViewerState
 from dermis.scene.camera import camera_preset
 
 Event = Mapping[str, Any]
 Point = tuple[float, float]
 CAMERA_PRESETS = ("portrait", "three-quarter", "profile", "ear", "cheek")
 """Names of the camera presets that the keys 1 to 5 select."""
-LIGHT_KEY = "Shift"
+LIGHT_DRAG_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
 _MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event, which sums all rotations of a frame
-_LEFT = 1
+_LEFT_BUTTON = 1
 _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs it [logical pixel]
 
 
@@ -69,9 +69,9 @@ class Controls:
     def _press(self, event: Event) -> None:
         self.history.end_gesture()
         self._gesture += 1
-        self._button = int(event.get("button", 0)) or _LEFT
+        self._button = int(event.get("button", 0)) or _LEFT_BUTTON
         self._pointer = event["x"], event["y"]
-        self._pinch = _pinch(event)
+        self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, size: Point) -> None:
         """End a drag at the position of the release, which may differ from that of the last move."""
@@ -81,22 +81,22 @@ class Controls:
         self.history.end_gesture()
 
     def _drag(self, event: Event, size: Point) -> None:
-        pinch, (x0, y0) = _pinch(event), self._pointer
+        pinch, (x0, y0) = _measure_pinch(event), self._pointer
         self._pointer = event["x"], event["y"]
         if pinch or self._pinch:
-            self._two_fingers(pinch, size)
+            self._pan_and_zoom(pinch, size)
             return
         state, side = self.history.state, self._drag_unit(size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
-        if state.view == ATLAS or self._button != _LEFT:
+        if state.view == ATLAS_VIEW_NAME or self._button != _LEFT_BUTTON:
             new_state = _pan(state, right, down)
-        elif LIGHT_KEY in event.get("modifiers", ()):
+        elif LIGHT_DRAG_KEY in event.get("modifiers", ()):
             new_state = drag_light(state, self.light, math.pi * right, -math.pi * down)
         else:
             new_state = state.with_camera(orbit(state.scene.camera, -math.pi * right, math.pi * down))
         self.history.change(new_state, f"drag {self._gesture}")
 
-    def _two_fingers(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
+    def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
         """Pan and zoom with two fingers; lifting one of them does not move the picture.
 
         pinch : midpoint (x, y) and distance of the fingers, None for fewer than two
@@ -116,7 +116,7 @@ class Controls:
         gesture : name of the gesture, which is undone in one step
         """
         state = self.history.state
-        if state.view == ATLAS:
+        if state.view == ATLAS_VIEW_NAME:
             x, y = ((a - 0.5 * b) / self._drag_unit(size) for a, b in zip(pointer, size, strict=True))
             new_state = state.with_atlas_view(state.atlas_view.zoomed(factor, x, y))
         else:
@@ -124,12 +124,12 @@ class Controls:
         self.history.change(new_state, gesture)
 
     def _drag_unit(self, size: Point) -> float:
-        """Return the length by which drags are divided: image height, or shorter side for the atlas view."""
-        return max(1.0, min(size) if self.history.state.view == ATLAS else size[1])
+        """Return the length that drags are divided by: image height, or shorter side for the atlas view."""
+        return max(1.0, min(size) if self.history.state.view == ATLAS_VIEW_NAME else size[1])
 
     def _focus(self, event: Event, size: Point) -> None:
         state, (width, height) = self.history.state, size
-        if state.view == ATLAS:
+        if state.view == ATLAS_VIEW_NAME:
             self.history.change(state.with_atlas_view(AtlasView(state.atlas_view.layer)))
             return
         x, y = 2.0 * event["x"] / width - 1.0, 1.0 - 2.0 * event["y"] / height
@@ -197,14 +197,14 @@ def picture_event(event: Event, left: float) -> Event:
 def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
     """Return the state with its camera, or its part of the atlas, moved along with the pointer.
 
-    right, down : motion of the pointer over the length `Controls._drag_unit`
+    right, down : motion of the pointer, divided by `Controls._drag_unit`
     """
-    if state.view == ATLAS:
+    if state.view == ATLAS_VIEW_NAME:
         return state.with_atlas_view(state.atlas_view.panned(right, down))
     return state.with_camera(pan(state.scene.camera, -right, down))
 
 
-def _pinch(event: Event) -> tuple[float, float, float] | None:
+def _measure_pinch(event: Event) -> tuple[float, float, float] | None:
     """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two."""
     touches = list((event.get("touches") or {}).values())
     if len(touches) < 2:

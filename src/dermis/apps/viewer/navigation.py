@@ -168,11 +168,11 @@ def drag_light(state: ViewerState, index: int, right: float, up: float) -> Viewe
 
 
 def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
-    """Rotate a light around its target in the axes of the camera.
+    """Rotate a light around its target, about the right and up axes of the camera.
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right, up : angles [rad]
+    right, up : angles [rad]; positive ones move a light in front of its target to the right and up on screen
     """
     x, y, _ = camera_axes(camera)
     rotation = _rotation(y, right) @ _rotation(x, -up)

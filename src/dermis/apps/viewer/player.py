@@ -1,4 +1,4 @@
-"""Playback of a motion over the viewer state; where it stops, its pose becomes a step of the undo history."""
+"""Playback of a motion over the viewer state; when paused, its pose becomes a step of the undo history."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class MotionPlayer:
     """Player of a motion, with its current time and the displayed state.
 
     While the motion plays, its current pose replaces that of the state, which other controls can still
-    change. When it stops, that pose becomes a step of the undo history.
+    change. When it pauses or ends, that pose becomes a step of the undo history.
 
     motion : motion to play, None for none
     clock : function that returns the time [s]
@@ -147,7 +147,7 @@ class MotionPlayer:
     def advance(self) -> None:
         """Advance the motion to the current time of the clock.
 
-        Time starts after the first frame, which may take long.
+        The time of the motion starts after the first frame, because that frame may take long.
         """
         now, clip = self._clock(), self.clip if self.is_playing else None
         if clip is None or self._starting:

@@ -18,7 +18,7 @@ REST_POSE = Pose()
 
 
 def target_weight(scene: Scene, target: str) -> float:
-    """Return the weight of a morph target in the pose of a scene; its rest weight without one."""
+    """Return the weight of a morph target in the pose of a scene; its rest weight if the pose sets none."""
     return float(_pose(scene).weights.get(target, _rest_weight(scene.head, target)))
 
 

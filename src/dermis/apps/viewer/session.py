@@ -13,7 +13,14 @@ from tempfile import TemporaryDirectory
 
 from dermis.apps.viewer.controls import Controls, SplitView
 from dermis.apps.viewer.player import MotionFile, MotionPlayer
-from dermis.apps.viewer.state import PARTS, PICTURE, UndoHistory, ViewerState, load_state, save_state
+from dermis.apps.viewer.state import (
+    PART_VIEWS,
+    PICTURE_VIEW_NAME,
+    UndoHistory,
+    ViewerState,
+    load_state,
+    save_state,
+)
 from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.base.errors import DermisError, refuse
 from dermis.formats.samples import SAMPLES, is_available
@@ -23,7 +30,7 @@ from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.skin import Skin
 
-HEAD_FILES = (".glb", ".obj", ".ply", ".json", ".toml")
+HEAD_FILE_SUFFIXES = (".glb", ".obj", ".ply", ".json", ".toml")
 """Suffixes of files that a page may upload: meshes, people and scenes."""
 
 _MAX_RECENT = 8
@@ -169,7 +176,7 @@ class Session:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the state on screen, which is saved and frozen: the current one with the playing motion."""
+        """Return the state on screen: the current state, with the pose of the motion while it plays."""
         return self.player.displayed_state
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
@@ -245,7 +252,7 @@ class Session:
         suffix, view = path.suffix.lower(), self.displayed_state.view
         if suffix not in (".png", ".exr"):
             refuse(f"picture {path}", "a name that ends in .png or .exr", f"got {path.name!r}", "Rename it")
-        if suffix == ".exr" and view not in (PICTURE, *PARTS):
+        if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
         self._write_or_offer(
             path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size)
@@ -278,11 +285,11 @@ def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerSt
     if not state.head:
         expected = "a head from a file or a sample"
         refuse("regions", expected, "it was created in memory", "Write it to a file first")
-    table = {key: value for key, value in state.table.items() if key != "regions"}
+    table = {key: value for key, value in state.head_table.items() if key != "regions"}
     if name != AUTO:
         table["regions"] = name
     for other in known_states:
-        if dict(other.table) == table:
+        if dict(other.head_table) == table:
             return state.with_head(other.scene.head, table, other.scene.skin.rho_s)
     head, skin = head_and_skin(HeadTable(**table), Skin(), Path())
     return state.with_head(head, table, skin.rho_s)

@@ -27,7 +27,7 @@ from dermis.scene.saving import save_scene
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
 from dermis.scene.skin import Pigments
 
-ATLAS = "atlas"
+ATLAS_VIEW_NAME = "atlas"
 """Name of the view that shows the atlas as a flat image."""
 _MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
 
@@ -70,8 +70,8 @@ class AtlasView:
 P = TypeVar("P", bound=FrozenModel)
 Table = Mapping[str, Any]
 """The [head] table of a scene file."""
-PICTURE = "picture"
-PARTS = {"diffuse": "diffuse", "specular": "specular"}
+PICTURE_VIEW_NAME = "picture"
+PART_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that show a part of the reflected light, with the value of `Settings.parts` for each."""
 
 
@@ -90,13 +90,13 @@ class ViewerState:
     scene: Scene
     settings: Settings = field(default_factory=Settings)
     head: Table = field(default_factory=dict)
-    view: str = PICTURE
+    view: str = PICTURE_VIEW_NAME
     rig: str = "studio"
     atlas_view: AtlasView = field(default_factory=AtlasView)
     seconds: float = 0.0
 
     @property
-    def table(self) -> Table:
+    def head_table(self) -> Table:
         """Return the [head] table with the head's subdivision level; empty for a head from memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
@@ -183,7 +183,7 @@ def states_equal(a: ViewerState, b: ViewerState) -> bool:
         scene = state.scene
         scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
         view_values = state.view, state.rig, state.atlas_view, state.seconds
-        return *scene_values, state.settings, state.table, *view_values
+        return *scene_values, state.settings, state.head_table, *view_values
 
     is_head_same = a.scene.head is b.scene.head and poses_equal(a.scene.pose, b.scene.pose)
     return is_head_same and values(a) == values(b)
@@ -202,8 +202,8 @@ def save_state(path: Path, state: ViewerState) -> None:
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was created in memory", "Write it to a file first")
-    parts = state.view if state.view in PARTS else state.settings.parts
-    save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.table)
+    parts = state.view if state.view in PART_VIEWS else state.settings.parts
+    save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.head_table)
 
 
 def _load_named_state(name: str) -> ViewerState:
@@ -244,7 +244,7 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
     Raises DermisError if the file is not a scene.
     """
     table = head_table(path)
-    same_table = current is not None and table in (current.head, current.table)
+    same_table = current is not None and table in (current.head, current.head_table)
     known_head = current.scene.head if current and same_table and not has_region_table(table) else None
     scene, scene_settings = load_scene(path, known_head)
     settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **scene_settings.model_dump(exclude_unset=True)})
@@ -257,11 +257,11 @@ def initial_state(scene: Scene, settings: Settings, head: Table, rig: str) -> Vi
     head : [head] table of a scene file from which the head was loaded
     rig : name of the light preset, empty for custom lights
     """
-    view = settings.parts if settings.parts in PARTS else PICTURE
+    view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME
     return ViewerState(scene, validated_copy(settings, parts="all"), head, view, rig)
 
 
-_MAX_STEPS = 200
+_MAX_UNDO_STEPS = 200
 
 
 class UndoHistory:
@@ -306,7 +306,7 @@ class UndoHistory:
             self._past[-1] = state
         else:
             self._past.append(state)
-            del self._past[: -_MAX_STEPS - 1]
+            del self._past[: -_MAX_UNDO_STEPS - 1]
         self._gesture = gesture
         self._undone.clear()
 

@@ -13,7 +13,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.viewer.state import ATLAS, PARTS, PICTURE, ViewerState, states_equal, validated_copy
+from dermis.apps.viewer.state import (
+    ATLAS_VIEW_NAME,
+    PART_VIEWS,
+    PICTURE_VIEW_NAME,
+    ViewerState,
+    states_equal,
+    validated_copy,
+)
 from dermis.apps.viewer.views import IntermediateViews
 from dermis.base.errors import refuse
 from dermis.frame.rendered_frame import RenderedFrame
@@ -43,16 +50,16 @@ class Quality:
     shadow_size: int
 
 
-_UNLIMITED = 1 << 14
+_NO_LIMIT = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _UNLIMITED, _UNLIMITED, _UNLIMITED),
+    Quality(1.0, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
     Quality(0.5, 1, 256, 512),
     Quality(0.35, 1, 256, 256),
 )
-_FIRST_LEVEL_ON_CPU = 2
+_BEST_LEVEL_ON_CPU = 2
 
 
 class QualityController:
@@ -64,7 +71,7 @@ class QualityController:
     def __init__(self, software: bool) -> None:
         self.software = software
         self._budget_ms = _BUDGET_MS[software]
-        self._level = self._first = _FIRST_LEVEL_ON_CPU if software else 0
+        self._level = self._first = _BEST_LEVEL_ON_CPU if software else 0
         self._streak = 0
 
     @property
@@ -105,7 +112,7 @@ class QualityController:
 
 Images = tuple[Texture, Texture | None]
 """Image of the live state, and that of the frozen state or None."""
-_CACHE_SIZE = 2  # resources for frames in motion and for still frames
+_CACHED_RESOURCES = 2  # resources for frames in motion and for still frames
 _PREPARATION_SIZE = (96, 64)  # size of quick frames that need all shaders
 _TIMED_FRAMES = 120
 _FROZEN_SIDE = "before"  # view with its own light, so that a moving camera relights neither side
@@ -131,7 +138,7 @@ class ViewRenderer:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, cache_size=_CACHE_SIZE, reopens=False)
+        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCES, reopens=False)
         self.quality_controller = QualityController(software=self.renderer.device.adapter.kind == "CPU")
         self.rendered: RenderedFrame | None = None
         self.settings: Settings | None = None
@@ -223,7 +230,9 @@ class ViewRenderer:
 
     def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
         """Return the settings of a frame with quality limits in motion, except for the atlas view."""
-        return self.quality_controller.limited_settings(state.settings, size, moving and state.view != ATLAS)
+        return self.quality_controller.limited_settings(
+            state.settings, size, moving and state.view != ATLAS_VIEW_NAME
+        )
 
     @property
     def is_current(self) -> bool:
@@ -245,7 +254,7 @@ class ViewRenderer:
         image = self._draw(state.with_settings(size=size))
         self._image_inputs = None
         is_linear, rendered = path.suffix.lower() == ".exr", self.rendered
-        if not rendered or state.view not in (PICTURE, *PARTS):
+        if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
             write_png(path, self.read(image))
         elif state.settings.background == "none":
             write_image(path, rendered.linear_rgba()) if is_linear else write_png(path, rendered.rgba8())
@@ -262,21 +271,21 @@ class ViewRenderer:
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, side: str = "") -> Texture:
-        parts = PARTS.get(state.view, state.settings.parts)
+        parts = PART_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
-        if state.view == ATLAS and self._has_atlas_light(state, side):
+        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, side):
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
         self._atlas_state = None
         self.rendered = self.renderer.draw(state.scene, settings, view=side)
         self._atlas_state = state, side
-        if state.view in (PICTURE, *PARTS):
+        if state.view in (PICTURE_VIEW_NAME, *PART_VIEWS):
             return self.rendered.picture.bytes
-        if state.view == ATLAS:
+        if state.view == ATLAS_VIEW_NAME:
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
         return self._views.draw(state.scene, settings, state.view, side)
 
     def _has_atlas_light(self, state: ViewerState, side: str) -> bool:
-        """Return whether the atlas already holds the light of a state, so that no frame is rendered.
+        """Return whether the atlas already holds the light of a state, so that no frame must be rendered.
 
         side : name of the state's side of the divider, empty for the live side
         """
@@ -325,10 +334,10 @@ class HeadPreparation:
         """Forget all preparations, because the renderer has been replaced."""
         self._ready = self._future = self._next = self._held_image = None
 
-    def picture(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Return the last image while the head of a state is being prepared; None when it can be drawn.
+    def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
+        """Start to prepare the head of `state` if it is new; return the last image until it is ready.
 
-        Raises the exception that stopped the preparation, once.
+        Returns None once the state can be drawn. Raises the exception that stopped the preparation, once.
         """
         if self._future is not None:
             if not self._future.done():

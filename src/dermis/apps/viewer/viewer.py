@@ -79,9 +79,9 @@ class BlitProgram(Program):
 
 
 _STILL_AFTER_S = 0.25  # time since the last change after which the picture is refined
-_MAX_STEP_S = 0.2  # of the camera easing per frame
-_MAX_FAILURES = 1  # consecutive failures of the device
-_PANEL_FRAMES = 3  # frames that the panel needs to settle after an event
+_MAX_EASING_STEP_S = 0.2  # of the camera easing per frame
+_MAX_DEVICE_FAILURES = 1  # consecutive failures of the device
+_PANEL_SETTLING_FRAMES = 3  # frames that the panel needs to settle after an event
 _POINTER_EVENTS = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
 _KEY_EVENTS = "key_down", "key_up", "char"
 
@@ -160,7 +160,7 @@ class Viewer:
         session, size = self.session, self._picture_size()
         session.take_head()
         session.player.advance()
-        state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_STEP_S)
+        state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_EASING_STEP_S)
         old_camera = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != old_camera or size != self._last_size:
@@ -183,7 +183,7 @@ class Viewer:
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
-        """Return where to draw the live image, and the frozen image left of the divider.
+        """Return patches that show the live image, and the frozen image left of the divider.
 
         size : width and height of the picture [pixel]
         """
@@ -201,13 +201,13 @@ class Viewer:
     def _render_images(
         self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Images:
-        """Return the live and the frozen image; the last image for a state that cannot be rendered."""
+        """Return the live and the frozen image; if `state` cannot be rendered, the last image and None."""
         import wgpu
 
         session = self.session
         if state is not self._rejected_state:
             try:
-                if held_image := self._preparation.picture(session.view_renderer, state):
+                if held_image := self._preparation.prepare_head(session.view_renderer, state):
                     return held_image, None
                 frozen_state = session.split.frozen_state
                 images = session.view_renderer.render_images(state, frozen_state, camera, size, moving)
@@ -251,18 +251,21 @@ class Viewer:
 
     def _on_event(self, event: Event) -> None:
         kind = event["event_type"]
-        self._panel_frames = _PANEL_FRAMES
+        self._panel_frames = _PANEL_SETTLING_FRAMES
         is_for_panel = self.panel.handle_event(event, self.canvas.get_logical_size())
         if kind == "pointer_down":
             self._on_panel = is_for_panel
         if not (self._on_panel if kind in ("pointer_move", "pointer_up") else is_for_panel):
-            self._on_picture(event)
+            self._on_picture_event(event)
         if kind == "pointer_up":
             self._on_panel = False
         self.canvas.request_draw()
 
-    def _on_picture(self, event: Event) -> None:
-        """Handle an event over the picture; during a drag, its left edge is kept as at the press."""
+    def _on_picture_event(self, event: Event) -> None:
+        """Handle an event over the picture.
+
+        During a drag, positions stay relative to the left edge that the picture had at the press.
+        """
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
         if event["event_type"] == "pointer_down":
@@ -299,7 +302,7 @@ class Viewer:
         with contextlib.suppress(wgpu.GPUError):  # release the texture of the old device
             self._context.unconfigure()
         try:
-            if self._failures > _MAX_FAILURES:
+            if self._failures > _MAX_DEVICE_FAILURES:
                 raise error.lost_twice() if isinstance(error, DeviceLostError) else error
             self.session.view_renderer = ViewRenderer(self._adapter)
             self._preparation.reset()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.viewer.state import ATLAS, PARTS, AtlasView
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, PART_VIEWS, AtlasView
 from dermis.base.errors import refuse
 from dermis.frame.features.post.meter import read_meter
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -36,7 +36,7 @@ LEVEL_VIEWS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 ATLAS_LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
 """Names of the maps over the atlas that the view "atlas" can show."""
 
-VIEW_NAMES = ("picture", *PARTS, *ATLAS_LAYERS, "shadow", "normals", ATLAS)
+VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
 """Names of all views."""
 
 _INTERMEDIATE_SHADER = Path(__file__).parent / "intermediate.wgsl"
@@ -112,7 +112,8 @@ class IntermediateViews:
     def _atlas_layer(self, inputs: FrameInputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
         """Return the texture over the atlas that a view shows, and a scale for its display.
 
-        For light, the scale is the factor to display values; for stretch, the mean number of texels per mm.
+        For light, the scale is the factor by which texels are multiplied for display. For stretch, it is the
+        mean number of texels per mm, and for thickness 1.
         """
         if view in LEVEL_VIEWS:
             level, blur = LEVEL_VIEWS[view], next(iter(inputs.blurs), None)
@@ -156,9 +157,10 @@ class IntermediateViews:
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
     """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
 
-    It is the distance to the nearest source cell of a translucent pair, at most the radius of the search.
+    The thickness is the least depth of a cell below the tangent planes of its source cells, and at most the
+    radius within which source cells are searched.
 
-    target : texture of the cells to fill; cells without pairs are unchanged
+    target : texture to fill, with one texel per cell; cells without pairs are unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rendercanvas.http import HttpRenderCanvas, asgi
 
-from dermis.apps.viewer.session import HEAD_FILES
+from dermis.apps.viewer.session import HEAD_FILE_SUFFIXES
 
-_QUALITY = 88
+_JPEG_QUALITY = 88
 _LOSSLESS_DELAY_S = 0.3
 _TICKET_BYTES = 18
 _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rendered
@@ -56,7 +56,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
     def request_file(self) -> None:
         """Ask the page that has control to let the user choose a file to upload."""
-        asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILES)}, [], self._active_client)
+        asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILE_SUFFIXES)}, [], self._active_client)
 
     def _rc_close(self) -> None:
         if not self._is_closed:  # garbage collection of an old canvas must not close the pages of a newer one
@@ -151,5 +151,5 @@ def encode_image(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
     if lossless:
         image.convert("RGB").save(buffer, "PNG", compress_level=1)
     else:
-        image.save(buffer, "JPEG", quality=_QUALITY, subsampling=0)
+        image.save(buffer, "JPEG", quality=_JPEG_QUALITY, subsampling=0)
     return buffer.getvalue()

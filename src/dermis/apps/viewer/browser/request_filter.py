@@ -112,7 +112,7 @@ class FrameFeedback(_TimedMessage):
     localtime: Seconds = 0.0
 
 
-_MESSAGES: TypeAdapter[Any] = TypeAdapter(
+_MESSAGE_PARSER: TypeAdapter[Any] = TypeAdapter(
     Annotated[
         Pointer | Wheel | Key | TextInput | Resize | VisibilityChange | FrameFeedback,
         Field(discriminator="type"),
@@ -128,7 +128,7 @@ def checked_message(text: object) -> str | None:
     if not isinstance(text, str) or len(text) > _MAX_CHARACTERS:
         return None
     try:
-        message = _MESSAGES.validate_python(parse_json(text, "message", "an event"))
+        message = _MESSAGE_PARSER.validate_python(parse_json(text, "message", "an event"))
         checked_text: str = message.model_dump_json()
     except (DermisError, ValueError):  # invalid JSON, a validation error, or half of a surrogate pair
         return None
@@ -143,11 +143,13 @@ App = Callable[[Message, Receive, Send], Awaitable[None]]
 MAX_PAGES = 8
 """Maximum number of open pages."""
 
-_SCHEMES = {"ws": "http", "wss": "https"}
-_NO_TOKEN = "The token is missing: open the complete URL that dermis view has printed."
-_WRONG_HOST = "This page is not served under this host name: open the URL that dermis view has printed."
-_OTHER_SITE = "Requests of other web sites are not answered."
-_TOO_MANY = "Too many pages are open: close one of them."
+_HTTP_SCHEMES = {"ws": "http", "wss": "https"}
+_NO_TOKEN_REASON = "The token is missing: open the complete URL that dermis view has printed."
+_WRONG_HOST_REASON = (
+    "This page is not served under this host name: open the URL that dermis view has printed."
+)
+_OTHER_SITE_REASON = "Requests of other web sites are not answered."
+_TOO_MANY_PAGES_REASON = "Too many pages are open: close one of them."
 
 
 class RequestFilter:
@@ -171,25 +173,25 @@ class RequestFilter:
         elif scope["type"] == "websocket":
             self._pages += 1
             try:
-                await self._app(scope, _receive_checked(receive), send)
+                await self._app(scope, _drop_invalid_messages(receive), send)
             finally:
                 self._pages -= 1
         else:
             if self._has_query_token(scope):
-                send = self._sending_cookie(send)
+                send = self._add_cookie(send)
             await self._app(scope, receive, send)
 
     def _refusal_reason(self, scope: Message) -> str:
         """Return the reason for which a request is rejected, or an empty string if it is accepted."""
         host = next(iter(_headers(scope, b"host")), "")
         if not self._token and not is_local(_host_name(host)):
-            return _WRONG_HOST  # DNS rebinding: the name of another site resolves to this machine
-        scheme = _SCHEMES.get(scope["scheme"], scope["scheme"])
+            return _WRONG_HOST_REASON  # DNS rebinding: the name of another site resolves to this machine
+        scheme = _HTTP_SCHEMES.get(scope["scheme"], scope["scheme"])
         if any(origin != f"{scheme}://{host}" for origin in _headers(scope, b"origin")):
-            return _OTHER_SITE
+            return _OTHER_SITE_REASON
         if self._token and not self._has_query_token(scope) and not self._has_cookie_token(scope):
-            return _NO_TOKEN
-        return _TOO_MANY if scope["type"] == "websocket" and self._pages >= MAX_PAGES else ""
+            return _NO_TOKEN_REASON
+        return _TOO_MANY_PAGES_REASON if scope["type"] == "websocket" and self._pages >= MAX_PAGES else ""
 
     def _has_query_token(self, scope: Message) -> bool:
         tokens = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
@@ -203,7 +205,7 @@ class RequestFilter:
     def _is_token(self, text: str) -> bool:
         return hmac.compare_digest(text.encode(), self._token.encode())
 
-    def _sending_cookie(self, send: Send) -> Send:
+    def _add_cookie(self, send: Send) -> Send:
         """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
         cookie = f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict".encode()
 
@@ -236,7 +238,7 @@ def _host_name(host: str) -> str:
     return host.partition(":")[0]
 
 
-def _receive_checked(receive: Receive) -> Receive:
+def _drop_invalid_messages(receive: Receive) -> Receive:
     """Return a `receive` function that drops invalid messages of the page."""
 
     async def next_message() -> Message:

@@ -132,7 +132,7 @@ async def prepare_viewer(
 T = TypeVar("T")
 _TOKEN_BYTES = 18
 _MAX_MESSAGE_BYTES = 1 << 16
-_SHUTDOWN_S = 1
+_SHUTDOWN_TIMEOUT_S = 1
 _PAGE_FILES = {"page.css": "css", "page.js": "javascript", "files.js": "javascript", "stage.js": "javascript"}
 RESPONSE_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
@@ -206,7 +206,7 @@ def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uv
         log_level="warning",
         ws_max_size=_MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # images are already compressed
-        timeout_graceful_shutdown=_SHUTDOWN_S,
+        timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT_S,
         server_header=False,
     )
     return uvicorn.Server(config)

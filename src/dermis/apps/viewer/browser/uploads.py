@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from dermis.apps.viewer.browser.canvas import PageCanvas
 from dermis.apps.viewer.browser.request_filter import App, Message, Receive, Send
-from dermis.apps.viewer.session import HEAD_FILES
+from dermis.apps.viewer.session import HEAD_FILE_SUFFIXES
 from dermis.base.errors import DermisError, refuse
 
 MAX_FILE_BYTES = 1 << 28
@@ -63,16 +63,16 @@ class Uploads:
         await send({"type": "http.response.body", "body": answer.encode()})
 
     def _accept(self, name: str, headers: dict[bytes, bytes]) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an uploaded file, one of `HEAD_FILES`, and the function that opens it.
+        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens it.
 
         Raises DermisError for an upload that is not permitted.
         """
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another page sent it", "Close that page")
-        kind = next((one for one in HEAD_FILES if name.lower().endswith(one)), None)
+        kind = next((one for one in HEAD_FILE_SUFFIXES if name.lower().endswith(one)), None)
         if kind is None:
-            kinds = ", ".join(HEAD_FILES)
+            kinds = ", ".join(HEAD_FILE_SUFFIXES)
             refuse(name, f"a mesh, a person or a scene ({kinds})", "it has another suffix", "Convert it")
         if (on_file := self._canvas.on_file) is None:
             refuse(name, "a viewer that is ready", "it is still being prepared", "Send the file again later")

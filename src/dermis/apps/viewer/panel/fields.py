@@ -24,13 +24,13 @@ from dermis.scene.frozen_model import (
 
 FieldsToState = Callable[..., ViewerState]
 ToState = Callable[[Any], ViewerState]
-_LOG_SLIDER = int(imgui.SliderFlags_.logarithmic)
-_HDR_COLOUR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
+_LOG_SLIDER_FLAG = int(imgui.SliderFlags_.logarithmic)
+_HDR_COLOUR_FLAGS = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
-_TALL_LIST = int(imgui.ComboFlags_.height_largest)
+_TALL_LIST_FLAG = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
 _NO_DISPLAY_NAMES: Mapping[str, str] = MappingProxyType({})
-_CUSTOM = "own"
+_CUSTOM_CHOICE = "own"
 _PLOT_HEIGHT = 130.0
 _PLOT_BASE_FLAGS = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
 _PLOT_FLAGS = int(_PLOT_BASE_FLAGS | implot.Flags_.no_inputs | implot.Flags_.no_legend)
@@ -105,23 +105,25 @@ def _draw_field(
     if isinstance(value, bool):
         edit_value(session, label, imgui.checkbox(label, value), with_value)
     elif style.options:
-        combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
+        draw_combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
     elif isinstance(value, (int, float)):
         unit, convert = style.unit, round if isinstance(value, int) else float
         formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if name.endswith(end))
         number = style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
-        slider(session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number)
+        draw_slider(
+            session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number
+        )
     elif kind.model_fields[name].annotation == _COLOUR_TYPE:
-        result = imgui.color_edit3(label, list(value), _HDR_COLOUR)
+        result = imgui.color_edit3(label, list(value), _HDR_COLOUR_FLAGS)
         edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
     elif isinstance(value, tuple) and value_range.logarithmic:
         result = imgui.slider_float3(
-            label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER
+            label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER_FLAG
         )
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
     elif len(keywords := field_choices(kind, name)) > 1:
-        combo(session, label, str(value), keywords, with_value, style.names)
+        draw_combo(session, label, str(value), keywords, with_value, style.names)
     else:
         return
     draw_tooltip(field_help(kind, name))
@@ -142,10 +144,16 @@ def _draw_keywords(
     custom_value = style.custom_value
 
     def with_keyword(keyword: str) -> ViewerState:
-        return with_value(custom_value(session) if custom_value and keyword == _CUSTOM else keyword)
+        return with_value(custom_value(session) if custom_value and keyword == _CUSTOM_CHOICE else keyword)
 
-    chosen = value if isinstance(value, str) else _CUSTOM
-    combo(session, f"{label} from", chosen, (*keywords, _CUSTOM) if custom_value else keywords, with_keyword)
+    chosen = value if isinstance(value, str) else _CUSTOM_CHOICE
+    draw_combo(
+        session,
+        f"{label} from",
+        chosen,
+        (*keywords, _CUSTOM_CHOICE) if custom_value else keywords,
+        with_keyword,
+    )
 
 
 def _field_label(name: str) -> str:
@@ -184,7 +192,7 @@ def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
     imgui.end_child()
 
 
-def slider(
+def draw_slider(
     session: Session,
     label: str,
     value: float,
@@ -197,7 +205,7 @@ def slider(
     with_value : function that returns a state, given the new number
     number_format : printf format of the number
     """
-    flags = _LOG_SLIDER if value_range.logarithmic else 0
+    flags = _LOG_SLIDER_FLAG if value_range.logarithmic else 0
     result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
     edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
 
@@ -221,7 +229,7 @@ def edit_value(session: Session, label: str, result: tuple[bool, Any], with_valu
         session.history.end_gesture()
 
 
-def combo(
+def draw_combo(
     session: Session,
     label: str,
     current: str,
@@ -250,7 +258,7 @@ def choose_name(
     display_names : text to show for each name, where it differs
     """
     chosen = None
-    if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST):
+    if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST_FLAG):
         record_position(session, label)
         return None
     for name in names:
@@ -265,7 +273,7 @@ def choose_name(
     return chosen
 
 
-def button(session: Session, label: str) -> bool:
+def draw_button(session: Session, label: str) -> bool:
     """Draw a button; return whether it was pressed."""
     pressed = imgui.button(label)
     record_position(session, label)

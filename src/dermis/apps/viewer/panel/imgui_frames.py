@@ -14,7 +14,7 @@ from dermis.apps.viewer.controls import Event
 from dermis.gpu import Device, TextureView
 
 _FONT_SIZE = 15.0
-_GREYS = (  # no hues, because they would affect the perception of the skin beside them
+_GREY_LEVELS = (  # no hues, because they would affect the perception of the skin beside them
     ("window_bg", 0.08),
     ("frame_bg", 0.18),
     ("frame_bg_hovered", 0.26),
@@ -43,7 +43,7 @@ def set_style() -> None:
     imgui.style_colors_dark()
     io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
     style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
-    for name, grey in _GREYS:
+    for name, grey in _GREY_LEVELS:
         if hasattr(imgui.Col_, name):  # some names require a newer version
             style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))
 
@@ -155,9 +155,9 @@ def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
 
 
 def feed_key(event: Event, frame: Callable[[], None]) -> None:
-    """Pass a key or character to Dear ImGui, followed by a layout of its own.
+    """Pass a key or character to Dear ImGui, and lay out the panel at once.
 
-    Without it, a press and a release of a key between two frames would cancel out.
+    Otherwise a press and a release of a key between two frames would cancel out.
 
     frame : function that lays out the panel with the events so far
     """

@@ -9,7 +9,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from dermis.apps.viewer.controls import Event, SplitView
-from dermis.apps.viewer.panel.fields import button, record_position, run_action
+from dermis.apps.viewer.panel.fields import draw_button, record_position, run_action
 from dermis.apps.viewer.panel.imgui_frames import (
     POINTER_EVENTS,
     ImguiFrames,
@@ -44,7 +44,7 @@ SHORTCUTS = (
 )
 _TEXT_MARGIN, _MIN_TEXT_WIDTH = 10.0, 80.0
 _HANDLE_RADIUS = 7.0  # of the divider
-_HELP_WIDTH, _FIRST_COLUMN = 460.0, 0.4
+_HELP_WIDTH, _FIRST_COLUMN_FRACTION = 460.0, 0.4
 
 
 def draw_divider(split: SplitView, left: float, size: tuple[float, float]) -> None:
@@ -104,8 +104,8 @@ def draw_help(left: float, size: tuple[float, float]) -> None:
     imgui.begin("shortcuts", None, int(flags))
     if imgui.begin_table("shortcuts", 2, int(imgui.TableFlags_.sizing_stretch_prop)):
         stretch = int(imgui.TableColumnFlags_.width_stretch)
-        imgui.table_setup_column("input", stretch, _FIRST_COLUMN)
-        imgui.table_setup_column("action", stretch, 1.0 - _FIRST_COLUMN)
+        imgui.table_setup_column("input", stretch, _FIRST_COLUMN_FRACTION)
+        imgui.table_setup_column("action", stretch, 1.0 - _FIRST_COLUMN_FRACTION)
         for text in (text for row in SHORTCUTS for text in row):
             imgui.table_next_column()
             imgui.text_wrapped(text)
@@ -113,13 +113,12 @@ def draw_help(left: float, size: tuple[float, float]) -> None:
     imgui.end()
 
 
-_PANEL_WIDTH, _CONTROL_FRACTION = (
-    330.0,
-    0.5,
-)  # logical width of the panel, and fraction of it for the controls
+_PANEL_WIDTH = 330.0  # logical
+_CONTROL_FRACTION = 0.5  # of the panel's width
 _MAX_WIDTH_FRACTION = 0.5  # of the window
 _MIN_TEXT_SCALE = 0.8  # in a narrow panel
-_NARROW_WINDOW, _PHONE_WINDOW = 400.0, 480.0  # width below which windows, and upright phones, have a drawer
+_NARROW_WINDOW_WIDTH = 400.0  # width below which a window has a drawer
+_PHONE_WINDOW_WIDTH = 480.0  # width below which an upright phone has a drawer
 _PORTRAIT_ASPECT = 1.4  # least height over width of an upright phone
 _DRAWER_FRACTION = 0.86  # of the window's width
 _TOUCH_PADDING = 8.0  # vertical padding of controls for fingers
@@ -244,7 +243,7 @@ class Panel:
         return True
 
     def _is_over_panel(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Return whether a pointer is over the panel, because Dear ImGui knows this only a frame later.
+        """Return whether a position is over the panel; Dear ImGui would know this only one frame later.
 
         x, y : position of the pointer in the window
         size : logical size of the window
@@ -261,7 +260,7 @@ class Panel:
         if self._covered_width(size):
             self._draw_panel(size)
         else:
-            self._draw_button()
+            self._draw_panel_button()
         imgui.pop_style_var()
         left, session = self.width(size), self._session
         if self.shows_help:
@@ -270,14 +269,14 @@ class Panel:
         status = "" if self._covered_width(size) > left else session.status
         draw_messages([line for line in (session.message, session.heads.note, status) if line], left, size)
 
-    def _draw_button(self) -> None:
+    def _draw_panel_button(self) -> None:
         """Draw the button that opens the panel in the corner of the picture."""
         self._has_popup = False
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
         imgui.push_style_var(int(imgui.StyleVar_.alpha), _BUTTON_ALPHA)
         imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
-        if button(self._session, "panel"):
+        if draw_button(self._session, "panel"):
             self.toggle()
         end = imgui.get_item_rect_max()
         self._button_end = float(end.x) + _BUTTON_MARGIN, float(end.y) + _BUTTON_MARGIN
@@ -314,17 +313,17 @@ class Panel:
         undo, redo = ("undo", history.can_undo, history.undo), ("redo", history.can_redo, history.redo)
         for label, is_possible, action in (undo, redo):
             imgui.begin_disabled(not is_possible)
-            if button(self._session, label):
+            if draw_button(self._session, label):
                 action()
             imgui.end_disabled()
             imgui.same_line()
-        self.shows_help ^= button(self._session, "help")
+        self.shows_help ^= draw_button(self._session, "help")
         imgui.same_line()
-        if button(self._session, "hide"):
+        if draw_button(self._session, "hide"):
             self.toggle()
 
     def _scroll_by_touch(self) -> None:
-        """Scroll the panel by a drag that began beside all controls, as fingers have no wheel."""
+        """Scroll the panel by a drag that began outside all controls, because touch screens have no wheel."""
         if imgui.is_mouse_clicked(0):
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):
@@ -334,4 +333,4 @@ class Panel:
 def is_drawer(size: tuple[float, float]) -> bool:
     """Return whether a window is so narrow that the panel is a drawer over the picture."""
     width, height = size
-    return width < (_PHONE_WINDOW if height > _PORTRAIT_ASPECT * width else _NARROW_WINDOW)
+    return width < (_PHONE_WINDOW_WIDTH if height > _PORTRAIT_ASPECT * width else _NARROW_WINDOW_WIDTH)

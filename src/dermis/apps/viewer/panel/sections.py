@@ -23,21 +23,21 @@ from dermis.apps.viewer.panel.fields import (
     TECHNIQUE_STYLES,
     FieldStyle,
     begin_plot,
-    button,
     choose_name,
     clamp,
-    combo,
+    draw_button,
+    draw_combo,
     draw_fields,
     draw_rows,
+    draw_slider,
     draw_tooltip,
     edit_value,
     record_position,
     run_action,
-    slider,
 )
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
 from dermis.apps.viewer.session import Session, built_in_heads
-from dermis.apps.viewer.state import ATLAS, ViewerState, validated_copy
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, ViewerState, validated_copy
 from dermis.apps.viewer.views import ATLAS_LAYERS, VIEW_NAMES
 from dermis.formats.samples import SAMPLES
 from dermis.scene.environment import Environment
@@ -46,22 +46,22 @@ from dermis.scene.heads import HUMAN
 from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
 from dermis.scene.talk import COMPARISONS
 
-_CUSTOM = "custom"
+_CUSTOM_CHOICE = "custom"
 _NO_ENVIRONMENT = "none"
 _STOP_RANGE = SliderRange(-6.0, 4.0)
 _NEW_LIGHT_MM = (-500.0, 400.0, 800.0)  # position of a new light, at the upper left of the portrait
 _MIN_FADE_DEGREES = 0.5  # least difference of the cones of a spotlight
-_ENVIRONMENT = {"exposure": FieldStyle("brightness")}
+_ENVIRONMENT_STYLES = {"exposure": FieldStyle("brightness")}
 _WEIGHT_RANGE, _ANGLE_RANGE = SliderRange(0.0, 1.0), SliderRange(-60.0, 60.0)
 _MAX_LABEL_LENGTH = 16  # characters that fit into a narrow panel
 Floats = NDArray[np.float64]
-_TOTAL = "total"
+_TOTAL_LABEL = "total"
 _HUE_STEP = 0.618034  # golden ratio of the hue circle, so that colours of neighbouring stages differ
 _SEED_COUNT = 10_000
-_ON_ENTER = int(imgui.InputTextFlags_.enter_returns_true)
+_ON_ENTER_FLAG = int(imgui.InputTextFlags_.enter_returns_true)
 _BUTTONS_PER_ROW = 3
 _MAP_SIZES = (256, 512, 1024, 2048, 4096)
-_SETTINGS = {
+_SETTING_STYLES = {
     **TECHNIQUE_STYLES,
     "atlas": FieldStyle(options=_MAP_SIZES),
     "shadow_size": FieldStyle("shadow map", options=_MAP_SIZES),
@@ -75,9 +75,9 @@ _OTHER_SETTINGS = ("size", "parts")  # determined by the window and by the view
 
 def draw_lights(session: Session) -> None:
     """Draw the controls of the light preset, the selected light and the environment."""
-    combo(session, "rig", session.state.rig or _CUSTOM, light_presets(), session.state.with_rig)
+    draw_combo(session, "rig", session.state.rig or _CUSTOM_CHOICE, light_presets(), session.state.with_rig)
     _draw_light_selector(session)
-    combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KIND_NAMES)
+    draw_combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KIND_NAMES)
     lights, index = session.state.scene.lights, session.controls.light
     if index < len(lights):
         _draw_light(session, index, lights[index])
@@ -118,14 +118,14 @@ def _draw_light(session: Session, index: int, light: Light) -> None:
         return make_state(irradiance=tuple(factor * c for c in light.irradiance))
 
     imgui.text_disabled(f"{LIGHT_KIND_NAMES.get(light.kind, light.kind)}, Shift and drag to move")
-    slider(session, "strength", math.log2(strength / math.pi), with_stops, _STOP_RANGE, "%.2f stops")
+    draw_slider(session, "strength", math.log2(strength / math.pi), with_stops, _STOP_RANGE, "%.2f stops")
     draw_fields(session, light, make_state, LIGHT_STYLES | _cone_styles(light))
-    if button(session, "copy"):  # raises DermisError if there are too many lights
+    if draw_button(session, "copy"):  # raises DermisError if there are too many lights
         lights = session.state.scene.lights
         run_action(session, lambda: session.change(session.state.with_lights([*lights, light])))
         session.controls.light = len(lights)
     imgui.same_line()
-    if button(session, "remove"):
+    if draw_button(session, "remove"):
         lights = session.state.scene.lights
         session.change(session.state.with_lights([*lights[:index], *lights[index + 1 :]]))
         session.controls.light = max(0, index - 1)
@@ -155,9 +155,9 @@ def _draw_environment(session: Session) -> None:
         return with_environment(validated_copy(environment, **fields))
 
     names = (_NO_ENVIRONMENT, "uniform", *samples)
-    combo(session, "environment", environment.name if environment else _NO_ENVIRONMENT, names, with_name)
+    draw_combo(session, "environment", environment.name if environment else _NO_ENVIRONMENT, names, with_name)
     if environment:
-        draw_fields(session, environment, make_state, _ENVIRONMENT)
+        draw_fields(session, environment, make_state, _ENVIRONMENT_STYLES)
 
 
 def has_expressions(session: Session) -> bool:
@@ -178,7 +178,7 @@ def draw_expressions(session: Session) -> None:
     _, session.search = imgui.input_text_with_hint("##search", "search", session.search, flags)
     record_position(session, "search")
     imgui.same_line()
-    if button(session, "rest"):
+    if draw_button(session, "rest"):
         session.player.stop()
         session.change(session.state.with_pose(posing.rest_pose(session.state.scene)))
     targets = posing.filter_names(head.targets, session.search)
@@ -201,18 +201,18 @@ def draw_motion(session: Session) -> None:
     """Draw the controls of the motion: its file, play and pause, and the time slider."""
     player, clip = session.player, session.player.clip
     _, session.motion_file = imgui.input_text("file", session.motion_file)
-    if button(session, "open"):
+    if draw_button(session, "open"):
         run_action(session, lambda: session.open_motion(session.motion_file))
     if clip is not None:
         imgui.same_line()
-        if button(session, f"{'pause' if player.is_playing else 'play'}##motion"):
+        if draw_button(session, f"{'pause' if player.is_playing else 'play'}##motion"):
             player.toggle()
         imgui.same_line()
         _, player.loops = imgui.checkbox("loop", player.loops)
         record_position(session, "loop")
         time_range = SliderRange(0.0, max(clip.duration_s, 1e-3))
         number_format = f"%.2f of {clip.duration_s:.2f} s"
-        slider(session, "time", player.seconds, player.state_at, time_range, number_format)
+        draw_slider(session, "time", player.seconds, player.state_at, time_range, number_format)
     if player.note:
         imgui.text_wrapped(player.note)
 
@@ -229,7 +229,7 @@ def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
 
     weight = posing.target_weight(session.displayed_state.scene, name)
     imgui.begin_disabled(name in animated)
-    slider(session, f"{name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
+    draw_slider(session, f"{name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
     if len(name) > _MAX_LABEL_LENGTH:
         draw_tooltip(name)
@@ -261,26 +261,26 @@ def draw_head(session: Session) -> None:
     """Draw the controls that choose a head: a list, the seed of a random person, and a file to open."""
     _draw_head_list(session)
     seed = _person_seed(session)
-    is_entered, new_seed = imgui.input_int("person###seed", seed, flags=_ON_ENTER)
+    is_entered, new_seed = imgui.input_int("person###seed", seed, flags=_ON_ENTER_FLAG)
     record_position(session, "seed")
     draw_tooltip("Seed of a random person; press Enter to show the person.")
     if is_entered:
         session.heads.open(f"{HUMAN}:{max(0, new_seed)}")
     imgui.same_line()
-    if button(session, "dice"):
+    if draw_button(session, "dice"):
         session.heads.open(f"{HUMAN}:{random.randrange(_SEED_COUNT)}")
     draw_tooltip("Another random person.")
     if session.request_file is None:
         hint = "path of a file"
         is_path_entered, session.head_file = imgui.input_text_with_hint(
-            "###path", hint, session.head_file, _ON_ENTER
+            "###path", hint, session.head_file, _ON_ENTER_FLAG
         )
         record_position(session, "path")
         draw_tooltip("A mesh (.glb .gltf .obj .ply), a person (.json) or a scene (.toml).")
         imgui.same_line()
-        if button(session, "open###open file") or is_path_entered:
+        if draw_button(session, "open###open file") or is_path_entered:
             session.heads.open(session.head_file)
-    elif button(session, "upload a file"):
+    elif draw_button(session, "upload a file"):
         session.request_file()
 
 
@@ -315,36 +315,36 @@ class Section(NamedTuple):
 def draw_view(session: Session) -> None:
     """Draw the list of views, such as the picture or the blurred irradiance, and the camera presets."""
     state = session.state
-    combo(session, "show", state.view, VIEW_NAMES, state.with_view)
-    if state.view == ATLAS:
+    draw_combo(session, "show", state.view, VIEW_NAMES, state.with_view)
+    if state.view == ATLAS_VIEW_NAME:
 
         def with_layer(name: str) -> ViewerState:
             return state.with_atlas_view(replace(state.atlas_view, layer=name))
 
-        combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
+        draw_combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
         imgui.text_disabled("wheel: zoom; double click: show all")
     for index, name in enumerate(CAMERA_PRESETS):
         if index % _BUTTONS_PER_ROW:
             imgui.same_line()
-        if button(session, f"{name}##camera"):
+        if draw_button(session, f"{name}##camera"):
             session.controls.set_camera_preset(name)
 
 
 def draw_comparison(session: Session) -> None:
     """Draw the buttons of the before/after comparison: freeze the state, swap the sides, or end it."""
     split, state = session.split, session.state
-    if button(session, "freeze"):
+    if draw_button(session, "freeze"):
         split.freeze(session.displayed_state)
     if split.frozen_state is None:
         return
     imgui.same_line()
-    if button(session, "swap"):
+    if draw_button(session, "swap"):
         displayed = session.displayed_state
         session.player.stop()
         session.change(split.frozen_state.with_camera(state.scene.camera))
         split.freeze(displayed)
     imgui.same_line()
-    if button(session, "release"):
+    if draw_button(session, "release"):
         split.release()
 
 
@@ -359,12 +359,14 @@ def draw_technique(session: Session) -> None:
         (name for name in fields_under("", kind) if name not in excluded),
         key=lambda name: not field_choices(kind, name),
     )
-    draw_fields(session, settings, session.state.with_settings, _SETTINGS, names)
+    draw_fields(session, settings, session.state.with_settings, _SETTING_STYLES, names)
 
 
 def draw_picture(session: Session) -> None:
     """Draw the settings that convert radiance to the picture: exposure, tone curve, bloom, ..."""
-    draw_fields(session, session.state.settings, session.state.with_settings, _SETTINGS, _PICTURE_SETTINGS)
+    draw_fields(
+        session, session.state.settings, session.state.with_settings, _SETTING_STYLES, _PICTURE_SETTINGS
+    )
 
 
 def draw_talk(session: Session) -> None:
@@ -374,16 +376,16 @@ def draw_talk(session: Session) -> None:
     names = fields_under(COMPARISONS, type(settings))
     if settings.seams != "clear-colour":
         names.remove("seam_colour")
-    draw_fields(session, settings, state.with_settings, _SETTINGS, names)
+    draw_fields(session, settings, state.with_settings, _SETTING_STYLES, names)
 
 
 def draw_files(session: Session) -> None:
     """Draw the controls that save and load the scene, and that write screenshots."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
-    if button(session, "save"):
+    if draw_button(session, "save"):
         run_action(session, lambda: session.save(Path(session.scene_file)))
     imgui.same_line()
-    if button(session, "load"):
+    if draw_button(session, "load"):
         run_action(session, lambda: session.load(Path(session.scene_file)))
     _, session.picture_file = imgui.input_text("picture", session.picture_file)
     size = session.picture_size if any(session.picture_size) else session.view_size
@@ -391,11 +393,11 @@ def draw_files(session: Session) -> None:
     record_position(session, "size")
     if is_changed:
         session.picture_size = max(1, sides[0]), max(1, sides[1])
-    if button(session, "screenshot"):
+    if draw_button(session, "screenshot"):
         run_action(session, lambda: session.screenshot(Path(session.picture_file), size))
     if any(session.picture_size):
         imgui.same_line()
-        if button(session, "size of the view"):
+        if draw_button(session, "size of the view"):
             session.picture_size = 0, 0
 
 
@@ -416,8 +418,8 @@ def draw_timing(session: Session) -> None:
 
 
 def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
-    """Return the times of each stage over n frames, (n,) by stage; 0 in frames without it [ms]."""
-    names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL)
+    """Return the times of each stage in n frames, (n,) by stage; 0 if a frame lacks the stage [ms]."""
+    names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL_LABEL)
     return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
 
 

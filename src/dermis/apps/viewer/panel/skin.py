@@ -14,8 +14,8 @@ from dermis.apps.viewer.panel.fields import (
     SURFACE_STYLES,
     FieldStyle,
     begin_plot,
-    button,
-    combo,
+    draw_button,
+    draw_combo,
     draw_fields,
     record_position,
     run_action,
@@ -59,7 +59,9 @@ def draw_profile(session: Session) -> None:
         return with_skin(profile=name, pigments=None, layers=())
 
     other_media = (name for name in preset_names() if name not in _SKIN_PROFILES)
-    combo(session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES)
+    draw_combo(
+        session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES
+    )
     draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
     if skin.profile in SKINS:
         _draw_pigments(session, skin)
@@ -67,7 +69,7 @@ def draw_profile(session: Session) -> None:
         _draw_layers(session, layers)
     else:
         imgui.text_disabled("a sum of Gaussians, without layers")
-    if skin.overrides_tissue and button(session, "reset"):
+    if skin.overrides_tissue and draw_button(session, "reset"):
         session.change(with_skin(pigments=None, layers=()))
     _plot_profile(session)
 
@@ -79,7 +81,9 @@ def draw_surface(session: Session) -> None:
         if name == "rho_s":
             current = str(state.head.get("regions", AUTO))
             names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT_TABLE, current))
-            combo(session, "regions", current, names, lambda name: apply_regions(state, name, earlier_states))
+            draw_combo(
+                session, "regions", current, names, lambda name: apply_regions(state, name, earlier_states)
+            )
         if name == "rho_s" and has_region_table(state.head):
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
@@ -159,11 +163,11 @@ def _draw_layer(session: Session, layers: Layers, index: int) -> None:
 
     draw_fields(session, layer, make_state, LAYER_STYLES, suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
-    if len(layers) < MAX_LAYERS and button(session, f"add above{label_suffix}"):
+    if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_MM)
         run_action(session, lambda: session.change(_replace_layer(session, layers, index, copy, layer)))
     imgui.same_line()
-    if len(layers) > 1 and button(session, f"remove{label_suffix}"):
+    if len(layers) > 1 and draw_button(session, f"remove{label_suffix}"):
         run_action(session, lambda: session.change(_replace_layer(session, layers, index)))
 
 
