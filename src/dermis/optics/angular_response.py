@@ -14,7 +14,7 @@ TABLE_STEPS = 64
 """Number of intervals into which tables over [0, 1] divide their argument."""
 DIRECTION_ROWS = 32
 """Number of incident directions in tables; the square roots of their cosines are evenly spaced."""
-_NODES = 32
+_QUADRATURE_NODES = 32
 _MAX_ALBEDO = 1.0 - 1e-8
 CACHE_SIZE = 256
 """Number of table columns that each function caches."""
@@ -111,7 +111,7 @@ def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
 
 
 def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the cosine from the normal below the surface of light at incident cosines in air [-]."""
+    """Return the cosine to the normal below the surface of light refracted from given cosines in air [-]."""
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 
@@ -135,7 +135,7 @@ class _HalfSpace:
         )
 
     def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
-        """Return the radiance that the medium reflects to each direction, over pi, (directions, n).
+        """Return the radiance over pi reflected by the medium in each direction, (directions, n) [-].
 
         mu : (n,) cosines of the incident light below the surface
         H : (n,) H function at these cosines
@@ -143,14 +143,17 @@ class _HalfSpace:
         return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
-        """Return the fraction of light at given cosines below the surface that leaves the medium [-]."""
+        """Return the fraction of the light entering at given cosines that is scattered back out [-].
+
+        cosine : cosines of the entering light to the normal, measured below the surface
+        """
         mu = np.atleast_1d(np.asarray(cosine, np.float64))
         source = self._reflected_radiance(mu, h_function(mu, self._albedo))
         leaving = self.leaving @ np.linalg.solve(self._transport, source)
         return np.asarray(leaving.reshape(np.shape(cosine)))
 
     def diffuse_reflectance(self) -> float:
-        """Return the fraction of light that enters from a uniform sky and leaves the medium again [-]."""
+        """Return the fraction of the light entering from a uniform sky that is scattered back out [-]."""
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
@@ -181,7 +184,7 @@ def _mean_kernel(eta: float) -> float:
 def albedo_for_reflectance(total: float, eta: float) -> float:
     """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence [-].
 
-    It inverts the reflectance of an isotropically scattering half-space numerically.
+    The reflectance of an isotropically scattering half-space is inverted numerically.
     """
     from scipy.optimize import brentq
 
@@ -207,7 +210,7 @@ def critical_cosine(eta: float) -> float:
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
-def gauss_legendre(low: float, high: float, count: int = _NODES) -> tuple[Floats, Floats]:
+def gauss_legendre(low: float, high: float, count: int = _QUADRATURE_NODES) -> tuple[Floats, Floats]:
     """Return nodes and weights of Gauss-Legendre quadrature from `low` to `high`, (count,) each."""
     nodes, weights = _unit_gauss_legendre(count)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.optics.media import Floats
-from dermis.optics.radial import TINY, RadialProfile
+from dermis.optics.radial import SMALLEST_FLOAT, RadialProfile
 
 _MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADII = 1e-4, 1000.0, 800
-_ANGLES = 256  # samples of the integral in `edge_response`
+_EDGE_RESPONSE_ANGLES = 256  # samples of the integral in `edge_response`
 
 
 def radii() -> Floats:
@@ -45,19 +45,19 @@ class CumulativeProfile:
 
     @classmethod
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
-        """Sum the ring energies of a radial profile with three channels to a cumulative profile.
+        """Accumulate the ring energies of a three-channel radial profile into a cumulative profile.
 
         entering_fraction : fraction of the incident light that enters, by which a profile per incident power
             is divided [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])
-        fraction = energy_within / np.maximum(total, TINY)
+        fraction = energy_within / np.maximum(total, SMALLEST_FLOAT)
         energy = total / entering_fraction
         return cls.from_function(lambda r: interpolate_cumulative(r, profile.edges_mm, fraction), energy)
 
     def fraction_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the fraction of all emerging light within radii, (..., 3) [-]."""
+        """Return the fraction of all emerging light that leaves within each radius, (..., 3) [-]."""
         r = np.asarray(radius_mm, np.float64)
         columns = [np.interp(r, self.radii_mm, self.fraction[:, i]) for i in range(3)]
         return np.stack(columns, axis=-1)
@@ -71,7 +71,7 @@ class CumulativeProfile:
         t) dt at x > 0, and 1 minus the response at -x elsewhere.
         """
         x = np.asarray(distance_mm, np.float64)
-        t = (np.arange(_ANGLES) + 0.5) * (0.5 * np.pi / _ANGLES)
+        t = (np.arange(_EDGE_RESPONSE_ANGLES) + 0.5) * (0.5 * np.pi / _EDGE_RESPONSE_ANGLES)
         mean = self.fraction_within(np.abs(x)[..., None] / np.sin(t)).mean(axis=-2)
         return np.asarray(0.5 + 0.5 * np.sign(x)[..., None] * mean)
 
@@ -80,7 +80,10 @@ class CumulativeProfile:
         return np.array([np.interp(fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile with unchanged fractions and another total reflectance, (3,) [-]."""
+        """Return a profile with the same fractions and another total reflectance.
+
+        energy : (3,) new total reflectance [-]
+        """
         return CumulativeProfile(self.radii_mm, self.fraction, np.asarray(energy, np.float64))
 
 

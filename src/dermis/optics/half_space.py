@@ -140,7 +140,7 @@ def has_photon_table(medium: Medium) -> bool:
 
 
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
-    """Return the cumulative profile of a medium from a photon-count table, or None without a table.
+    """Return the cumulative profile of a medium from a photon-count table, or None if no table covers it.
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
@@ -151,7 +151,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 
 
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
-    """Return the radial profile of a medium from a photon-count table, or None without a table.
+    """Return the radial profile of a medium from a photon-count table, or None if no table covers it.
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """

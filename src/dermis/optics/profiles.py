@@ -161,7 +161,7 @@ def _fit_preset(name: str) -> GaussianSum:
 
 
 def fit_profile(tissue: Tissue, name: str | Path, initial: GaussianSum | None = None) -> GaussianSum:
-    """Fit six Gaussians to the diffusion profile that the default model yields for a tissue.
+    """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
     Fits to photon counts keep the total reflectance: their profiles are steeper than those of diffusion, and
     a free fit would lose up to 2 % of the light.

@@ -10,7 +10,7 @@ from dermis.optics.fits.targets import PointTarget, RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
-NOTABLE_FRACTION, TINY = 0.01, float(np.finfo(np.float64).tiny)
+NOTABLE_MISSING_FRACTION, SMALLEST_FLOAT = 0.01, float(np.finfo(np.float64).tiny)
 MIN_RADIUS_MM, MAX_RADIUS_MM = 1e-4, 60.0
 """Smallest and largest radius of a sampled profile; errors are integrated between them [mm]."""
 
@@ -100,8 +100,8 @@ def missing_light_warnings(total: Floats, ring_energy: Floats) -> list[str]:
     total : (c,) total reflectance [-]
     ring_energy : (k, c) light through each ring [-]
     """
-    missing = float(((total - ring_energy.sum(axis=0)) / np.maximum(np.abs(total), TINY)).max())
-    if missing < NOTABLE_FRACTION:
+    missing = float(((total - ring_energy.sum(axis=0)) / np.maximum(np.abs(total), SMALLEST_FLOAT)).max())
+    if missing < NOTABLE_MISSING_FRACTION:
         return []
     return [f"{missing:.0%} of the light leaves beyond the widest radius and is in the total only"]
 

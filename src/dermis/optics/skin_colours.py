@@ -15,9 +15,9 @@ from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import dj2006_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
-_NODES = 65
+_TABLE_NODES = 65
 _ROWS_PER_BATCH = 5  # rows of the table that are computed together and fit into the processor's cache
-_COEFFICIENTS = ("sigma_a", "sigma_s_prime")
+_COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def _cell_and_offset(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], F
     return cell, (position - cell)[:, None]
 
 
-def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable:
+def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> ColourTable:
     """Compute the diffuse reflectance of skins over melanin and blood by layered diffusion.
 
     parameters : parameters of the skins; melanin and blood are ignored
@@ -74,8 +74,8 @@ def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable
 
 
 def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:
-    """Return a layer whose channels are those of the selected rows of stacked layers, concatenated.
+    """Return a layer with the coefficients of selected rows of stacked layers as its channels, concatenated.
 
     layer : stacked layers, with coefficients (n, c)
     """
-    return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENTS})
+    return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENT_FIELDS})

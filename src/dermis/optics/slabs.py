@@ -24,7 +24,7 @@ from dermis.optics.angular_response import (
 )
 
 Floats = NDArray[np.float64]
-NODES = 16
+DIRECTION_NODES = 16
 """Number of discrete directions that leave a slab, and of directions that are totally reflected."""
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness at which a slab equals a half-space [mean free paths]."""
@@ -44,8 +44,8 @@ class PhaseMatrices:
     extinction : extinction coefficient of the scaled medium over the reduced extinction coefficient [-]
     unscaled_extinction : extinction coefficient of the true medium over the reduced extinction coefficient
         [-]
-    backward, forward : (m, m) phase function from cosine to cosine, into the opposite hemisphere and into the
-        hemisphere of incidence; 1 for isotropic scattering [-]
+    backward, forward : (m, m) phase function between two cosines, for scattering that reverses the direction
+        of travel along the normal, and for scattering that keeps it; 1 for isotropic scattering [-]
     """
 
     albedo: float
@@ -97,7 +97,7 @@ class Slabs:
 
 
 def solve_slabs(
-    albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES, g: float = 0.0
+    albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = DIRECTION_NODES, g: float = 0.0
 ) -> Slabs:
     """Compute reflection and transmission of slabs by adding and doubling.
 
@@ -119,7 +119,12 @@ def solve_slabs(
 
 
 def solve_doubled_slabs(
-    albedo: float, smallest_depth: ArrayLike, doublings: int, eta: float, nodes: int = NODES, g: float = 0.0
+    albedo: float,
+    smallest_depth: ArrayLike,
+    doublings: int,
+    eta: float,
+    nodes: int = DIRECTION_NODES,
+    g: float = 0.0,
 ) -> Slabs:
     """Compute slabs of given thicknesses and all their doublings, in the time of the thickest alone.
 
@@ -177,7 +182,7 @@ class _Transport:
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
     def doublings(self, depth: float) -> int:
-        """Return the number of doublings from a slab with only single scattering to a given depth.
+        """Return how often a slab thin enough for single scattering must be doubled to reach a given depth.
 
         depth : thickness in reduced mean free paths [-]
         """
@@ -282,9 +287,9 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The single-scattering factor of isotropic scattering, from `angular_response`, is corrected by the change
-    of a fit: the kernel 1/(a + b) is fitted to the emerging radiance by least squares for both values of the
-    mean cosine, g and 0.
+    The kernel 1/(a + b) is fitted to the emerging radiance by least squares, once for the mean cosine g and
+    once for 0. The difference of both coefficients is added to the single-scattering factor of isotropic
+    scattering, from `angular_response`.
     """
     isotropic = angular_response(total, eta)
     if g == 0.0:
@@ -304,7 +309,7 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     The first DIRECTION_ROWS elements are the relative reflectance, the last two the relative diffuse
     reflectance and the factor of single scattering.
     """
-    a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, NODES, g)
+    a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, DIRECTION_NODES, g)
     reflectance = fraction @ radiance
     normal = float(_interpolate(a, reflectance, np.ones(1))[0])
     if normal <= _MIN_REFLECTANCE:

@@ -22,18 +22,18 @@ from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
 from dermis.optics.equivalent_medium import MAX_ALBEDO, MIN_ALBEDO, albedo_for_total
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, NODES, Slabs, solve_doubled_slabs, solve_slabs
+from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solve_doubled_slabs, solve_slabs
 
 Floats = NDArray[np.float64]
 THICKNESS_ROWS = 32
 """Number of thicknesses of the tables in `ThinParts`."""
-_DEEP_ENOUGH = (
+_DEEP_SLAB_DEPTH = (
     10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
 )
 _UNIFORM_NODES = 8  # number of discrete directions for uniform light
 # Thickness of the thinnest slabs that are solved [mean free paths], and how often they are doubled.
-_MIN_DEPTHS, _DOUBLINGS = 1e-4 * np.array([1.0, 2.0**0.5]), 25
-_DEPTHS = (_MIN_DEPTHS * 2.0 ** np.arange(_DOUBLINGS + 1)[:, None]).ravel()
+_MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT = 1e-4 * np.array([1.0, 2.0**0.5]), 25
+_OPTICAL_DEPTHS = (_MIN_OPTICAL_DEPTHS * 2.0 ** np.arange(_DOUBLING_COUNT + 1)[:, None]).ravel()
 _MIN_TRANSMITTANCE = 1e-300  # replaces the transmittance 0 of thick black slabs in divisions
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a profile [1/mean free path]
 
@@ -49,8 +49,8 @@ class ThinParts:
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect, but the thin part does
         not; it is spread like transmitted light [-]
-    directionality : (THICKNESS_ROWS,) strength of the dependence on incident direction: 1 as
-        `oblique_transmittance` of deep slabs, 0 for none, negative for the opposite, -1 to 1 [-]
+    directionality : (THICKNESS_ROWS,) strength of the dependence on incident direction, -1 to 1: at 1 it is
+        `oblique_transmittance`, that of deep slabs; at 0 there is none; below 0 it is reversed [-]
     """
 
     max_thickness_mm: float
@@ -105,21 +105,23 @@ def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False,
 @lru_cache(maxsize=CACHE_SIZE)
 def _oblique_column(eta: float, from_photons: bool, g: float, total: float) -> Floats:
     cosine = refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
-    half_space, relative = _deep_transmittance(albedo_for_total(total, eta, from_photons), eta, NODES, g)
+    half_space, relative = _deep_transmittance(
+        albedo_for_total(total, eta, from_photons), eta, DIRECTION_NODES, g
+    )
     return np.interp(cosine, half_space.cosine, relative)
 
 
 def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
     """Return a half-space as `Slabs`, and `oblique_transmittance` of deep slabs at its incident cosines."""
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, nodes, g)
-    deep = solve_slabs(albedo, _DEEP_ENOUGH, eta, nodes, g)
+    deep = solve_slabs(albedo, _DEEP_SLAB_DEPTH, eta, nodes, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
-    """Return the directional transmittance of slabs, divided by the directional reflectance, (n, m) [-].
+    """Return the directional transmittance of slabs divided by a half-space's reflectance, (n, m) [-].
 
-    The transmittance is relative to that for uniform light, as is the reflectance of the half-space.
+    Transmittance and reflectance are first divided by their values for uniform light.
     """
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
@@ -147,20 +149,20 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
     columns = [interpolate_table(partial(_totals_column, eta, g), root) for root in roots]
-    spline = CubicSpline(np.log(_DEPTHS), np.stack(columns, axis=1))
+    spline = CubicSpline(np.log(_OPTICAL_DEPTHS), np.stack(columns, axis=1))
     for c, extinction in enumerate(layer.sigma_t_prime.tolist()):
-        depth = np.clip(extinction * thickness_mm, _DEPTHS[0], _DEPTHS[-1])
+        depth = np.clip(extinction * thickness_mm, _OPTICAL_DEPTHS[0], _OPTICAL_DEPTHS[-1])
         yield _SlabTotals(*spline(np.log(depth))[:, c].T)
 
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _totals_column(eta: float, g: float, root: float) -> Floats:
-    """Return the four fields of `_SlabTotals` at the optical depths `_DEPTHS`, (n, 4), for one albedo.
+    """Return the four fields of `_SlabTotals` at `_OPTICAL_DEPTHS`, (n, 4), for one albedo.
 
     root : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
     """
     albedo = min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO)
-    slabs = solve_doubled_slabs(albedo, _MIN_DEPTHS, _DOUBLINGS, eta, _UNIFORM_NODES, g)
+    slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _UNIFORM_NODES, g)
     half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
     reflectance, change = half_space.reflected @ half_space.flux, deep - 1.0
     weight = half_space.flux * half_space.reflected[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.human.person import Human
-from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
 from dermis.scene.skin import Pigments, Skin
 
 
@@ -23,4 +23,4 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
         oxygen=look.oxygen,
         epidermis_mm=DEFAULT_SKIN.epidermis_mm,
     )
-    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL, "pigments": pigments}))
+    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL_PRESET, "pigments": pigments}))

@@ -9,9 +9,9 @@ import numpy as np
 from dermis.optics.media import Floats
 
 SAMPLE_COUNT = 2048
-_DECADES = 16.0
+_FREQUENCY_DECADES = 16.0
 _CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
-_STEP = _DECADES * np.log(10.0) / SAMPLE_COUNT
+_STEP = _FREQUENCY_DECADES * np.log(10.0) / SAMPLE_COUNT
 
 ZERO_FREQUENCY = np.array([1e-8])
 """Frequency so low that a Hankel transform equals the total reflectance there, (1,) [1/mm]."""
@@ -19,10 +19,7 @@ ZERO_FREQUENCY = np.array([1e-8])
 
 @cache
 def frequencies() -> Floats:
-    """Return the frequencies s of a transform for `inverse_transform`, (SAMPLE_COUNT,) [1/mm].
-
-    They are log-spaced.
-    """
+    """Return the log-spaced frequencies s of the input of `inverse_transform`, (SAMPLE_COUNT,) [1/mm]."""
     return np.asarray(
         _CENTRE_FREQUENCY_PER_MM * np.exp(_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
     )

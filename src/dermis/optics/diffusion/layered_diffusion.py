@@ -20,7 +20,7 @@ Source = Literal["beam", "point"]
 
 
 class _Sublayer(NamedTuple):
-    """Whole layer, or the part of a layer above or below the point source that it contains."""
+    """Layer, or one of the two parts into which a layer is divided at the point source."""
 
     layer: Layer
     thickness_mm: float | Floats

@@ -19,8 +19,8 @@ from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import (
-    NOTABLE_FRACTION,
-    TINY,
+    NOTABLE_MISSING_FRACTION,
+    SMALLEST_FLOAT,
     RadialProfile,
     enclosed_energy,
     missing_light_warnings,
@@ -154,7 +154,10 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction of scattering among a photon's events in the first mean free path, (c,) [-]."""
+    """Return the probability that a photon's event in the first mean free path is scattering, (c,) [-].
+
+    The alternative is absorption.
+    """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
         events = np.minimum(layer.sigma_t_prime * layer.thickness_mm, 1.0 - depth)
@@ -167,7 +170,7 @@ def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
     warnings = missing_light_warnings(total, ring_energy)
     if (total < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
-    size = np.maximum(np.abs(total), TINY)
+    size = np.maximum(np.abs(total), SMALLEST_FLOAT)
     negative = float((-np.minimum(ring_energy, 0.0).sum(axis=0) / size).max())
     if negative > _NOTABLE_NEGATIVE:
         warnings.append(
@@ -175,7 +178,7 @@ def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
             "model, or colours outside Rec. 709. No sum of Gaussians fits it there"
         )
     surplus = float(((ring_energy.sum(axis=0) - total) / size).max())
-    if surplus > NOTABLE_FRACTION:
+    if surplus > NOTABLE_MISSING_FRACTION:
         warnings.append(f"R(r) has {surplus:.0%} more light than the total: its radii are too coarse")
     return warnings
 
@@ -221,7 +224,7 @@ def slab_transmittance(
 
 
 def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
-    """Return the top of a medium down to a depth [mm], with air below; a thinner medium is returned whole."""
+    """Return the part of a medium above a depth [mm], with air below it; thinner media are returned whole."""
     if not 0.0 < thickness_mm < np.inf:
         refuse("thickness", "a length above 0 mm", f"got {thickness_mm:g}", "Correct it")
     layers, remaining_mm = [], thickness_mm

@@ -73,7 +73,7 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
     """Return the reflected profile R(r) of a slab per power that enters, (n, c) [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : bound of the light of omitted images, per power that enters [-]
+    tolerance : upper bound on the light of the image sources that are omitted, per power that enters [-]
 
     Source: [DonnerJensen2005] eq. 2-6.
     """
@@ -87,7 +87,7 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
     """Return the transmitted profile T(r) of a slab per power that enters, (n, c) [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : bound of the light of omitted images, per power that enters [-]
+    tolerance : upper bound on the light of the image sources that are omitted, per power that enters [-]
 
     A source that the clamp moves onto the lower face emits half of its light directly. This peak at r = 0 is
     missing here, but included in `transmittance_hankel`.
@@ -131,7 +131,7 @@ def _image_series(
 
 
 def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> int:
-    """Return how many image pairs on each side of the slab bound the omitted light by `tolerance`.
+    """Return the number of image pairs on each side of a slab that keeps the omitted light below `tolerance`.
 
     An image at depth z contributes exp(-|z| sigma_tr) / 2, so the omitted light is at most a geometric
     series. Without absorption the series does not converge so fast, but opposite images cancel: their flux

@@ -155,7 +155,8 @@ class UnrealParameters:
     """Subsurface profile settings of Unreal Engine 5 with Burley's kernel, for a scene in centimetres.
 
     surface_albedo : diffuse albedo, linear Rec. 709 [-]
-    mean_free_path_colour : mean free path of each channel over the distance below, linear Rec. 709 [-]
+    mean_free_path_colour : mean free path of each channel divided by `mean_free_path_distance_cm`, linear
+        Rec. 709 [-]
     mean_free_path_distance_cm : largest mean free path of a channel, or the smallest that the engine accepts
         [cm]
     world_unit_scale : scale of the scene; 1 is life-size [-]
@@ -171,10 +172,10 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
     According to public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp), the engine
-    multiplies the mean free path l, colour times distance, by `shape_factor_diffuse` / (0.6 `shape_factor`)
-    to obtain the diffuse mean free path, and divides `shape_factor_diffuse` by the latter: s = 0.6
-    `shape_factor` / l. Its kernel takes a tenth of the millimetres as scene units, so scale 1 is life-size
-    for centimetres.
+    obtains the diffuse mean free path by multiplying the mean free path l (colour times distance) by
+    `shape_factor_diffuse` / (0.6 `shape_factor`). The shape s is `shape_factor_diffuse` divided by the
+    diffuse mean free path, so s = 0.6 `shape_factor` / l. The kernel divides millimetres by ten to get scene
+    units, so scale 1 is life-size for centimetres.
     """
     _check_rgb(profile)
     mean_free_path = 0.1 * UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape

@@ -24,10 +24,10 @@ _START_FRACTIONS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001,
 # Tolerance of fits that start from a similar fit: their ring energies differ from those of the converged fit
 # by at most 0.06 % of the brightest ring, and their errors by at most 0.0001.
 _INITIAL_FIT_TOLERANCE = 3e-6
-_STIFFNESS = 1e4  # weight of the energy equation; its square bounds the error of the energy
+_ENERGY_EQUATION_WEIGHT = 1e4  # weight of the energy equation; its square bounds the error of the energy
 SHARED_TERMS = 6
 """Number of Gaussians in a fit of several profiles with shared variances."""
-_EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
+_RING_EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
 _CACHED_FITS = 8
 _HashableSum = tuple[str, bytes, bytes, int]
 
@@ -135,7 +135,7 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     The weight of the equation is so large that the total is met almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
-    stiffness = _STIFFNESS * float(np.linalg.norm(target.design(width)[0]))
+    stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design(width)[0]))
 
     def design(variance_mm2: Floats) -> tuple[Floats, Floats]:
         columns, slopes = target.design(variance_mm2)
@@ -226,5 +226,5 @@ def _hashable_sum(profile: GaussianSum) -> _HashableSum:
 
 def _combined_ring_target(profiles: Sequence[GaussianSum]) -> RingTarget:
     """Return ring energies of several profiles as one target, whose channels are those of all profiles."""
-    within = np.hstack([one.energy_within(_EDGES_MM) for one in profiles])
-    return RingTarget(_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))
+    within = np.hstack([one.energy_within(_RING_EDGES_MM) for one in profiles])
+    return RingTarget(_RING_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

@@ -11,10 +11,10 @@ from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
-SECTORS = 16
+SECTOR_COUNT = 16
 """Number of equal sectors of a quarter circle into which each ring is divided."""
 
-_NODES = 8
+_QUADRATURE_NODES = 8
 _START_FRACTIONS = ((0.3, 0.9), (0.1, 0.6))  # fractions of the light within both Gaussians of a start
 
 
@@ -41,7 +41,7 @@ class SeparableKernel:
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
     def sector_energy(self, edges_mm: Floats) -> Floats:
-        """Return the light through SECTORS sectors of each ring, (n, SECTORS, c) [-].
+        """Return the light through equal sectors of each ring, (n, SECTOR_COUNT, c) [-].
 
         The four quarters of the plane are added.
 
@@ -100,11 +100,11 @@ def _fit_channel(target: RingTarget) -> Floats:
     """Fit one channel; return the weight of the first Gaussian and both log variances, (3,)."""
     from scipy.optimize import least_squares
 
-    scale = np.sqrt(SECTORS) / np.linalg.norm(target.energy)
+    scale = np.sqrt(SECTOR_COUNT) / np.linalg.norm(target.energy)
 
     def residual(x: Floats) -> Floats:
         cells = _sector_fractions(target.edges_mm, np.exp(x[1:]), np.array([x[0], 1.0 - x[0]]))
-        return np.asarray(scale * (target.total * cells - target.energy / SECTORS).ravel())
+        return np.asarray(scale * (target.total * cells - target.energy / SECTOR_COUNT).ravel())
 
     edges = target.edges_mm
     low, high = 2.0 * np.log(edges[1] / 4.0), 2.0 * np.log(edges[-1])
@@ -118,11 +118,11 @@ def _fit_channel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fraction of a kernel's light in each ring and sector, for one channel, (n, SECTORS).
+    """Return the fraction of a kernel's light in each ring and sector, for one channel, (n, SECTOR_COUNT).
 
     variance, weight : (k,) Gaussians of a(x)
     """
-    cells = np.zeros((len(edges_mm) - 1, SECTORS))
+    cells = np.zeros((len(edges_mm) - 1, SECTOR_COUNT))
     for i in range(len(variance)):
         cells += weight[i] ** 2 * _elliptic_sectors(edges_mm, variance[i], variance[i])
         for j in range(i):
@@ -132,12 +132,12 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
 
 
 def _elliptic_sectors(edges_mm: Floats, along: float, across: float) -> Floats:
-    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTORS).
+    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTOR_COUNT).
 
     along, across : variances along x and y [mm2]
     """
-    x, w = np.polynomial.legendre.leggauss(_NODES)
-    theta = np.linspace(0.0, 0.5 * np.pi, SECTORS + 1)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    theta = np.linspace(0.0, 0.5 * np.pi, SECTOR_COUNT + 1)
     # Angle on the circle before it is stretched to the ellipse: equal angles contain equal light.
     phi = np.arctan2(np.sqrt(along) * np.sin(theta), np.sqrt(across) * np.cos(theta))
     half = 0.5 * np.diff(phi)[:, None]

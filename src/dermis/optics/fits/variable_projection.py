@@ -19,7 +19,7 @@ _MAX_STEP = 1.0
 TOLERANCE = 1e-7
 """Relative decrease of the cost below which the descent stops."""
 _MAX_DAMPING = 1e8
-_BLOCK = 512
+_ROWS_PER_BLOCK = 512
 
 
 class WeightedFit(NamedTuple):
@@ -118,7 +118,7 @@ def qr_factor(tall: Floats) -> Floats:
     Blocks of rows are factorised separately, because BLAS would start threads for the whole matrix that cost
     more than they save.
     """
-    blocks = np.array_split(tall, -(-len(tall) // _BLOCK))
+    blocks = np.array_split(tall, -(-len(tall) // _ROWS_PER_BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]
     return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
 

@@ -16,7 +16,7 @@ from dermis.base.quantities import checked_number
 Structure = Literal["dj2006", "donner2008", "biospec"]
 DEFAULT_STRUCTURE: Final[Structure] = "dj2006"
 _FRACTION_FIELDS = "melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"
-_EPIDERMIS_MM = 1e-3, 2.0
+_EPIDERMIS_RANGE_MM = 1e-3, 2.0
 """Accepted thickness of the epidermis: from less than a cell to a callous heel [mm]."""
 
 
@@ -48,7 +48,7 @@ class SkinParameters:
         """Check the ranges of all fields."""
         for name in _FRACTION_FIELDS:
             checked_number(_option_name(name), getattr(self, name), 0.0, 1.0, "a fraction")
-        checked_number(_option_name("epidermis_mm"), self.epidermis_mm, *_EPIDERMIS_MM, "mm")
+        checked_number(_option_name("epidermis_mm"), self.epidermis_mm, *_EPIDERMIS_RANGE_MM, "mm")
         if self.melanin + self.epidermal_blood > 1.0:
             both = f"{_option_name('melanin')} and {_option_name('epidermal_blood')}"
             actual = f"got {self.melanin:g} and {self.epidermal_blood:g}"
@@ -60,15 +60,15 @@ def _option_name(name: str) -> str:
 
 
 def _donner_jensen_skin(melanin: float, eumelanin: float, blood: float) -> SkinParameters:
-    """Return a skin of [DonnerJensen2006a], whose oxygenation and thickness are from public code."""
+    """Return a skin of [DonnerJensen2006a], with oxygenation and epidermal thickness from public code."""
     return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25)
 
 
-SPECTRAL: Final = "spectral"
+SPECTRAL_PRESET: Final = "spectral"
 DEFAULT_SKIN: Final = SkinParameters()
 SKINS: Final[Mapping[str, SkinParameters]] = MappingProxyType(
     {
-        SPECTRAL: DEFAULT_SKIN,
+        SPECTRAL_PRESET: DEFAULT_SKIN,
         "light": _donner_jensen_skin(0.005, 0.7, 0.005),
         "medium": _donner_jensen_skin(0.15, 0.0, 0.01),
         "dark": _donner_jensen_skin(0.5, 0.7, 0.05),

@@ -19,7 +19,7 @@ WAVELENGTHS_NM: Floats = np.arange(400.0, 701.0, 10.0)
 """Wavelengths from which colours are computed, (31,) [nm]."""
 WAVELENGTHS_NM.setflags(write=False)
 
-_PRIMARIES = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # red, green, blue; CIE 1931 x, y
+_PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # red, green, blue; CIE 1931 x, y
 _NM_PER_MM = 1e6
 _MM_PER_CM = 10.0
 _HAEMOGLOBIN_MOLAR = 150.0 / 64500.0  # in whole blood: 150 g/l of 64500 g/mol [mol/l]
@@ -81,7 +81,7 @@ def _weighted_colour_matching() -> Floats:
 
 def _primaries_xyz() -> Floats:
     """Return the matrix (3, 3) whose columns are XYZ of the Rec. 709 primaries, each with luminance 1."""
-    x, y = _PRIMARIES.T
+    x, y = _PRIMARIES_XY.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])
 
 
