@@ -16,7 +16,7 @@ from dermis.mesh.geometry import split_quads
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-PADDING = 1 / 256
+CHART_PADDING = 1 / 256
 _CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # of the seam over the crown, on the mean person [mm]
 _LOOSE = 0.05  # weight of what fills holes while a sheet is laid flat
 FACE, SCALP, EARS, TRUNK, HIDDEN, PLAIN = 1.0, 0.35, 0.7, 0.26, 0.14, 0.06
@@ -46,7 +46,7 @@ def human_layout(
         points = np.unique(corner[own])
         flat[points] = _flattened(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
     outlines = [flat[border_edges(split_quads(corner[own]))[0]] for own in pieces]
-    scale, offset = pack_charts(outlines, PADDING)
+    scale, offset = pack_charts(outlines, CHART_PADDING)
     for own, move in zip(pieces, offset, strict=True):
         points = np.unique(corner[own])
         flat[points] = scale * flat[points] + move

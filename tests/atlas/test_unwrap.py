@@ -12,7 +12,7 @@ from dermis.atlas.raster import rasterise
 from dermis.atlas.unwrap.charts import connected_pieces, grow_charts, merge_strays, neighbours, smooth_charts
 from dermis.atlas.unwrap.flatten import flatten, singular_values, untangle
 from dermis.atlas.unwrap.seams import border_edges, crossing_edges, faulty_triangles, split_at_seams
-from dermis.atlas.unwrap.unwrap import PADDING, UvLayout, pack_charts, unwrap
+from dermis.atlas.unwrap.unwrap import CHART_PADDING, UvLayout, pack_charts, unwrap
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Material, Mesh, build_mesh
@@ -169,7 +169,7 @@ def test_space_between_charts() -> None:
     positions, triangles = square(24)
     layout = unwrap(positions, triangles, grow_charts(positions, triangles, 30))
     owner = owners_of_texels(as_mesh(layout, positions), layout)
-    reach = int(PADDING * SIZE)
+    reach = int(CHART_PADDING * SIZE)
     y, x = np.nonzero(owner >= 0)
     for dy, dx in ((0, reach), (reach, 0), (reach // 2, reach // 2), (reach // 2, -(reach // 2))):
         ny, nx = y + dy, x + dx
@@ -264,12 +264,12 @@ def test_rectangles_are_packed_well() -> None:
     size = random.uniform(1, 4, (25, 2))
     box = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     outlines = [np.stack((box * s, np.roll(box, -1, axis=0) * s), axis=1) + 7.0 for s in size]
-    scale, offset = pack_charts(outlines, PADDING)
+    scale, offset = pack_charts(outlines, CHART_PADDING)
     low, high = scale * 7.0 + offset, scale * (7.0 + size) + offset
-    assert (low > PADDING / 3).all() and (high < 1 - PADDING / 3).all()
+    assert (low > CHART_PADDING / 3).all() and (high < 1 - CHART_PADDING / 3).all()
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
     gap[np.diag_indices(25)] = 1
-    assert gap.min() > 0.99 * PADDING
+    assert gap.min() > 0.99 * CHART_PADDING
     assert (scale**2 * size.prod(axis=1)).sum() > 0.65
 
 

@@ -16,7 +16,7 @@ from dermis.base.progress import logged_step
 from dermis.mesh.mesh import Mesh
 
 LAYOUTS = ("mesh", "stitched", "unwrapped")
-MIN_SIZE = 64
+MIN_ATLAS_SIZE = 64
 _CACHE_VERSION = 7  # increment when the result of `build_atlas` for a mesh changes
 
 
@@ -31,8 +31,8 @@ def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = 
 
     Raises DermisError for a size under 64 and for an unknown layout.
     """
-    if size < MIN_SIZE:
-        expected = f"a size of {MIN_SIZE} texels or more"
+    if size < MIN_ATLAS_SIZE:
+        expected = f"a size of {MIN_ATLAS_SIZE} texels or more"
         refuse("atlas", expected, f"it is {size}", "Choose --atlas 1024 or 2048")
     if layout not in LAYOUTS:
         refuse("layout", f"one of {', '.join(LAYOUTS)}", f"got {layout}", "Choose one of these")

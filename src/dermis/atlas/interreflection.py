@@ -151,7 +151,10 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
 
 
 def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
-    """Return the lowest integer between each triangle's corners (3, f), and the number of integers."""
+    """Return the lowest integer between each triangle's three corners (f,), and the number of such integers.
+
+    corner : (3, f) one coordinate of the corners
+    """
     low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
     high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
     return low, np.maximum(high - low + 1, 0).astype(np.int64)
@@ -186,7 +189,10 @@ def _hemisphere_directions(count: int) -> Doubles:
 
 
 def _line_axes(direction: Doubles, angle: float) -> Doubles:
-    """Return the right, up and forward axes (3, 3) along a direction, rotated about it by an angle [rad]."""
+    """Return the right, up and forward axes (3, 3): forward is `direction`, the others are rolled about it.
+
+    angle : angle of the roll [rad]
+    """
     right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     right /= np.linalg.norm(right)
     up = np.cross(direction, right)

@@ -66,7 +66,7 @@ def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Doubl
 
 
 def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Rasterise triangles in uv; return flat texel indices and the triangle that covers each centre.
+    """Rasterise triangles in uv; return flat indices of covered texels, and the triangle that covers each.
 
     size : texels along each side of the map
     triangle : (t,) indices of the triangles
@@ -78,7 +78,7 @@ def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Ind
 def covered_texels(
     p: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
 ) -> tuple[Index, Index]:
-    """Return the flat indices of texels whose centres triangles cover, and the triangles' rows in `p`.
+    """Return the flat index of each texel whose centre is in a triangle, and the row of that triangle in `p`.
 
     p : (t, 3, 2) corners of the triangles [texel], integers at texel centres
     shape : height and width of the grid of texels
@@ -201,7 +201,7 @@ def _dilate_owners(owner: Ints) -> Ints:
 
 
 def _interpolable_triangles(mesh: Mesh, size: int, owner: Ints) -> Mask:
-    """Return the mask (f,) of triangles around whose corners all four texels are owned.
+    """Return the mask (f,) of triangles with an owner for each of the four texels around each corner.
 
     Only such corners can be interpolated bilinearly; slivers may have no texels.
     """
@@ -243,7 +243,7 @@ def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
 def _texel_metric(
     mesh: Mesh, size: int, owner: Ints, barycentric: NDArray[np.uint16]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """Return texels per mm along u and v, and the cosine of the angle between them, at each texel.
+    """Return each texel's stretch (n, n, 2) along u and v [1/mm], and shear (n, n), as defined in `Atlas`.
 
     They are interpolated from the derivatives dp/du and dp/dv at the vertices.
     """

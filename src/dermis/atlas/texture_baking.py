@@ -24,7 +24,6 @@ _DEFAULTS: Mapping[Role, tuple[float, ...]] = {
     "normal": (0.0, 0.0),
     "roughness": (1.0,),
     "metalness": (1.0,),
-    "occlusion": (1.0,),
     "emission": (1.0, 1.0, 1.0),
 }
 """Values where a material has no picture, to which its factors apply."""
@@ -46,12 +45,17 @@ class PackedTextures:
 
 
 def pack_textures(
-    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
+    mesh: Mesh,
+    surface: FileSurface,
+    materials: Sequence[FileMaterial],
+    members: Mask,
+    required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
     """Return the common layout and maps of some materials of a mesh.
 
     surface, materials : of the file that the mesh comes from
     members : (m,) materials of the mesh that share the maps
+    required : roles that have a map even if no material has a picture for them
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
     baker = _Baker(mesh, surface, materials, tiles, side)
@@ -59,7 +63,7 @@ def pack_textures(
     return PackedTextures(
         np.concatenate([tile.vertices for tile in tiles]),
         np.concatenate([tile.layout_uv(side) for tile in tiles]).astype(np.float32),
-        {role: baker.bake(role) for role in baker.roles()},
+        {role: baker.bake(role) for role in baker.roles(required)},
         notes,
     )
 
@@ -74,10 +78,10 @@ class _Baker:
     tiles: list[Tile]
     side: int
 
-    def roles(self) -> list[Role]:
-        """Return the roles for which a material has a picture, and colour."""
+    def roles(self, required: Sequence[Role]) -> list[Role]:
+        """Return the roles for which a material has a picture, and those required."""
         used = {role for tile in self.tiles for role in self._material(tile).textures}
-        return [role for role in _DEFAULTS if role in used | {"colour"}]
+        return [role for role in _DEFAULTS if role in used or role in required]
 
     def bake(self, role: Role) -> Floats:
         """Return the common map (side, side, k) of a role."""
@@ -162,7 +166,6 @@ def _factor(material: FileMaterial, role: Role) -> Floats:
         "normal": (material.normal_scale, material.normal_scale),
         "roughness": (1.0 if material.roughness is None else material.roughness,),
         "metalness": (material.metalness,),
-        "occlusion": (1.0,),
         "emission": material.emission,
     }
     return np.array(factors[role], np.float32)

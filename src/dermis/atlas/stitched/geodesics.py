@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 START_SHIFT = 1e-3
 """Fraction of the way by which start points move to an inner point, so that none is at a corner."""
 
-INNER_WEIGHTS = 0.3547, 0.3141, 0.3312
+INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
 """Barycentric weights of that inner point; the centroid would let more geodesics hit corners."""
 
 _MAX_STEPS = 4096
@@ -101,7 +101,7 @@ def _leave_first_triangle(
 ) -> Geodesics:
     """Return the geodesics that leave their first triangle, and store the ends of those that do not."""
     corners = _as_complex(adjacency.planar_corners[triangle])
-    start = start + START_SHIFT * (corners @ np.array(INNER_WEIGHTS) - start)
+    start = start + START_SHIFT * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
     leaves_through = (_cross(direction[:, None], corners) <= 0.0) & (_cross(direction[:, None], after) >= 0.0)

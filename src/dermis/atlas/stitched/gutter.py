@@ -139,7 +139,7 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from nearest border points to texels; return their ends and the points' weights.
+    """Trace geodesics from nearest border points to texels; return their ends, and the weights of the points.
 
     The weights (n, 2) are those of the second and third corner of the border triangle.
 

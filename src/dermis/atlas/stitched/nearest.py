@@ -9,7 +9,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import expand_runs
 
-_TEXEL = 1.001  # a texel, with a margin for rounding
+_RIM_WIDTH_TEXELS = 1.001  # a texel, with a margin for rounding
 
 
 class BorderSides(NamedTuple):
@@ -60,9 +60,10 @@ class _SideMetric(NamedTuple):
 
 
 def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
-    """Return the nearest border point of each texel in a gutter, or read by interpolation at a border.
+    """Return the nearest border point of each texel that is in a gutter or in the rim of a piece.
 
-    Distances are measured by the surface metric at each border side.
+    Distances are measured by the surface metric at each border side. The rim consists of the texels that
+    bilinear interpolation at some point of the border reads.
 
     inside : (h, w) mask of texels that chart pieces cover
     """
@@ -95,7 +96,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
     e, f, g = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
     det = np.maximum(np.maximum(e * g - f * f, 1e-9 * e * g), 1e-30)
     reach = sides.gutter_mm * np.sqrt(np.stack((g, e)) / det)
-    half_extent = np.maximum(np.minimum(reach, sides.max_texels), _TEXEL).T
+    half_extent = np.maximum(np.minimum(reach, sides.max_texels), _RIM_WIDTH_TEXELS).T
     x, y = (sides.ends[:, 1] - sides.ends[:, 0]).T
     length = np.maximum(e * x * x + 2 * f * x * y + g * y * y, 1e-30)
     along = np.column_stack((e * x + f * y, f * x + g * y)) / length[:, None]
@@ -120,9 +121,11 @@ def _candidate_texels(
 def _within_a_texel(offset: Doubles, along: Doubles) -> Mask:
     """Return the mask of offsets (2, n) that are within a texel of the segment from 0 to `along` (2, n)."""
     low, high = np.minimum(along, 0.0), np.maximum(along, 0.0)
-    found = np.asarray(((offset > low - _TEXEL) & (offset < high + _TEXEL)).all(axis=0))
+    found = np.asarray(((offset > low - _RIM_WIDTH_TEXELS) & (offset < high + _RIM_WIDTH_TEXELS)).all(axis=0))
     offset, along = offset[:, found], along[:, found]
     along = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    ends = np.sort(np.stack(((offset - _TEXEL) / along, (offset + _TEXEL) / along)), axis=0)
+    ends = np.sort(
+        np.stack(((offset - _RIM_WIDTH_TEXELS) / along, (offset + _RIM_WIDTH_TEXELS) / along)), axis=0
+    )
     found[found] = np.maximum(ends[0].max(axis=0), 0.0) <= np.minimum(ends[1].min(axis=0), 1.0)
     return found

@@ -36,13 +36,13 @@ _MAX_GRID_CELLS = 600_000  # largest number of texels of the whole grid
 _CONFLICT_RANGE = 0.6  # fraction of the gutter width within which conflicts are counted
 _CLUSTER_CELL = 0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
 _CELLS_PER_GUTTER = 8  # cells of the grid for distances, per gutter width
-_MIN_LENGTH = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
+_MIN_CONFLICT_LENGTH = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
 _MIN_BENEFIT = 0.2  # fewest separated conflicts per texel of a cut
-_ANGLES, _OFFSETS = 8, 16  # number of directions and offsets of lines that are tried
+_LINE_DIRECTIONS, _LINE_OFFSETS = 8, 16  # number of directions and offsets of lines that are tried
 _LENGTH_BIAS = (
     1.0  # texels per conflict that are added to a cut's length, so that very short cuts are not preferred
 )
-_MIN_PART = 0.1  # area of the smallest part that stays separate, in squared gutter widths
+_MIN_PART_AREA = 0.1  # area of the smallest part that stays separate, in squared gutter widths
 _MAX_DEPTH = 4  # largest number of successive cuts
 _MAX_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along cuts
 
@@ -210,7 +210,7 @@ def _cut_piece(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float)
     reach = gutter_mm / found.texel_mm
     part = np.zeros(len(own), np.int64)
     for row, cluster in enumerate(_conflict_clusters(found, reach), start=1):
-        if len(cluster) * found.texel_mm < _MIN_LENGTH * gutter_mm:
+        if len(cluster) * found.texel_mm < _MIN_CONFLICT_LENGTH * gutter_mm:
             continue
         overlap = found._replace(one=found.one[cluster], other=found.other[cluster])
         normal, offset, separated = _best_line(overlap, reach)
@@ -255,6 +255,8 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
     """Return the mask (t,) of triangles near meeting gutters, on the side of a line with less such area.
 
+    The area is that of the triangles near meeting gutters on each side.
+
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
     """
@@ -266,15 +268,18 @@ def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: 
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts for its length: normal, offset and their number."""
+    """Return the line that separates most conflicts for its length.
+
+    Returns its normal and offset, and the number of conflicts that it separates.
+    """
     close = overlap.inside[_within_reach(overlap.inside, np.concatenate((overlap.one, overlap.other)), reach)]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
-    for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
+    for angle in np.arange(_LINE_DIRECTIONS) * np.pi / _LINE_DIRECTIONS:
         normal = np.array([np.cos(angle), np.sin(angle)])
         one, other, inside = (points @ normal for points in (overlap.one, overlap.other, close))
         low, high = np.minimum(one, other), np.maximum(one, other)
         first, last = low.min(), high.max()
-        offsets = first + (last - first) * (np.arange(_OFFSETS)[:, None] + 0.5) / _OFFSETS
+        offsets = first + (last - first) * (np.arange(_LINE_OFFSETS)[:, None] + 0.5) / _LINE_OFFSETS
         separated = np.count_nonzero((low < offsets) & (offsets < high), axis=1)
         length = np.count_nonzero(np.abs(inside - offsets) < 0.5, axis=1)
         score = separated / (length + _LENGTH_BIAS * len(one))
@@ -295,7 +300,7 @@ def _connected_parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: f
     neighbour = np.where(there >= 0, there, np.arange(len(own))[:, None])
     part = connected_pieces(part, neighbour)
     area = np.bincount(part, surface.area_mm2[own])
-    is_small = area[part] < _MIN_PART * gutter_mm**2
+    is_small = area[part] < _MIN_PART_AREA * gutter_mm**2
     largest_neighbour = np.take_along_axis(
         part[neighbour], area[part[neighbour]].argmax(axis=1)[:, None], axis=1
     )[:, 0]

@@ -18,9 +18,9 @@ _MAX_CELLS = 512  # largest number of cells along each side of the square
 _COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTIONS = 8  # number of trials in the search for the scale
 _FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest gain of scale by them
-_ORDERS = 6  # number of packing orders: by area, height and width, each by rows and by columns
-_MIN_GAIN = 1.003  # gain of scale for which the search is repeated with another order
-_MAX_MASKS = 4  # number of attempts with masks of different scales
+_ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
+_MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
+_MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
 _MASK_RATIO = 0.65  # found scale over the scale of the masks, below which the masks are computed again
 _MASK_EXCESS = 1.15  # scale of the next masks over the found scale
 
@@ -157,7 +157,7 @@ def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layou
     """Return the layout with the largest scale that the search finds, or None if the pieces never fit."""
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
-    for _ in range(_MAX_MASKS):
+    for _ in range(_MAX_MASK_ATTEMPTS):
         found = _largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
         if found is None or found.scale > _MASK_RATIO * top:
             return found
@@ -171,9 +171,9 @@ def _largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout |
     The best order is searched with coarse cells.
     """
     coarse, best = None, 0
-    for order in range(_ORDERS):
+    for order in range(_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
-        if order == 0 or (coarse and _try_scale(masks, lower * _MIN_GAIN, cells // _COARSENING, order)):
+        if order == 0 or (coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells // _COARSENING, order)):
             found = _bisect_scale(masks, (lower, top / _COARSENING), cells // _COARSENING, order, _BISECTIONS)
             coarse, best = (found, order) if found else (coarse, best)
     if coarse is None:

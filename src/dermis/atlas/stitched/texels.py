@@ -99,7 +99,7 @@ def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
 
 
 def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance of surface points above which there is a gap between adjacent texels, (n,) [mm].
+    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """

@@ -18,8 +18,10 @@ TILE_CELLS = 4
 TILE_MARGIN_TEXELS = 0.7
 """Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
 
-_PAIR_RADIUS = 3.2  # largest distance of a pair, in standard deviations of the widest Gaussian
-_CELL_SIZE = 0.36  # side of a cell in the same unit, so small that light interpolated between cells is smooth
+_PAIR_RADIUS_SIGMAS = 3.2  # largest distance of a pair, in standard deviations of the widest Gaussian
+_CELL_SIGMAS = (
+    0.36  # side of a cell in the same unit, so small that light interpolated between cells is smooth
+)
 _MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs
 _MAX_TEXELS = 1024  # largest number of texels per side whose light is averaged, if there are fewer cells
 _SAME_POINT_TEXELS = (
@@ -70,7 +72,7 @@ class Cells:
     @property
     def radius_mm(self) -> float:
         """Return the largest distance between the entry and the exit cell of a translucent pair [mm]."""
-        return _PAIR_RADIUS * self.max_sigma_mm
+        return _PAIR_RADIUS_SIGMAS * self.max_sigma_mm
 
     @property
     def tiles_per_side(self) -> int:
@@ -86,7 +88,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -
     coarser : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
-    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIZE * sigma_mm * coarser)))
+    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * coarser)))
     side = min(max(side, 1), atlas.size)
     stride = max(1, atlas.size // max(_MAX_TEXELS, side))
     tiles = -(-side // TILE_CELLS)
@@ -157,7 +159,7 @@ def _source_cells(lit: Mask, tiles: int) -> tuple[Index, Index]:
 
 
 def _tile_of(atlas: Atlas, points: Words, side: int, tiles: int) -> Ints:
-    """Return the index of the tile (m,) in which the atlas contains each surface point.
+    """Return the index (m,) of the tile in which each surface point lies in the atlas.
 
     A point that a gutter texel shows is in the tile of the texel that the gutter copies.
 
@@ -198,10 +200,10 @@ def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return lit texels (r, 2) at chart rims whose surface point is elsewhere in the atlas, and where.
+    """Return lit texels at chart rims whose surface point is elsewhere in the atlas, and that position.
 
-    The second array has the position (r, 2) of the point in the atlas [texel]. Such texels are outside the
-    triangles of their chart, but interpolation reads them.
+    Both arrays are (r, 2): texel indices, and positions of the points in the atlas [texel]. Such texels are
+    outside the triangles of their chart, but interpolation reads them.
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):

@@ -11,7 +11,7 @@ from dermis.atlas.unwrap.flatten import flatten, vertex_components
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, cross_2d, uv_cross
 
-_BLOCK = 256  # number of edges that are compared with all other edges at a time
+_EDGES_PER_BLOCK = 256  # number of edges that are compared with all other edges at a time
 _MAX_REASSIGNMENTS = 6  # number of moves of faulty triangles to adjacent charts before charts are split
 
 
@@ -67,8 +67,8 @@ def crossing_edges(edges: Doubles) -> Mask:
     edges : (k, 2, 2) end points of the edges
     """
     found = np.zeros(len(edges), dtype=bool)
-    for k in range(0, len(edges), _BLOCK):
-        found[k : k + _BLOCK] = _pairs_cross(edges[k : k + _BLOCK], edges).any(axis=1)
+    for k in range(0, len(edges), _EDGES_PER_BLOCK):
+        found[k : k + _EDGES_PER_BLOCK] = _pairs_cross(edges[k : k + _EDGES_PER_BLOCK], edges).any(axis=1)
     return found
 
 

@@ -19,10 +19,10 @@ from dermis.mesh.mesh import Mesh, build_mesh
 _GRID_CELLS = 512  # number of cells along each side of the map
 _MAX_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
 _BISECTIONS = 9  # number of trials in the search for the scale
-_MIN_GAIN = 1.004  # gain of scale for which the search is repeated with another order
-PADDING = 1 / 128
+_MIN_SCALE_GAIN = 1.004  # gain of scale for which the search is repeated with another order
+CHART_PADDING = 1 / 128
 """Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
-UPRIGHT = (0.0, 1.0, -0.1)
+DEFAULT_UP_DIRECTION = (0.0, 1.0, -0.1)
 """Direction in space that points up on the map: upwards and, for horizontal surfaces, backwards."""
 _MIN_AREA_MM2 = 1e-10
 _CHART_COUNT = 16
@@ -49,7 +49,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     best, cells = 0.0, None
     for order in _packing_orders(size):
         low, high = best, bound
-        if cells is not None and _drop_charts(shifted, order, best * _MIN_GAIN, padding) is None:
+        if cells is not None and _drop_charts(shifted, order, best * _MIN_SCALE_GAIN, padding) is None:
             continue
         for _ in range(_BISECTIONS):
             scale = (low + high) / 2
@@ -133,7 +133,11 @@ class UvLayout:
 
 
 def unwrap(
-    positions: Doubles, triangles: Index, chart: Index, upright: ArrayLike = UPRIGHT, padding: float = PADDING
+    positions: Doubles,
+    triangles: Index,
+    chart: Index,
+    upright: ArrayLike = DEFAULT_UP_DIRECTION,
+    padding: float = CHART_PADDING,
 ) -> UvLayout:
     """Unwrap a mesh into a uv layout in which no triangle is mirrored and none overlaps another.
 
