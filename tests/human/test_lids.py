@@ -147,5 +147,5 @@ def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
         part, moved = targets.rows(targets.index[name]), places.copy()
         point = targets.point[part]
         moved[point] += targets.delta_mm[part]
-        drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.FORWARD))
+        drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.REST_GAZE))
         assert found[part] == pytest.approx((drawn - resting)[point], abs=1e-5)

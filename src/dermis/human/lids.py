@@ -23,7 +23,7 @@ EYE_OFFSET_MM = 2.2
 CONTROL_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
 _SKIN_REACH_MM = 15.0  # distance up to which skin follows the lids
-_FALLOFF_MM = 1.0  # blend distance between the lid points that skin follows
+_SKIN_BLEND_MM = 1.0  # blend distance between the lid points that skin follows
 _MIN_HEIGHT_MM = -1.5  # relative to the eyeball; deeper points are never visible
 _LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # fractions of the radius, see `_compress_radius`
 _CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # minimum distances of wall, edge, crest and skin from the eye
@@ -33,13 +33,20 @@ _ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
 """Rise of the floor of the inner corner for each row while the eye is open."""
-_UPPER, _LOWER = slice(1, 12), slice(13, 28)  # rows of lid_rings.csv that hold the upper and the lower lid
-_OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
+_UPPER_LID_ROWS, _LOWER_LID_ROWS = (
+    slice(1, 12),
+    slice(13, 28),
+)  # rows of lid_rings.csv that hold the upper and the lower lid
+_LID_OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
 """Overlap of closed upper lids over the lower lids."""
 _SLIDING_ROWS = 6  # rows of quads around the lids that may slide over the eye
 _BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
-_RINGS, _EDGE, _CREST = 4, 1, 2  # number of columns of lid_rings.csv, and indices of two of them
-FORWARD = np.array([0.0, 0.0, 1.0])
+_RING_COUNT, _EDGE_COLUMN, _CREST_COLUMN = (
+    4,
+    1,
+    2,
+)  # number of columns of lid_rings.csv, and indices of two of them
+REST_GAZE = np.array([0.0, 0.0, 1.0])
 """Viewing direction of the eyes in rest pose."""
 _LID_TARGET_PREFIXES = "eyeBlink", "eyeLook", "eyeSquint", "eyeWide"
 Doubles = NDArray[np.float64]
@@ -61,7 +68,7 @@ class LidSide(NamedTuple):
 
     rings : (r,) indices of the lid points, row by row of lid_rings.csv
     point : (n,) indices of the lid points and of the surrounding skin
-    weights : (n, r) by which `point` follows the displacements of `rings`
+    weights : (n, r) weights with which the points in `point` follow the displacements of those in `rings`
     contact, clearances_mm : (c,) indices of the points that slide over the eye, and their minimum distances
         from it [mm]
     """
@@ -85,7 +92,7 @@ def fit_socket(balls: Points) -> EyeSocket:
 
 
 def fit_lids(
-    points_mm: Points, sockets: tuple[EyeSocket, EyeSocket], closed: bool = False, axis: Points = FORWARD
+    points_mm: Points, sockets: tuple[EyeSocket, EyeSocket], closed: bool = False, axis: Points = REST_GAZE
 ) -> Points:
     """Return a person's published points (n, 3) with the lids fitted to eyeballs of anatomical size [mm].
 
@@ -107,7 +114,7 @@ def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | 
     axis : (3,) unit viewing direction of the eye; (m, 1, 3) for m poses
     """
     points[..., side.point, :] += side.weights @ _lid_displacements(points[..., side.rings, :], eye, closed)
-    centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
+    centre = eye.centre + eye.size * EYE_OFFSET_MM * REST_GAZE
     size = CONTROL_SCALE * eye.size
     relative = (points[..., side.contact, :] - centre) / size
     distance, surface = radial_distances_mm(relative, axis)
@@ -129,7 +136,7 @@ def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidConta
         np.concatenate([side.clearances_mm for side in both]).astype(np.float32),
         np.array([first + apex, first + eyeball_size + apex], np.int32),
         np.array([first + back, first + eyeball_size + back], np.int32),
-        lid_rings()[..., _EDGE].astype(np.int32),
+        lid_rings()[..., _EDGE_COLUMN].astype(np.int32),
     )
 
 
@@ -141,12 +148,12 @@ def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> P
     """
     published = (rings - eye.centre) / eye.size
     relative, is_closed = published.copy(), np.asarray(closed)
-    lids = relative.reshape(-1, len(_ROW_CONTACT), _RINGS, 3)
+    lids = relative.reshape(-1, len(_ROW_CONTACT), _RING_COUNT, 3)
     for one in np.flatnonzero(is_closed):
         _close_upper_lid(lids[one])
     above = np.linalg.norm(published, axis=-1) - PUBLISHED_EYE_RADIUS_MM
-    above = above.reshape(*is_closed.shape, -1, _RINGS)
-    above += (_ROW_CONTACT * (_EDGE_HEIGHT_MM - above[..., _EDGE]))[..., None]
+    above = above.reshape(*is_closed.shape, -1, _RING_COUNT)
+    above += (_ROW_CONTACT * (_EDGE_HEIGHT_MM - above[..., _EDGE_COLUMN]))[..., None]
     radius = SCLERA_MM + np.maximum(above.reshape(*is_closed.shape, -1), _MIN_HEIGHT_MM)
     across = np.linalg.norm(relative[..., :2], axis=-1)
     target_radius = radius * _compress_radius(across / radius)
@@ -161,10 +168,10 @@ def _close_upper_lid(rings: Points) -> None:
 
     rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the eye
     """
-    crest = rings[:, _CREST]
-    lower = crest[_LOWER][np.argsort(crest[_LOWER, 0])]
-    ends = np.interp(crest[_UPPER, 0], lower[:, 0], lower[:, 1]) - _OVERLAP_MM
-    rings[_UPPER, :, 1] += (ends - crest[_UPPER, 1])[:, None]
+    crest = rings[:, _CREST_COLUMN]
+    lower = crest[_LOWER_LID_ROWS][np.argsort(crest[_LOWER_LID_ROWS, 0])]
+    ends = np.interp(crest[_UPPER_LID_ROWS, 0], lower[:, 0], lower[:, 1]) - _LID_OVERLAP_MM
+    rings[_UPPER_LID_ROWS, :, 1] += (ends - crest[_UPPER_LID_ROWS, 1])[:, None]
 
 
 def _compress_radius(across: Points) -> Points:
@@ -192,7 +199,7 @@ def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSid
     distance = np.linalg.norm(points_mm[near][:, None] - points_mm[ring_points], axis=-1)
     within = distance.min(axis=1) < _SKIN_REACH_MM
     point, distance = near[within], distance[within]
-    weights = 1.0 / (distance**2 + _FALLOFF_MM**2) ** 2
+    weights = 1.0 / (distance**2 + _SKIN_BLEND_MM**2) ** 2
     weights /= weights.sum(axis=1, keepdims=True)
     t = distance.min(axis=1) / _SKIN_REACH_MM
     weights *= (1.0 - t * t * (3.0 - 2.0 * t))[:, None]
@@ -204,7 +211,7 @@ def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSid
 
 
 def _sliding_points(rings: Index, point: Index, name: str) -> Index:
-    """Return the skin points (c,) beyond the lid rings that a blink moves, which also slide over the eye.
+    """Return the skin points (c,) beyond the lid rings that slide over the eye because a blink moves them.
 
     rings : (rows, 4) lid points from lid_rings.csv
     point : (n,) candidates
@@ -232,7 +239,7 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
     posed = np.tile(rest_points, (len(lids.closed), 1, 1))
     posed[lids.target, lids.point_index] += delta_mm[lids.row]
     for side, eye, target_index in zip(lids.lid_sides, sockets, lids.target_index, strict=True):
-        _project_lids(rest_points, side, eye, False, FORWARD)
+        _project_lids(rest_points, side, eye, False, REST_GAZE)
         near = posed[target_index]
         _project_lids(near, side, eye, lids.closed[target_index], lids.axis[target_index])
         posed[target_index] = near
@@ -273,7 +280,7 @@ def _lid_targets() -> _LidTargets:
     row = np.concatenate(rows)
     return _LidTargets(
         np.array(["Blink" in name for name in names]),
-        np.array([gaze_axes().get(name, FORWARD) for name in names])[:, None],
+        np.array([gaze_axes().get(name, REST_GAZE) for name in names])[:, None],
         point,
         tuple(side.reindexed(point) for side in sides),
         tuple(np.flatnonzero(one) for one in near),
@@ -285,7 +292,7 @@ def _lid_targets() -> _LidTargets:
 
 @cache
 def gaze_axes() -> dict[str, Points]:
-    """Return the viewing direction (3,) of an eye at full weight of each gaze target, by target name."""
+    """Return the viewing direction (3,) that each gaze target at full weight gives an eye, by target name."""
     angles = {rotation.target: np.radians(rotation.degrees) for rotation in gaze_rotations()}
     axes = {}
     for name, (x, y, _) in angles.items():
@@ -304,5 +311,5 @@ def eyeball_mesh() -> tuple[Doubles, Index]:
 
 def place_eyeball(eye: EyeSocket) -> tuple[Doubles, Doubles]:
     """Return the control points (n, 3) and the centre (3,) of the anatomical eyeball in a socket [mm]."""
-    centre = eye.centre + eye.size * EYE_OFFSET_MM * FORWARD
+    centre = eye.centre + eye.size * EYE_OFFSET_MM * REST_GAZE
     return centre + eye.size * eyeball_mesh()[0], centre

@@ -14,7 +14,7 @@ from dermis.base.errors import format_value, refuse
 
 Points = NDArray[np.float64]
 
-YOUNG, OLD = 25.0, 90.0
+YOUNG_AGE, OLD_AGE = 25.0, 90.0
 """Ages of the published young and old people [years]."""
 
 DELTA_UNIT_MM = 0.01
@@ -69,7 +69,7 @@ def _target_indices() -> Mapping[str, int]:
 
 
 def check_targets(names: Iterable[str]) -> None:
-    """Raise DermisError, with similar names as advice, for a name that is no published morph target."""
+    """Raise DermisError, suggesting similar names, if a name is not that of a published morph target."""
     for name in names:
         if name not in _target_indices():
             known = target_deltas().names

@@ -28,7 +28,7 @@ from dermis.mesh.subdivide import Refinement, refinement
 Layout = Literal["own", "hm08"]
 Index = NDArray[np.int64]
 
-CREDIT = "MakeHuman community, CC0"
+MAKEHUMAN_CREDIT = "MakeHuman community, CC0"
 _EYE_COLOUR, _TOOTH_COLOUR, _TONGUE_COLOUR = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
 LEFT_EYE, RIGHT_EYE = "helper-l-eye", "helper-r-eye"
 MATERIALS = {
@@ -91,7 +91,7 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
-    return Head("human", mesh, maps, CREDIT, rig, _build_eyes(eyes))
+    return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eyes))
 
 
 def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:

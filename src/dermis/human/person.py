@@ -15,7 +15,7 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields, checked_integer, checked_number
 from dermis.human.hair.groom import add_hair
 from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
-from dermis.human.makehuman import OLD, YOUNG, human_targets
+from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.model import Layout, build_head, control_points_mm, template
 from dermis.human.skin.look import (
     Demographics,
@@ -61,7 +61,7 @@ _FIELD_RANGES = {
     "asian": (0.0, 1.0),
     "caucasian": (0.0, 1.0),
     "sex": (0.0, 1.0),
-    "age": (YOUNG, OLD),
+    "age": (YOUNG_AGE, OLD_AGE),
     "weight": (-1.0, 1.0),
     "muscle": (-1.0, 1.0),
     "hair_eumelanin": (0.0, 10.0),
@@ -83,12 +83,12 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
     sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
     sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     old = rng.beta(1.2, 2.2)
-    old = (macro["age"] - YOUNG) / (OLD - YOUNG) if "age" in macro else old
+    old = (macro["age"] - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE) if "age" in macro else old
     weight = rng.normal(0.3 * old - 0.1, 0.25)
     muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * old, 0.2)
     fields: dict[str, Any] = {
         "sex": float(sex),
-        "age": float(YOUNG + (OLD - YOUNG) * old),
+        "age": float(YOUNG_AGE + (OLD_AGE - YOUNG_AGE) * old),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
@@ -435,7 +435,7 @@ class Human:
 
     def _adult_fractions(self) -> dict[str, float]:
         """Return the blend fractions of MakeHuman's four adults: female or male, young or old."""
-        old = (self.age - YOUNG) / (OLD - YOUNG)
+        old = (self.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
         return {
             f"{sex}-{age}": sex_fraction * age_fraction
             for sex, sex_fraction in (("female", 1.0 - self.sex), ("male", self.sex))

@@ -12,9 +12,9 @@ from dermis.human.skin.surface import average_surface
 
 Doubles = NDArray[np.float64]
 
-ARCH_MM, CROWN_MM = 160.0, 40.0
+MM_PER_U, MM_PER_V = 160.0, 40.0
 """Lengths of a unit of u and of v [mm]."""
-MIDDLE, BITE = 0.5, 0.02
+ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
 """u between the first teeth, and v of the biting edge."""
 _ARCH_SAMPLES = 2000
 
@@ -29,8 +29,8 @@ def teeth_layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
     x, y, z = average_surface()[0][points].astype(np.float64).T
     across, deep = float(np.abs(x).max()), float(np.ptp(z))
     angle = np.arctan2(x / across, (z - z.min()) / deep)
-    v = BITE + (y - y.min() if upper else y.max() - y) / CROWN_MM
-    return points, np.stack([MIDDLE + _arc_length(angle, across, deep) / ARCH_MM, v], axis=-1)
+    v = BITING_EDGE_V + (y - y.min() if upper else y.max() - y) / MM_PER_V
+    return points, np.stack([ARCH_MIDDLE_U + _arc_length(angle, across, deep) / MM_PER_U, v], axis=-1)
 
 
 def _arc_length(angle: Doubles, across: float, deep: float) -> Doubles:

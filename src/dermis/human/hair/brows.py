@@ -13,19 +13,19 @@ from dermis.base.arrays import Doubles
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin_surface import tangent_component
 
-_CELL_MM = 2.5
+_GRID_CELL_MM = 2.5
 _GRID_LOW, _GRID_HIGH = (1.0, -2.0), (64.0, 40.0)  # grid around the left brow and the tips of its hairs [mm]
 KNOTS_PER_HAIR = 9
 _MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
-_ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
-_CENTRE_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
-_CENTRE_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
-_HALF_HEIGHT = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
-_ANGLES = np.radians([82, 66, 43, 21, 3, -20, -32])
-_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
-_LENGTH = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
+_TABLE_POSITIONS = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
+_CENTRELINE_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
+_CENTRELINE_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
+_BROW_HALF_HEIGHT = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
+_HAIR_ANGLES = np.radians([82, 66, 43, 21, 3, -20, -32])
+_HAIR_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
+_HAIR_LENGTH_MM = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
 
 
 class SurfacePoints(NamedTuple):
@@ -65,7 +65,9 @@ def grid_points() -> tuple[Doubles, Doubles]:
 
 
 def _grid_axes() -> tuple[Doubles, Doubles]:
-    x, y = (np.arange(low, high + 0.5, _CELL_MM) for low, high in zip(_GRID_LOW, _GRID_HIGH, strict=True))
+    x, y = (
+        np.arange(low, high + 0.5, _GRID_CELL_MM) for low, high in zip(_GRID_LOW, _GRID_HIGH, strict=True)
+    )
     return x, y
 
 
@@ -78,7 +80,7 @@ class BrowSurface:
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
         shape = tuple(map(len, _grid_axes()))
-        tangents = np.gradient(node_mm.reshape(2, *shape, 3), _CELL_MM, axis=(1, 2))
+        tangents = np.gradient(node_mm.reshape(2, *shape, 3), _GRID_CELL_MM, axis=(1, 2))
         self._last = np.array(shape) - 1
         plane = (node_mm * normal).sum(axis=1, keepdims=True)
         slopes = [tangent.reshape(-1, 3) for tangent in tangents]
@@ -90,7 +92,7 @@ class BrowSurface:
         side : (n,) 1 for the left brow, -1 for the right
         x, y : (n,) coordinates in the front plane, x outwards from the middle of the face [mm]
         """
-        grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _CELL_MM
+        grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _GRID_CELL_MM
         grid = np.clip(grid, 0.0, self._last[:, None] - 1e-9)
         cell = grid.astype(np.int64)
         s, t = grid - cell
@@ -111,17 +113,22 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
     lower to the upper edge, and x and y are coordinates in the front plane of the left brow [mm].
     """
     u = rng.random(4 * _MAX_HAIRS)
-    accepted = rng.random(len(u)) < np.interp(u, _ALONG, _DENSITY * _HALF_HEIGHT / _HALF_HEIGHT.max())
+    accepted = rng.random(len(u)) < np.interp(
+        u, _TABLE_POSITIONS, _HAIR_DENSITY * _BROW_HALF_HEIGHT / _BROW_HALF_HEIGHT.max()
+    )
     u = u[accepted][:_MAX_HAIRS]
     v = np.clip(rng.normal(0.0, 0.52, len(u)), -1.5, 1.5)
     ahead, behind = np.minimum(u + 0.02, 1.0), np.maximum(u - 0.02, 0.0)
     along = np.stack(
-        [np.interp(ahead, _ALONG, c) - np.interp(behind, _ALONG, c) for c in (_CENTRE_X, _CENTRE_Y)]
+        [
+            np.interp(ahead, _TABLE_POSITIONS, c) - np.interp(behind, _TABLE_POSITIONS, c)
+            for c in (_CENTRELINE_X, _CENTRELINE_Y)
+        ]
     )
     along /= np.linalg.norm(along, axis=0)
-    offset = v * np.interp(u, _ALONG, _HALF_HEIGHT)
-    x = np.interp(u, _ALONG, _CENTRE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
-    y = np.interp(u, _ALONG, _CENTRE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
+    offset = v * np.interp(u, _TABLE_POSITIONS, _BROW_HALF_HEIGHT)
+    x = np.interp(u, _TABLE_POSITIONS, _CENTRELINE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _TABLE_POSITIONS, _CENTRELINE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
     return u, v, x, y
 
 
@@ -130,11 +137,11 @@ def brow_outline(across: float) -> Doubles:
 
     across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
     """
-    along = np.gradient(np.stack([_CENTRE_X, _CENTRE_Y], axis=-1), axis=0)
+    along = np.gradient(np.stack([_CENTRELINE_X, _CENTRELINE_Y], axis=-1), axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     x, y = (
-        _CENTRE_X - across * _HALF_HEIGHT * along[:, 1],
-        _CENTRE_Y + across * _HALF_HEIGHT * along[:, 0],
+        _CENTRELINE_X - across * _BROW_HALF_HEIGHT * along[:, 1],
+        _CENTRELINE_Y + across * _BROW_HALF_HEIGHT * along[:, 0],
     )
     return np.stack([x, y], axis=-1)
 
@@ -154,10 +161,19 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
     """
     n = len(u)
     # hairs of the upper and the lower half lean towards each other
-    angle = np.interp(u, _ALONG, _ANGLES) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
-    bend = -0.5 * np.clip(angle - np.interp(np.minimum(u + 0.2, 1), _ALONG, _ANGLES), 0, 1) - 0.25 * v * u
+    angle = (
+        np.interp(u, _TABLE_POSITIONS, _HAIR_ANGLES)
+        - 0.6 * v * np.minimum(2.5 * u, 1.0)
+        + rng.normal(0, 0.13, n)
+    )
+    bend = (
+        -0.5 * np.clip(angle - np.interp(np.minimum(u + 0.2, 1), _TABLE_POSITIONS, _HAIR_ANGLES), 0, 1)
+        - 0.25 * v * u
+    )
     bend += rng.normal(0, 0.14, n)
-    length = np.interp(u, _ALONG, _LENGTH) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)
+    length = (
+        np.interp(u, _TABLE_POSITIONS, _HAIR_LENGTH_MM) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)
+    )
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
     radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
     return np.stack([angle, bend, length, rise, radius])

@@ -28,7 +28,7 @@ _WHORL_CENTRE = np.array([9.0, 86.0, -131.0])
 _WHORL_MM = 24.0  # radius of the spiral
 _PARTING_X = 31.0  # position of the parting of short hair
 _PARTING_WIDTH_MM = 9.0
-_LEVEL_TILT = 0.15  # slope of the levels of equal length, higher in front
+_LENGTH_LEVEL_TILT = 0.15  # slope of the levels of equal length, higher in front
 _CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # angles of root and tip to the skin [rad]
 _SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # angles at the sides, and their increase on top [rad]
 _TUFT_MM = 2.2  # size of the cells in which tips form tufts
@@ -73,7 +73,7 @@ def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: flo
     if look.style == "cropped":
         length = look.length_mm * (0.55 + 0.45 * smoothstep(-2.0, 22.0, edge)) * (0.85 + 0.15 * top)
         return GuideShape(growth, length, *(np.full(n, rise) for rise in _CROPPED_RISE))
-    high = points[:, 1] + _LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z)
+    high = points[:, 1] + _LENGTH_LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z)
     sides = 1.0 - look.fade * (1.0 - smoothstep(-45.0, 62.0, high))
     near = 0.3 + 0.7 * np.maximum(smoothstep(0.0, 35.0, edge), top)
     length = look.length_mm * np.minimum(sides, near)
@@ -84,7 +84,8 @@ def comb_scalp(points: Doubles, normals: Doubles, look: HairLook, recession: flo
 def comb_beard(points: Doubles, normals: Doubles, look: HairLook) -> GuideShape:
     """Return the shapes of beard guide hairs, which point down and slightly to the sides.
 
-    points, normals : (n, 3) root positions on the average person [mm], and skin normals of the actual person
+    points : (n, 3) positions of the guide roots on the average person [mm]
+    normals : (n, 3) skin normals of the actual person at these roots
     """
     n = len(points)
     sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
@@ -117,7 +118,7 @@ def _growth_directions(points: Doubles, normals: Doubles) -> Doubles:
 
 def _top_weight(points: Doubles) -> Doubles:
     """Return a blend weight (n,) for combing: 1 on top of the head, 0 at its sides and back."""
-    return smoothstep(48.0, 86.0, points[:, 1] + _LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z))
+    return smoothstep(48.0, 86.0, points[:, 1] + _LENGTH_LEVEL_TILT * (points[:, 2] - HEAD_AXIS_Z))
 
 
 def _combed_directions(points: Doubles, normals: Doubles, growth: Doubles) -> Doubles:

@@ -9,11 +9,11 @@ import numpy as np
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields
-from dermis.human.makehuman import OLD, YOUNG
+from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
 from dermis.human.skin.look import Demographics
 
 Style = Literal["none", "cropped", "short"]
-STYLES: tuple[Style, ...] = get_args(Style)
+HAIR_STYLES: tuple[Style, ...] = get_args(Style)
 FIELD_RANGES = {
     "length_mm": (1.0, 60.0),
     "beard_mm": (0.0, 30.0),
@@ -84,8 +84,10 @@ class HairLook:
 
     def __post_init__(self) -> None:
         """Raise DermisError for an unknown style and for fields out of range."""
-        if self.style not in STYLES:
-            refuse("style", f"one of {', '.join(STYLES)}", f"got {format_value(self.style)}", "Choose one")
+        if self.style not in HAIR_STYLES:
+            refuse(
+                "style", f"one of {', '.join(HAIR_STYLES)}", f"got {format_value(self.style)}", "Choose one"
+            )
         check_fields(
             self, {field.name: FIELD_RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]}
         )
@@ -96,7 +98,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 
     eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
-    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     curl = demographics.weighted_mean(_TYPICAL_CURL)
     tight = curl > _CROPPED_CURL
     short_mm = _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex
@@ -145,7 +147,7 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 def sample_recession(rng: np.random.Generator, demographics: Demographics) -> float:
     """Return a random recession of the hairline for `SkinLook`, 0 to 1, which increases with age in men."""
-    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     man = max(2.0 * demographics.sex - 1.0, 0.0)
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 

@@ -20,12 +20,12 @@ SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
 _MIN_WEIGHT = -1e-9  # tolerance of barycentric weights
-_CELL_MM = 2.0  # cells of the grid of triangle lists
+_GRID_CELL_MM = 2.0  # cells of the grid of triangle lists
 _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),
     np.array([70.0, 50.0]),
 )  # bounds of that grid, around the brows [mm]
-_TRIANGLES = np.array([[0, 1, 2], [2, 3, 0]])  # corners of the two triangles of a quad
+_HALF_QUAD_CORNERS = np.array([[0, 1, 2], [2, 3, 0]])  # corners of the two triangles of a quad
 
 
 class _FrontTriangles(NamedTuple):
@@ -78,7 +78,7 @@ class RootFinder:
         x, y : (n,) coordinates in the front plane [mm]
         """
         front = self._front
-        cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _CELL_MM).astype(np.int64)
+        cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64)
         last_cell = np.array(front.triangle_lists.shape[:2]) - 1
         triangles = front.triangle_lists[tuple(np.clip(cell, 0, last_cell).T)]
         query_index, column = np.nonzero(triangles >= 0)
@@ -100,7 +100,7 @@ class RootFinder:
             np.stack([u[front_index], v[front_index], w[front_index]], axis=-1),
         )
         position = np.einsum(
-            "nk,nkc->nc", weights, _QUAD_CORNERS[_TRIANGLES].take(front.half[triangle], axis=0)
+            "nk,nkc->nc", weights, _QUAD_CORNERS[_HALF_QUAD_CORNERS].take(front.half[triangle], axis=0)
         )
         quad = np.where(hit, front.quad[triangle], 0)
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
@@ -159,14 +159,16 @@ class RootFinder:
     def _front(self) -> _FrontTriangles:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
-        corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _TRIANGLES[half], axis=1)]
+        corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALF_QUAD_CORNERS[half], axis=1)]
         (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_bounding_box(corner)
         ac = ab + ac
         visible = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
         visible &= ((high >= _GRID_LOW) & (low <= _GRID_HIGH)).all(axis=1)
         quad, half, corner = quad[visible], half[visible], corner[visible]
-        shape = np.ceil((_GRID_HIGH - _GRID_LOW) / _CELL_MM).astype(np.int64)
-        grid = (np.floor((bound[visible] - _GRID_LOW) / _CELL_MM).astype(np.int64) for bound in (low, high))
+        shape = np.ceil((_GRID_HIGH - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64)
+        grid = (
+            np.floor((bound[visible] - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64) for bound in (low, high)
+        )
         first, last = (np.clip(cell, 0, shape - 1) for cell in grid)
         cells: dict[tuple[int, int], list[int]] = {}
         for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):

@@ -40,9 +40,9 @@ HUMAN_FIELDS = (
     "neck",
 )
 """Label classes of the skin, in order of precedence."""
-SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
+LIP_SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
 """Polyline where the lips meet: distance from the middle and height [mm]."""
-_OUTSIDE_MM = -1.0
+_OUTSIDE_FIELD_MM = -1.0
 _MIN_BROW_Z = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height above the hairline that separates hair of the head from the beard
 _DENSE_LEVELS = 2
@@ -59,11 +59,11 @@ def label_fields() -> Doubles:
     Distances are positive inside a class.
     """
     points = average_head().positions_mm.astype(np.float64)
-    distances = np.full((len(BORDER_FIELDS), len(points)), -_OUTSIDE_MM)
+    distances = np.full((len(BORDER_FIELDS), len(points)), -_OUTSIDE_FIELD_MM)
     distances[:, : len(average_surface()[1])] = average_surface()[1].T
     lips, mouth, lids = distances
     left = points[:, 0] > 0
-    above = points[:, 1] - np.interp(np.abs(points[:, 0]), *SEAM_MM.T)
+    above = points[:, 1] - np.interp(np.abs(points[:, 0]), *LIP_SEAM_MM.T)
     fields = {
         "mouth_interior": -mouth,
         "upper_lip": np.minimum(lips, above),
@@ -72,8 +72,8 @@ def label_fields() -> Doubles:
         "neck": neck_distance_mm(points),
     }
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
-        fields[f"left_{name}"] = np.where(left, values, _OUTSIDE_MM)
-        fields[f"right_{name}"] = np.where(left, _OUTSIDE_MM, values)
+        fields[f"left_{name}"] = np.where(left, values, _OUTSIDE_FIELD_MM)
+        fields[f"right_{name}"] = np.where(left, _OUTSIDE_FIELD_MM, values)
     return np.stack([fields[name] for name in HUMAN_FIELDS])
 
 
@@ -145,7 +145,7 @@ def _brow_field(points: Doubles) -> Doubles:
     ends = 0.5 * (low + high)
     below, above = (np.interp(x, *side.T) for side in (low, high))
     across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
-    return np.where(points[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_MM)
+    return np.where(points[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_FIELD_MM)
 
 
 _LABEL_CACHE: dict[bytes, MeshLabels] = {}
@@ -212,8 +212,8 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
-        inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_MM)
-        fields[f"{side}_iris"] = np.full(len(points), _OUTSIDE_MM)
+        inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_FIELD_MM)
+        fields[f"{side}_iris"] = np.full(len(points), _OUTSIDE_FIELD_MM)
         fields[f"{side}_iris"][eyeball_points] = inside
     return fields
 
@@ -235,7 +235,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     outside = np.ones(count, bool)
     outside[mesh.point[mesh.triangles[kinds[mesh.material]]]] = False
-    return {name: np.where(outside, _OUTSIDE_MM, values) for name, values in fields.items()}
+    return {name: np.where(outside, _OUTSIDE_FIELD_MM, values) for name, values in fields.items()}
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:

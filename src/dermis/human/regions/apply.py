@@ -28,12 +28,12 @@ Floats = NDArray[np.float32]
 
 MIN_MAP_SIDE = 1024
 """Minimum side of the maps [texel]; larger maps of the head keep their size."""
-EDGE_MM = 2.5
+REGION_BLUR_MM = 2.5
 """Standard deviation of the blur of borders between regions [mm]."""
 _DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
 _MIN_LOCAL_MEAN, _MAX_DETAIL = 0.4, 3.0  # relative to the mean of the map, and to its local mean
-_CELL_MM = 2.0
-_MAX_CELLS = 256  # along the longest side of the grid
+_GRID_CELL_MM = 2.0
+_MAX_GRID_CELLS = 256  # along the longest side of the grid
 _BLUR_TRUNCATION = 3  # radius of the blur kernel in standard deviations
 _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for the same head
 
@@ -78,7 +78,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
         table = load_region_table(table)
     atlas = build_atlas(head.mesh, MIN_MAP_SIDE)
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
-    smoothed = gaussian_mean(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
+    smoothed = gaussian_mean(points, table.values[label_texels(head, atlas, table)], REGION_BLUR_MM)
     own_maps = (head.maps.roughness, head.maps.specular)
     roughness, specular = (
         np.clip(_region_map(atlas, points, smoothed[:, k], own_maps[k]), *limits)
@@ -143,7 +143,7 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
     from scipy.ndimage import gaussian_filter, map_coordinates
 
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    side = max(_CELL_MM, float(extent.max()) / _MAX_CELLS)
+    side = max(_GRID_CELL_MM, float(extent.max()) / _MAX_GRID_CELLS)
     position = (points - low) / side + 1
     shape = tuple(int(length) + 4 for length in extent / side)
     cell = np.ravel_multi_index(tuple(np.rint(position).astype(int).T), shape)

@@ -63,7 +63,7 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
-    """Return the signed vertical distance (n,) of points below the line from jaw to skull [mm].
+    """Return the vertical distance (n,) of each point below the line from jaw to skull [mm].
 
     It is positive on the neck and negative on the head.
 

@@ -81,7 +81,7 @@ def zone_table(recession: float = 0.0) -> Floats:
 
 @lru_cache(maxsize=_CACHE_SIZE)
 def hairline_heights(recession: float = 0.0) -> Floats:
-    """Return the height (91,) of the hairline over y = 0 by the angle from the front, every 2 degrees [mm].
+    """Return the height (91,) of the hairline above y = 0, by angle from the front, every 2 degrees [mm].
 
     recession : recession of the hairline, 0 to 1, which starts at the temples, see `SkinLook`
     """
@@ -99,8 +99,8 @@ class Folds(NamedTuple):
     """Skin folds, such as the nasolabial fold, as polylines on the left half of the average face.
 
     knots : (k, 4) points of all polylines [mm], and their position along the fold, 0 to 1
-    curves : (c, 8) for each fold: centre and radius of a bounding sphere, width, depth in a young and in an
-        old face [mm], and 1 plus the index of the movement that deepens the fold, or 0
+    curves : (c, 8) for each fold: centre and radius of a bounding sphere [mm]; width of the fold, and its
+        depth in a young and in an old face [mm]; index plus 1 of the movement that deepens it, or 0 for none
     first : (c + 1,) index of the first knot of each fold, followed by the number of knots
     """
 

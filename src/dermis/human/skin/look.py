@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.quantities import check_fields
-from dermis.human.makehuman import OLD, YOUNG
+from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
 from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
@@ -123,9 +123,9 @@ class Demographics(NamedTuple):
 
 def typical_skin(demographics: Demographics) -> SkinLook:
     """Return the typical skin look for a person's ancestry, age and sex."""
-    old = (demographics.age - YOUNG) / (OLD - YOUNG)
+    old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     log_melanin = {name: math.log(fraction) for name, fraction in _TYPICAL_MELANIN.items()}
-    lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD - _AGE_SPOTS_FROM)
+    lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM)
     return SkinLook(
         melanin=math.exp(demographics.weighted_mean(log_melanin)),
         eumelanin=demographics.weighted_mean(_TYPICAL_EUMELANIN),
@@ -142,7 +142,7 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eye look: brown irises, which are lighter with more European ancestry."""
-    redness = 0.15 + 0.2 * (demographics.age - YOUNG) / (OLD - YOUNG)
+    redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     return EyeLook(eumelanin=demographics.weighted_mean(_TYPICAL_IRIS), redness=redness)
 
 

@@ -63,5 +63,5 @@ class PaintedMaps(Maps):
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """Return the mean colour (3,) of the skin, of its colour map or of its look, linear Rec. 709 [-]."""
+        """Return the mean colour (3,) of the colour map, or of the look without one, linear Rec. 709 [-]."""
         return super().mean_colour if self.colour is not None else mean_colour(self.look)
