@@ -21,7 +21,7 @@ def test_the_page_has_the_figures() -> None:
 
 
 def test_figures_are_those_of_today(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(script, "SKINS", ("skin1",))
+    monkeypatch.setattr(script, "COMPARED_SKINS", ("skin1",))
     known = json.loads(RESULTS_FILE.read_text("utf-8"))["skins"]["skin1"]
     found = script.skin_errors()["skin1"]
     for target, reading in (("openpbr", "error"), ("openpbr", "as_a_profile"), ("pbrt", "error")):

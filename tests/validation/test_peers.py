@@ -190,7 +190,7 @@ def test_page_is_written_with_all_placeholders_filled(
     (tmp_path / "templates").mkdir()
     (tmp_path / "templates" / "peers.md").write_text(template, encoding="utf-8")
     monkeypatch.setattr(report, "PAGE", tmp_path / "peers.md")
-    monkeypatch.setattr(report, "FIGURES", tmp_path / "results" / "peers.json")
+    monkeypatch.setattr(report, "RESULTS_FILE", tmp_path / "results" / "peers.json")
     monkeypatch.setattr(report, "PeerPlan", lambda: peers.QUICK_PLAN)
     peers.peers()
     page = (tmp_path / "peers.md").read_text(encoding="utf-8")

@@ -31,9 +31,9 @@ def test_a_line_tells_view_light_and_errors() -> None:
 
 def test_the_picture_is_small_and_shows_all_views() -> None:
     data = page.picture_sheet([noisy(name, 96) for name in VIEWS])
-    assert len(data) <= page.MAX_BYTES
+    assert len(data) <= page.MAX_SHEET_BYTES
     width, height = Image.open(io.BytesIO(data)).size
-    assert width >= page.COLUMNS * 96 and height >= -(-2 * len(VIEWS) // page.COLUMNS) * 96
+    assert width >= page.SHEET_COLUMNS * 96 and height >= -(-2 * len(VIEWS) // page.SHEET_COLUMNS) * 96
 
 
 def test_the_page_names_what_is_filled_in() -> None:

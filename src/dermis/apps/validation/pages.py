@@ -26,7 +26,7 @@ SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "
 
 
 def in_checkout(path: Path) -> Path:
-    """Return a path if it exists in the checkout of the project.
+    """Check that a path exists in the checkout of the project, and return it.
 
     Raises DermisError where the package is installed without a checkout of the project.
     """

@@ -42,12 +42,12 @@ PROFILE = load_profile("gpu-gems-3")
 Array = NDArray[np.floating]
 Flags = NDArray[np.bool_]
 PointFilter = Callable[[Array], Flags]
-SIZE = 256  # side of flat patches [texels]
-HUMAN = "heads/makehuman/head_young_male_light.obj"
-RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
+PATCH_SIDE = 256  # side of flat patches [texels]
+HUMAN_FILE = "heads/makehuman/head_young_male_light.obj"
+SPHERE_RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_SIDE, HEAD_SIDE = 320, 1024
-SPACING_MM, WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
-MIN_FACING = 0.4  # least cosine between the normal at a seam and the light
+STRIPE_SPACING_MM, STRIPE_WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
+MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the light
 
 
 def blur(adapter: str = "auto") -> None:
@@ -57,7 +57,7 @@ def blur(adapter: str = "auto") -> None:
 
 
 def point_tables(device: Device) -> dict[str, object]:
-    """Return the Markdown rows on blurred points of light by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows on blurred points of light for docs/templates/accuracy.md, by placeholder name."""
     return {
         "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
@@ -82,11 +82,11 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     The reference is the analytic sum of Gaussians.
     """
     profile = load_profile("gpu-gems-3")
-    light = np.zeros((SIZE, SIZE), np.float32)
-    middle = SIZE // 2
+    light = np.zeros((PATCH_SIDE, PATCH_SIDE), np.float32)
+    middle = PATCH_SIDE // 2
     light[middle, middle] = 1.0
-    levels = blurred_levels(device, plane(SIZE / texels_per_mm), light)
-    y, x = np.mgrid[:SIZE, :SIZE] - middle
+    levels = blurred_levels(device, plane(PATCH_SIDE / texels_per_mm), light)
+    y, x = np.mgrid[:PATCH_SIDE, :PATCH_SIDE] - middle
     r2 = (x**2 + y**2) / texels_per_mm**2
     blurred = GaussianSum("blurred levels", profile.variance_mm2[1:], profile.weight[1:])
     exact = blurred.radiant_exitance(np.sqrt(r2))[..., 0] / texels_per_mm**2
@@ -102,15 +102,15 @@ def sheared_row(device: Device, degrees: float) -> str:
 
     degrees : angle between the uv axes on the flat surface [degrees]
     """
-    flat = plane(SIZE / 3.0)
+    flat = plane(PATCH_SIDE / 3.0)
     shear = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     positions = flat.positions.copy()
     positions[:, 0] += shear[0] * positions[:, 1]
     positions[:, 1] *= shear[1]
     mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
-    light = np.zeros((SIZE, SIZE), np.float32)
-    light[SIZE // 2, SIZE // 2] = 1.0
-    y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
+    light = np.zeros((PATCH_SIDE, PATCH_SIDE), np.float32)
+    light[PATCH_SIDE // 2, PATCH_SIDE // 2] = 1.0
+    y, x = np.mgrid[:PATCH_SIDE, :PATCH_SIDE] - PATCH_SIDE // 2
     position = np.stack([x - shear[0] * y, -shear[1] * y]) / 3.0  # v points down
     target_variance = load_profile("gpu-gems-3").variance_mm2[-1]
     cells = []
@@ -123,21 +123,21 @@ def sheared_row(device: Device, degrees: float) -> str:
 
 def constant_light_error(device: Device) -> float:
     """Return the largest error of blurred constant light on the atlas of a sphere, over all levels [-]."""
-    atlas = build_atlas(uv_sphere(100.0), SIZE)
+    atlas = build_atlas(uv_sphere(100.0), PATCH_SIDE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
 
 
 def surface_tables(adapter: str) -> dict[str, str]:
-    """Return the Markdown rows on curvature and seams by placeholder of docs/templates/techniques.md."""
+    """Return Markdown rows on curvature and seams for docs/templates/techniques.md, keyed by placeholder."""
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    curved = [harmonic_row(renderer, radius) for radius in RADII_MM]
+    curved = [harmonic_row(renderer, radius) for radius in SPHERE_RADII_MM]
     return {"curvature": "\n".join(curved), "seams": "\n".join(seam_rows(renderer))}
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row with the fraction of light proportional to x that a blur leaves on a sphere.
+    """Return a Markdown row: the fraction that a blur on a sphere keeps of light proportional to x.
 
     The widest Gaussian is applied on the atlas, by the heat equation, and by the Gaussian of chord length.
     """
@@ -199,7 +199,7 @@ def seam_rows(renderer: Renderer) -> list[str]:
     from cut_meshes import cut_sphere
 
     human = dermis.load_head("human")
-    makehuman = replace(dermis.load_head(data_file(HUMAN), unit_mm=100, subdivide=0), maps=Maps())
+    makehuman = replace(dermis.load_head(data_file(HUMAN_FILE), unit_mm=100, subdivide=0), maps=Maps())
     rows = (
         ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_SIDE, all_points),
         ("human, neck and back of the head", human, HEAD_SIDE, visible_points),
@@ -259,7 +259,7 @@ def seam_side_points(head: Head, where: PointFilter) -> tuple[Points, Points]:
     mesh = head.mesh
     first, second = seam_points(mesh)
     positions = first.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    selected = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING)
+    selected = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING_COSINE)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
@@ -271,8 +271,8 @@ def seam_side_points(head: Head, where: PointFilter) -> tuple[Points, Points]:
 def striped_scene(head: Head) -> Scene:
     """Return a scene with sharp stripes of light from front and back, and a little uniform light."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
-    positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
-    stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=WIDTH_MM, shadows=False)
+    positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)
+    stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=STRIPE_WIDTH_MM, shadows=False)
     lights: list[Light] = []
     for direction in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
         lights += [stripe(direction=direction, position=(x, 0, 0)) for x in positions]

@@ -29,20 +29,23 @@ from dermis.scene.lights import PointLight
 from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
 HIGHLIGHT_RESULTS, LOOK_RESULTS = RESULTS / "highlights.json", RESULTS / "look.json"
-PICTURE = DOCS / "images" / "look.webp"
+LOOK_PICTURE = DOCS / "images" / "look.webp"
 LOBE_MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
 HIGHLIGHT_VIEWS = ("cheek", "portrait")
-ROUGHNESS, PATHS = 0.3, 64
+SKIN_ROUGHNESS, HIGHLIGHT_PATHS = 0.3, 64
 KEY_LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
-ONE_LOBE = ((1.0, ROUGHNESS),)
-TWO_LOBES = ((NARROW_WEIGHT, NARROW_FACTOR * ROUGHNESS), (1.0 - NARROW_WEIGHT, WIDE_FACTOR * ROUGHNESS))
+ONE_LOBE = ((1.0, SKIN_ROUGHNESS),)
+TWO_LOBES = (
+    (NARROW_WEIGHT, NARROW_FACTOR * SKIN_ROUGHNESS),
+    (1.0 - NARROW_WEIGHT, WIDE_FACTOR * SKIN_ROUGHNESS),
+)
 LIT_QUANTILE = 0.6  # quantile of the lit pixels above which they are compared
 GRAIN_BLUR_PX = 6.0  # standard deviation of the blur that removes the grain [pixel]
 
-HEADS = {"scan": "lee_perry_smith", "human": "human"}
+HEAD_NAMES = {"scan": "lee_perry_smith", "human": "human"}
 LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
-COLUMNS = ("deck-2007", "default", "Cycles")
-SIDE, SURFACE_PATHS, MAP_SIDE = 256, 16, 1024
+LOOK_COLUMNS = ("deck-2007", "default", "Cycles")
+LOOK_SIDE, SURFACE_PATHS, MAX_MAP_SIDE = 256, 16, 1024
 
 Picture = NDArray[np.float32]
 
@@ -77,26 +80,26 @@ def highlights(adapter: str = "auto") -> None:
     in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
-    write_results(HIGHLIGHT_RESULTS, {"paths": PATHS, "rows": rows})
+    write_results(HIGHLIGHT_RESULTS, {"paths": HIGHLIGHT_PATHS, "rows": rows})
 
 
 def looks(adapter: str = "auto") -> None:
     """Render skins by dermis and by Cycles; write results/look.json and docs/images/look.webp."""
-    in_checkout(PICTURE.parent)
+    in_checkout(LOOK_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
-    renders = {head: skin_renders(renderer, head) for head in HEADS}
+    renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
     for view in LOOK_VIEWS:
-        for head in HEADS:
+        for head in HEAD_NAMES:
             columns = renders[head][view]
             rows.append({"head": head, "view": view, "shares": [one.reflected for one in columns]})
-            for column, one in zip(COLUMNS, columns, strict=True):
+            for column, one in zip(LOOK_COLUMNS, columns, strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.reflected:.1f} %"] = one.picture
-    write_results(LOOK_RESULTS, {"paths": PATHS, "rows": rows})
-    PICTURE.write_bytes(sheet_bytes(panels, 2 * len(COLUMNS)))
+    write_results(LOOK_RESULTS, {"paths": HIGHLIGHT_PATHS, "rows": rows})
+    LOOK_PICTURE.write_bytes(sheet_bytes(panels, 2 * len(LOOK_COLUMNS)))
 
 
 def tables() -> dict[str, object]:
-    """Return the Markdown rows of the last measurement by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows of the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
     highlight_rows, look_rows = read_results(HIGHLIGHT_RESULTS)["rows"], read_results(LOOK_RESULTS)["rows"]
     cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
@@ -105,12 +108,12 @@ def tables() -> dict[str, object]:
             f"| {row['grain_of_cycles']:.2f} | {row['correlation']:.3f} |"
             for row in highlight_rows
         ),
-        "highlight_paths": PATHS,
+        "highlight_paths": HIGHLIGHT_PATHS,
         "looks": "\n".join(
             f"| {row['head']} | {row['view']} | {fractions} |"
             for row, fractions in zip(look_rows, cells, strict=True)
         ),
-        "look_paths": PATHS,
+        "look_paths": HIGHLIGHT_PATHS,
     }
 
 
@@ -147,7 +150,7 @@ def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float
     """
     picture = np.zeros(settings.size[::-1], np.float32)
     for weight, roughness in lobes:
-        (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [PATHS], settings)
+        (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [HIGHLIGHT_PATHS], settings)
         picture += weight * image_pass.image[..., 1]
     return picture
 
@@ -164,7 +167,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
     for model in LOBE_MODELS:
         reference = two_lobes if model == "two-lobe" else one_lobe
         lit = reference > np.quantile(reference[reference > 0], LIT_QUANTILE)
-        values = {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
+        values = {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": SKIN_ROUGHNESS}
         skin = Skin.model_validate(values)
         ours = renderer.draw(Scene(head, [KEY_LIGHT], camera, skin), settings).linear()[..., 1]
         rows.append(
@@ -182,7 +185,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
     """Render a scene by dermis, and its surface reflection alone for the reflected fraction."""
-    options = {"size": (SIDE, SIDE), "atlas": 1024, "strands": False}
+    options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
     return SkinRender(picture, float(surface_pass.sum() / picture.sum()))
@@ -190,19 +193,19 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
     """Render a scene by Cycles, and again with black skin for the fraction that the surface reflects."""
-    settings = Settings(size=(SIDE, SIDE))
+    settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
-    (image_pass,) = cycles_passes(scene, skin, [PATHS], settings)
+    (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATHS], settings)
     (surface_pass,) = cycles_passes(scene, black, [SURFACE_PATHS], settings)
     return SkinRender(image_pass.image, float(surface_pass.image.sum() / image_pass.image.sum()))
 
 
 def downsample_map(values: Picture) -> Picture:
-    """Return a map averaged over blocks of texels, to at most `MAP_SIDE` rows.
+    """Return a map averaged over blocks of texels, to at most `MAX_MAP_SIDE` rows.
 
     values : (h, w) or (h, w, c) map
     """
-    step = max(1, len(values) // MAP_SIDE)
+    step = max(1, len(values) // MAX_MAP_SIDE)
     blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
@@ -226,17 +229,17 @@ def principled_skin(head: Head) -> PrincipledSkin:
     offset_mm = (profile.weight * np.sqrt(0.5 * np.pi * profile.variance_mm2[:, None])).sum(axis=0)
     mean_free_path_mm = offset_mm / 2.5 * (1.9 - colour + 3.5 * (colour - 0.8) ** 2)
     red, green, blue = (float(part) for part in 4.0 * np.pi * mean_free_path_mm)
-    return PrincipledSkin(downsample_map(head.maps.colour), (red, green, blue), ROUGHNESS)
+    return PrincipledSkin(downsample_map(head.maps.colour), (red, green, blue), SKIN_ROUGHNESS)
 
 
 def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRender]]:
     """Render a head with the skin of the 2007 talk, the default skin and Cycles; return them by view.
 
-    title : key of `HEADS`
+    title : key of `HEAD_NAMES`
     """
-    name = HEADS[title]
+    name = HEAD_NAMES[title]
     painted, one_lobe = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
-    mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAP_SIDE))
+    mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAX_MAP_SIDE))
     skin, renders = principled_skin(mapped), dict[str, list[SkinRender]]()
     for view in LOOK_VIEWS:
         camera = CAMERA_PRESETS[view](painted)

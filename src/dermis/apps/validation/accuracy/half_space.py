@@ -69,9 +69,9 @@ def _oblique_ratio(albedo: float, eta: float) -> float:
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return errors of Lambertian and of half-space skin, over all directions of light and view in air.
+    """Return errors of Lambertian and of half-space skin, over all directions of light and view in air [-].
 
-    The exact radiance below the surface is that of the index-matched half-space with all internal
+    The reference below the surface is the exact radiance of the index-matched half-space with all internal
     reflections.
 
     albedo : single-scattering albedo [-]
@@ -150,7 +150,7 @@ def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floa
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return half-space over Lambertian skin in studio light: median and 99th percentile, by channel."""
+    """Return ratios of half-space to Lambertian skin in studio light: median, 99th percentile, by channel."""
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
     def picture(direction: Literal["lambertian", "half-space"]) -> Floats:

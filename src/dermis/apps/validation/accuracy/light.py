@@ -27,7 +27,7 @@ from dermis.specular.cosines import Cosines
 from dermis.specular.kelemen import kelemen
 
 PANORAMAS = ("royal_esplanade", "lebombo")
-ANGLES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # of the view from the normal [degrees]
+VIEW_DEGREES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # of the view from the normal [degrees]
 FINE_ROUGHNESS = 0.25  # below this roughness, lobes are summed over smaller texels
 Array = NDArray[np.floating]
 UP = np.array([0.0, 1.0, 0.0])
@@ -84,7 +84,7 @@ def irradiance_error(name: str, count: int = 200) -> float:
 
 
 def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
-    """Return the relative RMS error of a panorama's radiance reflected by a lobe, over random normals.
+    """Return the relative RMS error of the radiance that a lobe reflects of a panorama, over random normals.
 
     m : roughness of the lobe
     angle : angle between view and normal [degrees]
@@ -209,7 +209,9 @@ def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
 
 
 def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
-    """Return bias and RMS difference of area light shadows from 64 point lights, over the mean radiance.
+    """Return bias and RMS error of an area light's shadows against those of 64 point lights [-].
+
+    Both are divided by the mean radiance.
 
     rig : light preset
     """
@@ -239,14 +241,14 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {
         "irradiance": f"{max(map(irradiance_error, PANORAMAS)):.1e}",
         "reflections": "\n".join(
             f"| {name} | {m} | "
-            + " | ".join(f"{100 * reflection_error(name, m, angle):.1f}" for angle in ANGLES)
+            + " | ".join(f"{100 * reflection_error(name, m, angle):.1f}" for angle in VIEW_DEGREES)
             + " |"
             for name in PANORAMAS
             for m in (0.15, 0.2, 0.3, 0.45, 0.6)

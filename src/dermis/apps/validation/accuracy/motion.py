@@ -28,7 +28,7 @@ from dermis.scene.files import load_camera, load_lights
 Points = NDArray[np.float32]
 Floats = NDArray[np.float64]
 PAGE = DOCS / "motion.md"
-SKIN = "heads/makehuman/skins/young_lightskinned_male_diffuse.png"
+SKIN_MAP_FILE = "heads/makehuman/skins/young_lightskinned_male_diffuse.png"
 PEOPLE = {
     "old man": Human(1, 0, 0, sex=1, age=90),
     "young woman": Human(0, 1, 0, age=25),
@@ -46,12 +46,12 @@ EXPRESSIONS: dict[str, dict[str, float]] = {
     "jaw aside": expression("jaw-aside"),
     "wink": expression("wink"),
 }
-VIEWS = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
+LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
-SIDE = 512
-BAKE_SETTINGS = Settings(size=(16, 16), atlas=SIDE, samples=1)
+OCCLUSION_ATLAS_SIDE = 512
+BAKE_SETTINGS = Settings(size=(16, 16), atlas=OCCLUSION_ATLAS_SIDE, samples=1)
 _REFERENCE_SIZE = 1024  # number of directions, and side of their depth maps [texels]
-_MIN_CHANGE = 0.02
+_MIN_OCCLUSION_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
@@ -63,7 +63,7 @@ def motion(adapter: str = "auto") -> None:
     in_checkout(PAGE)
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    head = Human(age=25).head(load_maps(colour=data_file(SKIN)), "hm08", 0)
+    head = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
     persons = {name: person.positions_mm for name, person in PEOPLE.items()}
     fill_page(
         PAGE,
@@ -104,7 +104,7 @@ def picture_error(
     view : camera preset
     """
     rebuilt = rebuilt_head(head, posed_points(head, person, weights))
-    lights, camera = VIEWS[view]
+    lights, camera = LIGHT_AND_CAMERA[view]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
     posed_head = replace(head)
     vars(posed_head)["centre_mm"] = rebuilt.centre_mm  # lights and cameras are relative to it
@@ -115,17 +115,17 @@ def picture_error(
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows with picture errors by expression: the worst person, from front and back.
+    """Yield Markdown rows, one per expression: the picture error of the worst person, from front and back.
 
     persons : positions in the rest pose by name of the person [mm]
     """
-    worst = dict.fromkeys(VIEWS, 0.0)
+    worst = dict.fromkeys(LIGHT_AND_CAMERA, 0.0)
     for name, weights in EXPRESSIONS.items():
         errors = {
             view: max(picture_error(renderer, head, person, weights, view) for person in persons.values())
-            for view in VIEWS
+            for view in LIGHT_AND_CAMERA
         }
-        worst = {view: max(worst[view], errors[view]) for view in VIEWS}
+        worst = {view: max(worst[view], errors[view]) for view in LIGHT_AND_CAMERA}
         yield f"| {name} | {100 * errors['front']:.2f} | {100 * errors['back']:.2f} |"
     yield f"| **worst** | **{100 * worst['front']:.2f}** | **{100 * worst['back']:.2f}** |"
 
@@ -187,7 +187,7 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
         maps = [frame_occlusion(renderer, posed, mode) for mode in ("rest", "baked")]
         errors = [one - reference for one in (*maps, baked_occlusion(renderer, head, shape))]
         surface = np.isfinite(reference) & np.isfinite(rest)
-        changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_CHANGE)
+        changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_OCCLUSION_CHANGE)
         cells = (
             f"{root_mean_square(error[surface]):.3f} / {root_mean_square(error[changed]):.3f}"
             for error in errors
@@ -203,9 +203,14 @@ def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int)
     sampling : number of directions and side of depth maps [texel]; those of frames by default
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
-    texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, SIDE, "stitched")
-    occlusion = bake_occlusion(renderer.device, shape, atlas, inputs.bindings, texels, SIDE, *sampling)
-    return occlusion[:SIDE].astype(float)
+    texels, atlas = (
+        inputs.layouts[0].atlas.resources["atlas"],
+        cached_atlas(head.mesh, OCCLUSION_ATLAS_SIDE, "stitched"),
+    )
+    occlusion = bake_occlusion(
+        renderer.device, shape, atlas, inputs.bindings, texels, OCCLUSION_ATLAS_SIDE, *sampling
+    )
+    return occlusion[:OCCLUSION_ATLAS_SIDE].astype(float)
 
 
 def frame_occlusion(renderer: Renderer, scene: Scene, mode: str) -> Floats:
@@ -216,7 +221,7 @@ def frame_occlusion(renderer: Renderer, scene: Scene, mode: str) -> Floats:
     settings = BAKE_SETTINGS.model_copy(update={"occlusion": mode})
     renderer.draw(scene, settings)
     texture = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
-    return download(renderer.device, texture)[:SIDE].astype(float)
+    return download(renderer.device, texture)[:OCCLUSION_ATLAS_SIDE].astype(float)
 
 
 def root_mean_square(error: Floats) -> float:

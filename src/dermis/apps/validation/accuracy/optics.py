@@ -27,8 +27,8 @@ from dermis.optics.tissue import Tissue, load_tissue
 
 Floats = NDArray[np.float64]
 PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
-TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
-MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
+COMPARED_TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
+COMPARED_MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
     ("dipole", "layer"),
     ("better-dipole", "layer"),
     ("multipole", "none"),
@@ -52,7 +52,7 @@ def tissue_by_name(name: str) -> Tissue:
 
 def models_table() -> str:
     """Return Markdown rows with the errors of total and ring energies, by diffusion model and tissue."""
-    return "\n".join(row for name in TISSUES for row in _model_rows(name, tissue_by_name(name)))
+    return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
 def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
@@ -64,7 +64,7 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
     yield f"| **{name}** | Monte Carlo | {totals} | ± {relative_error:.2%} |"
     layers = tissue.medium.layers
     thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in layers)
-    for model, clamp in MODELS:
+    for model, clamp in COMPARED_MODELS:
         one_layer = len(layers) == 1
         if (model.endswith("dipole") and not one_layer) or (model == "multipole" and one_layer):
             continue
@@ -99,7 +99,7 @@ def fits_table() -> str:
     The fits are to the ring energies of layered diffusion.
     """
     rows = []
-    for name in TISSUES:
+    for name in COMPARED_TISSUES:
         profile = tissue_by_name(name).profile()
         rings = profile.rings()
         cells = [_percent(fit_gaussians(rings, n).error, sign=False) for n in (2, 4, 6, 8)]
@@ -164,7 +164,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 
 def published_errors() -> str:
-    """Return text with the errors of diffusion models for published layers against published Gaussians."""
+    """Return text on published layers: the errors of diffusion models against the published Gaussians."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
@@ -178,7 +178,7 @@ def published_errors() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "models": models_table(),
         "counted": counted_table(),

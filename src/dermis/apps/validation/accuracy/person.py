@@ -28,9 +28,9 @@ from dermis.scene.heads import load_head
 
 PAGE = DOCS / "path_traced.md"
 PICTURE = DOCS / "images" / "path_traced.webp"
-SIDE, SAMPLES = 192, 40
-COLUMNS = 4
-MAX_BYTES = 300_000
+PICTURE_SIDE, PATHS_PER_PIXEL = 192, 40
+SHEET_COLUMNS = 4
+MAX_SHEET_BYTES = 300_000
 
 
 def with_error(estimate: Estimate, digits: int = 2) -> str:
@@ -46,7 +46,7 @@ def view_row(pair: PersonComparison) -> str:
 
 
 def iris_cells(pair: PersonComparison) -> dict[str, str]:
-    """Return the errors of the iris in the eye view, by placeholder of docs/templates/path_traced.md."""
+    """Return errors of the iris in the eye view for docs/templates/path_traced.md, keyed by placeholder."""
     return {name: with_error(one) for name, one in iris_errors(pair, EYE_FRAME_MM)._asdict().items()}
 
 
@@ -56,20 +56,20 @@ def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:
     for pair in pairs:
         panels[pair.name] = pair.tone_mapped(pair.ours)
         panels[f"{pair.name}, traced"] = pair.tone_mapped(pair.reference)
-    return sheet_bytes(panels, COLUMNS)
+    return sheet_bytes(panels, SHEET_COLUMNS)
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
-    """Return pictures on a sheet as a WebP file of at most `MAX_BYTES`."""
+    """Return pictures on a sheet as a WebP file of at most `MAX_SHEET_BYTES`."""
     picture = np.asarray(panel_sheet(panels, columns))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(picture, quality)
-        if len(data) <= MAX_BYTES:
+        if len(data) <= MAX_SHEET_BYTES:
             break
     return data
 
 
-def person(adapter: str = "auto", side: int = SIDE, samples: int = SAMPLES) -> None:
+def person(adapter: str = "auto", side: int = PICTURE_SIDE, samples: int = PATHS_PER_PIXEL) -> None:
     """Path-trace and render the package's human, and write docs/path_traced.md with its picture.
 
     Needs Mitsuba, and DERMIS_DATA or a network for the two panoramas.

@@ -32,10 +32,10 @@ from dermis.scene import Skin
 
 Array = NDArray[np.float64]
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
-DEGREES = (0.0, 40.0, 60.0, 80.0)
+INCIDENT_DEGREES = (0.0, 40.0, 60.0, 80.0)
 PHOTONS = 100_000
 FORWARD_G = 0.8  # mean cosine of scattering in real skin
-MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
+SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
 def slabs(adapter: str = "auto") -> None:
@@ -49,8 +49,8 @@ def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
     thickness : thickness of the slab [mm]
     g : mean cosine of the scattering angle; the medium's coefficients are reduced ones
     """
-    layer, response = medium.layers[0], np.empty((2, len(DEGREES), 3))
-    inner_cosine = refracted_cosine(np.cos(np.radians(DEGREES)), medium.eta)
+    layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
+    inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
     for c in range(3):
         albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness
         slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=g)
@@ -64,8 +64,8 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -
 
     thickness : thickness of the slab [mm]
     """
-    mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
-    for k, angle in enumerate(np.radians(DEGREES)):
+    mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(INCIDENT_DEGREES), 3))
+    for k, angle in enumerate(np.radians(INCIDENT_DEGREES)):
         beam = np.array([np.sin(angle), 0.0, np.cos(angle)])
         positions, normals, exitance = scattered_light(renderer, mesh, beam, skin, 256)
         central = np.abs(positions[:, :2]).max(axis=1) < 8.0
@@ -76,7 +76,7 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return skin with a medium's profile by name of its angular distribution: Lambertian and half-space.
+    """Return a Lambertian and a half-space skin with a medium's profile, by name of the angular distribution.
 
     folder : folder for the file of the profile
     """
@@ -92,7 +92,7 @@ def error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with RMS errors of reflectance and transmittance, by slab and skin."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, eta in MEDIA:
+        for name, eta in SLAB_MEDIA:
             medium = media()[name].with_eta(eta)
             for direction, skin in skins_by_direction(medium, folder).items():
                 for thickness in THICKNESSES_MM:
@@ -103,13 +103,13 @@ def error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows of half-space skin against forward-scattering slabs.
+    """Return Markdown rows with the errors of half-space skin against forward-scattering slabs.
 
     The skin ignores forward scattering, or takes it into account by the setting `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, eta in MEDIA:
+        for name, eta in SLAB_MEDIA:
             medium = media()[name].with_eta(eta)
             half_space = skins_by_direction(medium, folder)["half-space"]
             for g in (0.0, FORWARD_G):
@@ -137,7 +137,9 @@ def forward_direction_rows() -> str:
 
 
 def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
-    a, weights, exact = adding_doubling.half_space_radiance(albedo, eta, adding_doubling.NODES, FORWARD_G)
+    a, weights, exact = adding_doubling.half_space_radiance(
+        albedo, eta, adding_doubling.DIRECTION_NODES, FORWARD_G
+    )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
     table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), angular.relative_reflectance[:, 0])
@@ -149,8 +151,8 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return table cells on transmittance, then on reflectance: RMS error, and ratio of red by angle."""
-    flux, cells = np.sqrt(np.cos(np.radians(DEGREES)))[:, None], []
+    """Return table cells on transmittance, then on reflectance: RMS error, and ratio in red by angle."""
+    flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
         ours, exact = response[side], reference[side]
         error = np.linalg.norm(flux * (ours - exact)) / np.linalg.norm(flux * exact)
@@ -177,7 +179,7 @@ def forward_rows() -> str:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     return {
         "slab_errors": error_rows(renderer),

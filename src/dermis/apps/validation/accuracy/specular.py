@@ -16,14 +16,14 @@ from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyScheme, hemispherical_
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
-VIEWS = (np.arange(200) + 0.5) / 200
+VIEW_COSINES = (np.arange(200) + 0.5) / 200
 ENERGY_MODELS = {
     "none": ENERGY_SCHEMES["none"],
     "published": ENERGY_SCHEMES["published"],
     "divided by π, internally reflected light lost": EnergyScheme(1.0, returns_internal_light=False),
     "full": ENERGY_SCHEMES["full"],
 }
-SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
+ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
 REFERENCE_NODES = (96, 96)
 
 
@@ -54,8 +54,8 @@ def albedo_rows() -> str:
     return "\n".join(rows)
 
 
-def peak_error() -> float:
-    """Return the largest relative error of the interpolated Beckmann table where the lobe is visible."""
+def beckmann_table_error() -> float:
+    """Return the largest relative error of the interpolated Beckmann table, where the lobe is visible [-]."""
     m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
     rows, columns = beckmann_table().shape
     axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
@@ -72,28 +72,28 @@ def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
 
     model : energy conservation scheme
     """
-    albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
-    exact = directional_albedo(VIEWS, m)
+    albedo, mean = (read_albedo("kelemen", VIEW_COSINES, np.array(m))[..., k] for k in (0, 1))
+    exact = directional_albedo(VIEW_COSINES, m)
     entered = model.entering_fraction(mean, rho_s)
     out = rho_s * exact + entered * model.exitance_factor(albedo, mean, rho_s)
-    return f"{out.min():.3f} {(out * VIEWS).sum() / VIEWS.sum():.3f} {out.max():.3f}"
+    return f"{out.min():.3f} {(out * VIEW_COSINES).sum() / VIEW_COSINES.sum():.3f} {out.max():.3f}"
 
 
 def furnace_rows() -> str:
     """Return the Markdown rows of the white furnace, by energy conservation scheme."""
     return "\n".join(
-        f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in SKINS)} |"
+        f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in ROUGHNESS_AND_STRENGTH)} |"
         for name, model in ENERGY_MODELS.items()
     )
 
 
 def tables() -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
     return {
         "albedos": albedo_rows(),
-        "peak": f"{100 * peak_error():.1f} %",
+        "peak": f"{100 * beckmann_table_error():.1f} %",
         "furnace": furnace_rows(),
         "smooth": f"{hemispherical_reflectance():.1%}",
         "smooth_schlick": f"{hemispherical_reflectance(schlick):.1%}",

@@ -52,14 +52,14 @@ def techniques(adapter: str = "auto") -> None:
     parts: dict[str, str] = {}
     path_traced: dict[str, dict[str, Comparison]] = {}
     for medium in ("skin1", "skin2"):
-        parts[f"traced_{medium}"], comparison = table(head, "path-traced", medium, adapter)
+        parts[f"traced_{medium}"], comparison = technique_rows(head, "path-traced", medium, adapter)
         parts[f"floor_{medium}"] = albedo_rows(head, medium, comparison["front"], adapter)
         path_traced[medium] = comparison
-    parts["direction"] = by_direction(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
+    parts["direction"] = direction_rows(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
     parts["counted"] = profile_model_rows(head, path_traced, adapter)
     parts["half_space"] = half_space.direction_table(head, adapter)
-    parts["integral"], _ = table(head, "surface-integral", "skin1", adapter, "layered")
-    parts["heat"], _ = table(head, "heat", "skin1", adapter, "layered")
+    parts["integral"], _ = technique_rows(head, "surface-integral", "skin1", adapter, "layered")
+    parts["heat"], _ = technique_rows(head, "heat", "skin1", adapter, "layered")
     parts["heat"] += "\n" + fine_atlas_row(head, adapter)
     parts |= texture_space.tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
     fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
@@ -68,7 +68,7 @@ def techniques(adapter: str = "auto") -> None:
 def _compare(
     head: Head, against: str, techniques: Sequence[str], light: str, adapter: str, **options: Any
 ) -> Comparison:
-    """Return a comparison in the light's default region, with the number of samples that suits it.
+    """Return a comparison whose region and number of samples suit the light, unless `options` sets them.
 
     against : name of the reference
     """
@@ -77,12 +77,12 @@ def _compare(
     return compare(head, against, techniques, light=light, adapter=adapter, **(defaults | options))
 
 
-def table_line(first: str, row: ComparisonRow) -> str:
+def technique_row(first: str, row: ComparisonRow) -> str:
     """Return a Markdown row with a given first cell and the errors of a technique."""
     return f"| {first} | " + " | ".join(cells(row)) + " |"
 
 
-def table(
+def technique_rows(
     head: Head, against: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
     """Return Markdown rows of all techniques under each light, and the comparisons by light.
@@ -98,7 +98,7 @@ def table(
         comparison[light] = _compare(
             head, against, techniques, light, adapter, region=region, medium=medium, model=model
         )
-        rows += [table_line(light, row) for row in comparison[light].rows]
+        rows += [technique_row(light, row) for row in comparison[light].rows]
     return "\n".join(rows), comparison
 
 
@@ -108,7 +108,7 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
     comparison = _compare(
         head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
     )
-    return table_line("laser, atlas 2048", comparison.rows[0])
+    return technique_row("laser, atlas 2048", comparison.rows[0])
 
 
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
@@ -168,8 +168,8 @@ def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) 
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 
-def by_direction(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows comparing Lambertian and half-space skin with path tracing, on head and ball.
+def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
+    """Return Markdown rows that compare Lambertian and half-space skin with path tracing, on head and ball.
 
     lights : paths per pixel by name of the light
     """

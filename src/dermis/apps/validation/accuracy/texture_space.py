@@ -27,10 +27,10 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-LIGHTS = ("front", "back", "laser")
-ATLASES = (512, 1024, 2048)
-RADIUS_MM = 14.0
-MIN_UNIFORM = 1e-3
+COMPARED_LIGHTS = ("front", "back", "laser")
+ATLAS_SIDES = (512, 1024, 2048)
+REGION_RADIUS_MM = 14.0
+MIN_UNIFORM_INTEGRAL = 1e-3
 MIN_VARIANCE_MM2 = 1.0  # of Gaussians for which Euclidean and surface distance differ
 LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
     "front": {
@@ -46,13 +46,13 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/techniques.md."""
+    """Return Markdown rows for docs/templates/techniques.md, keyed by placeholder."""
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
-    for light in LIGHTS:
+    for light in COMPARED_LIGHTS:
         region = default_region(light)
         with comparison_subject(head, light, region, "skin1", settings, adapter, "layered") as subject:
             integral, uniform = surface_integral(subject, 0), uniform_light_integral(subject)
-            normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM))
+            normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM_INTEGRAL))
             rows["by_atlas"] += atlas_rows(subject, integral, normalised, light)
             rows["zero_width"].append(zero_width_row(subject, light))
             rows["places"] += region_rows(subject, integral, light) if light in LANDMARKS_BY_REGION else []
@@ -84,7 +84,7 @@ def atlas_rows(
     integral, normalised : surface integral, and the integral divided by that of uniform light
     """
     unscattered, rows = render(subject, "none"), []
-    for side in ATLASES:
+    for side in ATLAS_SIDES:
         image, cells = render(subject, "texture-space", atlas=side), [light, str(side)]
         for reference in (integral, normalised):
             pair = reference.image, reference.mask
@@ -127,7 +127,7 @@ def mean_and_percentile(uniform: Floats) -> str:
 
 
 def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str) -> list[str]:
-    """Return Markdown rows with errors by region of the face, and those that a perfect map would have.
+    """Return Markdown rows by region of the face: errors of texture space, and errors that a perfect map has.
 
     The heat equation on the surface takes the place of a perfect map.
     """
@@ -139,7 +139,7 @@ def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str
     rows = []
     for region, names in LANDMARKS_BY_REGION[light].items():
         centre = tuple(np.mean([landmarks[name] for name in names], axis=0))
-        heat = surface_heat_around(subject, centre, RADIUS_MM, samples, MIN_VARIANCE_MM2)
+        heat = surface_heat_around(subject, centre, REGION_RADIUS_MM, samples, MIN_VARIANCE_MM2)
         fraction = ((ours - integral.image)[heat.mask] ** 2).sum() / total
         pixels = heat.mask.sum() / integral.mask.sum()
         errors = [

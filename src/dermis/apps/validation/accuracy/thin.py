@@ -27,12 +27,12 @@ from dermis.scene.lights import DirectionalLight
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array, Array], Mask]  # mask of points from their positions and normals
-MATTE = Skin(albedo="profile", rho_s=0.0)
+MATTE_SKIN = Skin(albedo="profile", rho_s=0.0)
 PROFILE = load_profile("gpu-gems-3")
 BLURRED_PROFILE = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
-ANGLES = (5.0, 10.0, 20.0, 30.0, 45.0)
-ATLAS = 1024
+WEDGE_DEGREES = (5.0, 10.0, 20.0, 30.0, 45.0)
+ATLAS_SIDE = 1024
 EAR_DISTANCE_MM = 66.0  # distance from the scan's middle beyond which a point is on an ear
 
 
@@ -90,7 +90,7 @@ def slab_rows(renderer: dermis.Renderer) -> str:
     for thickness in THICKNESSES_MM:
         beam = np.array([0.0, 0.0, 1.0])
         slab = wedge(60.0, thickness, thickness)
-        points, normals, light = scattered_light(renderer, slab, beam, MATTE, 256, transmission="thin")
+        points, normals, light = scattered_light(renderer, slab, beam, MATTE_SKIN, 256, transmission="thin")
         inner = (normals[:, 2] > 0.9) & (np.abs(points[:, :2]).max(axis=1) < 12.0)
         rendered, exact = light[inner].mean(axis=0), gaussian_transmittance(BLURRED_PROFILE, thickness)
         cells = (" ".join(f"{value:.4f}" for value in one) for one in (rendered, exact))
@@ -99,7 +99,9 @@ def slab_rows(renderer: dermis.Renderer) -> str:
 
 
 def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> Array:
-    """Return the red light (n,) of the surface integral whose straight path to a point crosses air.
+    """Return the red light (n,) that the surface integral carries to each point across air.
+
+    Light crosses air if the straight path between source and point leaves the body.
 
     beam : (3,) direction of the light
     points, normals : (n, 3) positions and surface normals
@@ -146,11 +148,11 @@ def comparison_cells(
 
     point_filter : selects the compared points by position and normal
     spacing : largest distance of the irradiance samples [mm]
-    air : whether to add the energy ratio to the integral without light that crosses air
+    air : whether to add the energy ratio against an integral without the light that crosses air
     """
     cells = []
     for transmission in ("none", "thin"):
-        lit = scattered_light(renderer, mesh, beam, MATTE, atlas, transmission=transmission)
+        lit = scattered_light(renderer, mesh, beam, MATTE_SKIN, atlas, transmission=transmission)
         points, normals, light = lit
         selected = np.flatnonzero(point_filter(points, normals))
         selected = np.random.default_rng(5).permutation(selected)[:3000]
@@ -167,7 +169,7 @@ def comparison_cells(
 def wedge_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows on red light through wedges lit from behind, within 15 mm of their edge."""
     rows = []
-    for angle in ANGLES:
+    for angle in WEDGE_DEGREES:
         mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
 
         def dark(points: Array, normals: Array, half: float = angle / 2) -> Mask:
@@ -193,13 +195,13 @@ def ear_rows(renderer: dermis.Renderer) -> str:
                 ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
                 return np.asarray(ear & (z * normals[:, 2] > 0.3))
 
-            cells = comparison_cells(renderer, mesh, beam, dark, ATLAS, 1.5, air=True)
+            cells = comparison_cells(renderer, mesh, beam, dark, ATLAS_SIDE, 1.5, air=True)
             rows.append(f"| {name} | {side} | {cells} |")
     return "\n".join(rows)
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """Return the Markdown rows by placeholder of docs/templates/accuracy.md."""
+    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}
     return {name: make(renderer) for name, make in rows.items()}

@@ -24,8 +24,8 @@ _TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # in the buffers of triangles and of po
 _GUTTER_ENTRY_BYTES = 16
 _INDEX_BYTES = 4  # of a source's index
 _BILINEAR_TEXELS = 4  # texels read by bilinear interpolation
-_SIDE, _SIDE_ON_CPU = 4096, 1024  # larger than caches
-_COPIES, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
+_TEXTURE_SIDE, _TEXTURE_SIDE_ON_CPU = 4096, 1024  # larger than caches
+_COPIES_PER_PASS, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
 def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, float]:
     """Return the memory traffic of the stages that light the atlas and diffuse the light [byte].
 
-    shadow_bytes : bytes of a texel in all shadow maps
+    shadow_bytes : bytes read from all shadow maps for one texel of the atlas
     """
     inputs, texels, levels = traffic.inputs, traffic.texels, traffic.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
@@ -150,13 +150,13 @@ def copy_rate(device: Device) -> float:
     Raises DermisError when the device has no timestamps.
     """
     software = device.adapter.kind == "CPU"
-    side = _SIDE_ON_CPU if software else _SIDE
+    side = _TEXTURE_SIDE_ON_CPU if software else _TEXTURE_SIDE
     program = ComputeProgram(device, Path(__file__).parent / "copy.wgsl")
     textures = [make_texture(device, (side, side), "rgba32float") for _ in range(2)]
     times = [
         _copy_ms(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))
     ]
-    traffic = 2 * _COPIES * side * side * texel_bytes(textures[0])
+    traffic = 2 * _COPIES_PER_PASS * side * side * texel_bytes(textures[0])
     return traffic / (1e-3 * statistics.median(times[-_REPEATS:]))
 
 
@@ -166,7 +166,7 @@ def _copy_ms(device: Device, program: ComputeProgram, textures: list[Any]) -> fl
     textures : two textures of equal size
     """
     frame = CommandList(device)
-    for source, target in (textures, textures[::-1]) * (_COPIES // 2):
+    for source, target in (textures, textures[::-1]) * (_COPIES_PER_PASS // 2):
         frame.compute("copy", program, {"source": source, "destination": target}, source.size[:2])
     frame.submit()
     frame.wait()

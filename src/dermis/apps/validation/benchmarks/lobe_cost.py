@@ -20,8 +20,8 @@ from dermis.specular.models import MODELS
 _REPEATS = 5
 _WARMUP_S = 0.5  # because an idle GPU has a reduced clock rate
 _SHADER = Path(__file__).with_suffix(".wgsl")
-_SIDE, _LIGHTS = 1024, 64  # points along each side, and lights per point
-_SIDE_ON_CPU, _LIGHTS_ON_CPU = 256, 16
+_POINTS_PER_SIDE, _LIGHTS_PER_POINT = 1024, 64  # points along each side, and lights per point
+_POINTS_PER_SIDE_ON_CPU, _LIGHTS_PER_POINT_ON_CPU = 256, 16
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
@@ -31,7 +31,11 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     names in MODELS and FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
-    side, lights = (_SIDE_ON_CPU, _LIGHTS_ON_CPU) if on_cpu else (_SIDE, _LIGHTS)
+    side, lights = (
+        (_POINTS_PER_SIDE_ON_CPU, _LIGHTS_PER_POINT_ON_CPU)
+        if on_cpu
+        else (_POINTS_PER_SIDE, _LIGHTS_PER_POINT)
+    )
     skins = [Skin.model_validate({"specular": m, "fresnel": f}) for m in MODELS for f in FRESNEL]
     overrides = [{"IDLE": 1}, *(dict(surface_constants(skin)) for skin in skins)]
     constants = ({"LIGHTS": lights, **one} for one in overrides)

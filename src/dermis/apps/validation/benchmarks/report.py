@@ -152,8 +152,8 @@ def _html_table(lines: Sequence[tuple[str, ...]]) -> str:
     return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
 
 
-_TEXT, _TOTAL, _FLOOR = "#c8c8d0", "#e8a87c", "#6fb3b8"
-_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
+_TEXT_COLOUR, _TOTAL_COLOUR, _FLOOR_COLOUR = "#c8c8d0", "#e8a87c", "#6fb3b8"
+_SCALING_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
     "image": ("image [megapixel]", lambda row: row.case.image[0] * row.case.image[1] / 1e6),
     "atlas": ("side of the atlas [texel]", lambda row: row.case.atlas),
     "gaussians": ("Gaussians", lambda row: row.case.gaussians),
@@ -169,21 +169,21 @@ def three_digits(number: float) -> str:
 
 def scaling_plots(benchmark: Benchmark) -> str:
     """Return SVG plots of device time and its lower bound over each size that the cases vary."""
-    axes_names = [name for name in _AXES if any(row.case.varies == name for row in benchmark.rows)]
+    axes_names = [name for name in _SCALING_AXES if any(row.case.varies == name for row in benchmark.rows)]
     if not axes_names:
         return ""
     figure, panels = _figure(width=3.4 * len(axes_names), height=2.9, columns=len(axes_names))
     for axes, name in zip(panels, axes_names, strict=True):
-        label, value = _AXES[name]
+        label, value = _SCALING_AXES[name]
         rows = sorted((row for row in benchmark.rows if row.case.varies in ("", name)), key=value)
         x = [value(row) for row in rows]
-        axes.plot(x, [row.gpu_ms["total"] for row in rows], "o-", color=_TOTAL, label="device", ms=4)
-        axes.plot(x, [row.floor_ms["total"] for row in rows], "s--", color=_FLOOR, label="floor", ms=3)
+        axes.plot(x, [row.gpu_ms["total"] for row in rows], "o-", color=_TOTAL_COLOUR, label="device", ms=4)
+        axes.plot(x, [row.floor_ms["total"] for row in rows], "s--", color=_FLOOR_COLOUR, label="floor", ms=3)
         axes.set(xlabel=label, xscale="log", yscale="log")
         _set_ticks(axes.xaxis, x)
         _set_ticks(axes.yaxis, None)
     panels[0].set_ylabel("ms per frame")
-    panels[0].legend(frameon=False, labelcolor=_TEXT, fontsize=8)
+    panels[0].legend(frameon=False, labelcolor=_TEXT_COLOUR, fontsize=8)
     return _svg(figure)
 
 
@@ -192,12 +192,14 @@ def stage_bars(row: BenchmarkRow) -> str:
     names = [stage for stage in row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
     positions = range(len(names))
-    axes.barh(positions, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL, label="device")
-    axes.barh(positions, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR, label="floor")
+    axes.barh(positions, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device")
+    axes.barh(
+        positions, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR_COLOUR, label="floor"
+    )
     axes.set_yticks(positions, names)
     axes.invert_yaxis()
     axes.set_xlabel("ms")
-    axes.legend(frameon=False, labelcolor=_TEXT, fontsize=8)
+    axes.legend(frameon=False, labelcolor=_TEXT_COLOUR, fontsize=8)
     return _svg(figure)
 
 
@@ -207,9 +209,9 @@ def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axe
     panels = list(figure.subplots(1, columns, squeeze=False)[0])
     for axes in panels:
         axes.patch.set_alpha(0.0)
-        axes.tick_params(colors=_TEXT, labelsize=8, which="both")
-        axes.xaxis.label.set_color(_TEXT)
-        axes.yaxis.label.set_color(_TEXT)
+        axes.tick_params(colors=_TEXT_COLOUR, labelsize=8, which="both")
+        axes.xaxis.label.set_color(_TEXT_COLOUR)
+        axes.yaxis.label.set_color(_TEXT_COLOUR)
         axes.grid(alpha=0.2, linewidth=0.5)
         for spine in axes.spines.values():
             spine.set_visible(False)

@@ -132,7 +132,7 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Yield the subject of a comparison, whose profile is a temporary file during the context.
+    """Yield the subject of a comparison; its profile is a temporary file, deleted when the context ends.
 
     The parameters are those of `compare`.
     """

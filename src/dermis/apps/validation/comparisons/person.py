@@ -314,7 +314,7 @@ def _without_highlights(image: Floats, ring: Mask) -> Mask:
 
 
 def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
-    """Return the shift of the reference to the right of, and below, the picture by dermis [pixel].
+    """Return how far the reference is shifted to the right and down against the picture by dermis [pixel].
 
     Shift and brightness are fitted together by least squares.
 

@@ -26,7 +26,7 @@ from dermis.scene.settings import Settings
 Floats = NDArray[np.float32]
 _TEXTURE_SIDE = 1024
 """Side of the textures of eyes and teeth [texels]."""
-_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # in the order of person_textures.wgsl
+_TEXTURED_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # in the order of person_textures.wgsl
 _MIN_ROUGHNESS = 0.05
 _DENSITY_RANGE = 5.0, 14.0  # binary logarithms of mm per unit of uv
 _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
@@ -52,7 +52,9 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, side: int)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
-    iris, white, *teeth = (_part_texture(renderer, scene, part, radius) for part in range(len(_PARTS)))
+    iris, white, *teeth = (
+        _part_texture(renderer, scene, part, radius) for part in range(len(_TEXTURED_PARTS))
+    )
     colour = np.ascontiguousarray(colour[..., :3])
     return SkinTextures(colour, roughness, height, iris, radius, white, (teeth[0], teeth[1]))
 

@@ -3,7 +3,7 @@
 
 const IRIS: u32 = 0u;
 const WHITE_OF_EYE: u32 = 1u; // 2 for upper teeth, 3 for lower ones
-const UV_RADIUS: f32 = 0.49; // distance in uv from the middle that corresponds to half a turn from the axis
+const EYE_UV_RADIUS: f32 = 0.49; // distance in uv from the middle that corresponds to half a turn from the axis
 
 struct PartRequest {
     eye: Eye,
@@ -21,7 +21,7 @@ fn on_iris(uv: vec2f) -> vec3f {
 
 fn on_white(uv: vec2f) -> vec3f {
     let across = uv - 0.5;
-    let angle = min(length(across) / UV_RADIUS, 1.0) * PI;
+    let angle = min(length(across) / EYE_UV_RADIUS, 1.0) * PI;
     let turn = atan2(-across.y, across.x);
     return white_colour(part_request.eye, part_request.eyeball_radius_mm * vec3f(sin(angle) * cos(turn), sin(angle) * sin(turn), cos(angle)));
 }

@@ -102,7 +102,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Yield `comparison_scene` with a medium's profile, which is a temporary file during the context."""
+    """Yield `comparison_scene` with a medium's profile, a temporary file deleted when the context ends."""
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
@@ -123,9 +123,10 @@ _PHOTONS = 2_000_000  # per channel
 def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
     """Return the sum of six Gaussians that fits a medium's diffusion profile.
 
-    model : scattering model; by default photon counts if they include the medium, else layered diffusion
+    model : scattering model; by default tabulated photon counts if a table covers the medium, else layered
+        diffusion
 
-    Raises DermisError for photon counts of a medium that they do not include.
+    Raises DermisError if photon counts are requested for a medium that no table covers.
     """
     if model == "montecarlo":
         return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS), medium.name)

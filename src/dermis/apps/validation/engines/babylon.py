@@ -61,11 +61,11 @@ def babylon_page(library: Path) -> Iterator[Page]:
 
 
 def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the radiance (side, side, 3) that Babylon.js draws, over that far inside the light.
+    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that far from the edge in light.
 
     Row 0 is at the bottom.
 
-    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
     pixel : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -76,9 +76,9 @@ def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, a
 
 
 def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the radiance (side, side, 3) predicted from the shader's samples, rounded to pixels.
+    """Return the radiance (side, side, 3) predicted from the shader's sample positions, rounded to pixels.
 
-    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
     pixel : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -115,7 +115,7 @@ def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, ha
 def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> JsonObject:
     """Return edge responses averaged over azimuths: measured, predicted, and those of Burley profiles.
 
-    colour, metres : diffusion profile, and metersPerUnit of a scene in mm
+    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
     d_mm : (3,) widths of the Burley profiles [mm]
     """
     widest = float(d_mm.max())
@@ -162,7 +162,7 @@ def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
 
 
 def exported_skin(page: Page, name: str) -> JsonObject:
-    """Return the edge responses of a skin with its exported parameters, with the error to its profile."""
+    """Return edge responses of a skin with its exported parameters, and their error against its profile."""
     subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))

@@ -17,7 +17,7 @@ from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.validation.engines.heads import (
-    TEXELS,
+    EXPORTED_MAP_SIDE,
     Floats,
     compare_pictures,
     render_cycles,
@@ -32,12 +32,16 @@ RESULTS_FILE = RESULTS / "engines_blender.json"
 PICTURE = DOCS / "images" / "engines_blender.webp"
 SCRIPT = Path(__file__).with_name("blender_script.py")
 Measurement = Literal["edges", "heads", "picture"]
-SKINS = "skin1", "skin2", "dj3"
-METHODS = "random-walk-skin", "random-walk", "burley"
-BINS, BIN_COLUMNS, ROWS = 12, 8, 8  # bins from -6 d to 6 d, pixels across a bin, and rows of pixels
+COMPARED_SKINS = "skin1", "skin2", "dj3"
+SUBSURFACE_METHODS = "random-walk-skin", "random-walk", "burley"
+BIN_COUNT, BIN_COLUMNS, PIXEL_ROWS = (
+    12,
+    8,
+    8,
+)  # bins from -6 d to 6 d, pixels across a bin, and rows of pixels
 SAMPLES_BY_METHOD = {"burley": 512}
 DEFAULT_SAMPLES = 1024
-SEEDS = 2  # pictures per channel, whose difference gives the noise
+SEED_COUNT = 2  # pictures per channel, whose difference gives the noise
 HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
@@ -59,7 +63,7 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
-    results["columns_in_d"] = column_positions().reshape(BINS, BIN_COLUMNS).mean(axis=1).tolist()
+    results["columns_in_d"] = column_positions().reshape(BIN_COUNT, BIN_COLUMNS).mean(axis=1).tolist()
     if "edges" in parts:
         results["edges"] = list(measure_edges(pythons))
         write_results(RESULTS_FILE, results)
@@ -73,15 +77,15 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
 def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     """Yield the measured edge response of each skin, by Blender version and subsurface method."""
     for version, python in pythons.items():
-        for method in METHODS:
-            for name in SKINS:
+        for method in SUBSURFACE_METHODS:
+            for name in COMPARED_SKINS:
                 yield measure_edge(python, version, method, name)
                 print_lines(f"{version} {method} {name}")
 
 
 def column_positions() -> Floats:
     """Return the distance of each pixel column from the edge of the light, in units of the Burley width d."""
-    return 12.0 * (np.arange(BINS * BIN_COLUMNS) + 0.5) / (BINS * BIN_COLUMNS) - 6.0
+    return 12.0 * (np.arange(BIN_COUNT * BIN_COLUMNS) + 0.5) / (BIN_COUNT * BIN_COLUMNS) - 6.0
 
 
 def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
@@ -95,8 +99,8 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
     predicted_curve = target.predicted_curve(rows, subject, version)
     naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
     samples = SAMPLES_BY_METHOD.get(method, DEFAULT_SAMPLES)
-    shared = {"size": [BINS * BIN_COLUMNS, ROWS], "samples": samples}
-    channels = [(k, c) for k in range(SEEDS) for c in range(3)]
+    shared = {"size": [BIN_COUNT * BIN_COLUMNS, PIXEL_ROWS], "samples": samples}
+    channels = [(k, c) for k in range(SEED_COUNT) for c in range(3)]
     passes = [{"channel": c, "width_m": 12e-3 * d[c], "seed": k, **shared} for k, c in channels]
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name)
@@ -104,8 +108,8 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
         run_blender(python, SCRIPT, [str(folder)], 3600.0, PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
-    columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEEDS)])[..., 0]
-    means = columns.reshape(SEEDS, 3, BINS, BIN_COLUMNS).mean(axis=-1)
+    columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
+    means = columns.reshape(SEED_COUNT, 3, BIN_COUNT, BIN_COLUMNS).mean(axis=-1)
     predicted, true = (binned_response(curve, d) for curve in (predicted_curve, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
@@ -114,7 +118,7 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         "version": output["version"],
         "method": method,
         "skin": name,
-        "samples": SEEDS * BIN_COLUMNS * ROWS * samples,
+        "samples": SEED_COUNT * BIN_COLUMNS * PIXEL_ROWS * samples,
         "d_mm": d.round(4).tolist(),
         "measured": measured.round(4).tolist(),
         "predicted": predicted.round(4).tolist(),
@@ -133,12 +137,12 @@ def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
     d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
     """
     columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
-    return np.asarray(np.array(columns).reshape(3, BINS, BIN_COLUMNS).mean(axis=-1))
+    return np.asarray(np.array(columns).reshape(3, BIN_COUNT, BIN_COLUMNS).mean(axis=-1))
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     """Yield the differences of Cycles from dermis in outline and colour, for a head without hair."""
-    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
+    subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
@@ -154,7 +158,7 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 def write_picture(pythons: dict[str, Path]) -> None:
     """Write a picture that shows a head with hair by dermis and by each version of Cycles."""
-    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
+    subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     columns = [render_dermis(subject, PICTURE_SIDE)]
     for version, python in pythons.items():
         method = METHODS_BY_VERSION[version][0]

@@ -33,9 +33,9 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.settings import Settings
 
 RESULTS_FILE, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
-TEXELS, SIDE = 1024, 256
-CYCLES_SAMPLES, MITSUBA_SAMPLES, SEEDS = 64, 256, 2
-LIGHTS = (
+EXPORTED_MAP_SIDE, HEAD_PICTURE_SIDE = 1024, 256
+CYCLES_SAMPLES, MITSUBA_SAMPLES, SEED_COUNT = 64, 256, 2
+HEAD_LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
@@ -53,11 +53,11 @@ def heads() -> None:
     babylonjs into. Needs Mitsuba.
     """
     in_checkout(PICTURE.parent)
-    subject = load_subject("human").with_painted_maps(TEXELS, "auto")
+    subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.head is not None and subject.scene is not None
     hairless = replace(subject.head, hair=None, strands=None)
-    subject = replace(subject, scene=replace(subject.scene, head=hairless, lights=LIGHTS))
-    ours = render_dermis(subject, SIDE)
+    subject = replace(subject, scene=replace(subject.scene, head=hairless, lights=HEAD_LIGHTS))
+    ours = render_dermis(subject, HEAD_PICTURE_SIDE)
     columns, rows = [ours], []
     for name, draw in available_renderers(subject, ours).items():
         pictures = np.stack(draw())
@@ -79,7 +79,7 @@ def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[]
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
     for version, python in zip(("4.5", "5.2"), named, strict=False):
         result[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
-            subject, "random-walk-skin", version, Path(python), SIDE, CYCLES_SAMPLES, SEEDS
+            subject, "random-walk-skin", version, Path(python), HEAD_PICTURE_SIDE, CYCLES_SAMPLES, SEED_COUNT
         )
     if os.environ.get(LIBRARY_VARIABLE):
         library = babylon_library()
@@ -93,7 +93,7 @@ def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
 
     ours : (h, w, 4) picture by dermis, whose alpha is used
     """
-    with TemporaryDirectory() as folder_name, chromium_page(SIDE) as page:
+    with TemporaryDirectory() as folder_name, chromium_page(HEAD_PICTURE_SIDE) as page:
         file = Path(folder_name) / "head.html"
         export_skin(subject, "babylon", file, library=library)
         page.goto(file.as_uri())
@@ -113,8 +113,13 @@ def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
         folder = Path(folder_name) / "head"
         export_skin(subject, "mitsuba", folder)
-        scene = mi.load_file(str(folder / "scene.xml"), width=SIDE, height=SIDE, samples=MITSUBA_SAMPLES)
-        frames = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEEDS)]
+        scene = mi.load_file(
+            str(folder / "scene.xml"),
+            width=HEAD_PICTURE_SIDE,
+            height=HEAD_PICTURE_SIDE,
+            samples=MITSUBA_SAMPLES,
+        )
+        frames = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEED_COUNT)]
     return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in frames]
 
 
@@ -126,7 +131,7 @@ def over_grey(picture: Floats) -> Floats:
 def render_dermis(subject: Subject, side: int) -> Floats:
     """Return the linear picture (h, w, 4) of the subject by dermis."""
     assert subject.scene is not None
-    settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
+    settings = Settings(size=(side, side), atlas=EXPORTED_MAP_SIDE, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 

@@ -30,7 +30,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 
 Floats = NDArray[np.float64]
 RESULTS_FILE = RESULTS / "engines_mitsuba.json"
-SKINS: dict[str, tuple[Boundary, ...]] = {
+COMPARED_SKINS: dict[str, tuple[Boundary, ...]] = {
     "skin1": ("matched", "smooth"),
     "skin2": ("matched", "smooth", "rough"),
     "dj3": ("matched", "smooth"),
@@ -47,7 +47,8 @@ def half_lit_plane(
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
-    The camera is below the surface where the surface does not change the direction along the normal.
+    The camera is below the surface, except for a rough one: any other surface transmits light along the
+    normal without changing its direction.
 
     d_mm : Burley width of the profile; the view spans 3 d on each side of the edge [mm]
     black : whether the medium absorbs all light, so that only the surface reflects
@@ -158,7 +159,7 @@ def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str =
     mi = load_mitsuba()
     edge = []
     with mitsuba_variant(mi, variant):
-        for name, boundaries in SKINS.items():
+        for name, boundaries in COMPARED_SKINS.items():
             subject = load_subject(name)
             edge += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
     half = _PIXELS // 2

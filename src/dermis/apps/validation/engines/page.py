@@ -11,7 +11,7 @@ from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, in_checkout,
 from dermis.base.console import print_lines
 
 PAGE = DOCS / "engines.md"
-SKINS = "skin1", "skin2", "dj3", "medium"
+COMPARED_SKINS = "skin1", "skin2", "dj3", "medium"
 _EXCLUDED = ("maps",)  # a baked light map has no skin parameters
 _COLUMNS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge, published values typed in"
 _BLENDER_EDGE_HEADER = (
@@ -43,9 +43,9 @@ def fill_tables(text: str) -> str:
 
 
 def predicted_table() -> str:
-    """Return a Markdown table of the predicted errors of all targets and variants, newest versions."""
+    """Return a Markdown table of the predicted errors of the newest version of each target and variant."""
     lines = []
-    subjects = [load_subject(name) for name in SKINS]
+    subjects = [load_subject(name) for name in COMPARED_SKINS]
     for name in sorted(set(TARGETS) - set(_EXCLUDED), key=str.lower):
         for variant in TARGETS[name].variants or (None,):
             target = TARGETS[name].with_variant(variant)

@@ -143,7 +143,7 @@ def _dermis_row(renders: PeerRenders, name: str, mask: Mask) -> RendererRow:
 
 
 def _time_ratios(row: RendererRow, ours: RendererRow) -> dict[str, float]:
-    """Return elapsed and CPU time of another frame of dermis over those of the first one."""
+    """Return the elapsed and the CPU time of a row over those of the row `ours` [-]."""
     assert row.seconds and row.core_seconds and ours.seconds and ours.core_seconds
     return {"ratio": row.seconds / ours.seconds, "core_ratio": row.core_seconds / ours.core_seconds}
 

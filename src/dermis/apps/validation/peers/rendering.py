@@ -23,7 +23,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
+CYCLES_METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ GPU_GEMS_3_VARIANTS = {
 """Passes of GPU Gems 3 (2007) in dermis, to compare with the first of `DERMIS_VARIANTS`."""
 FIRST_SEEDS = (100, 200)
 """Seeds of the first pass of each turn; further passes have the following seeds."""
-_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
+_PROGRESS_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
 """Relative times of a turn of frames and of one path per pixel, for the progress bar."""
 
 
@@ -76,9 +76,13 @@ class PeerPlan:
     @property
     def work(self) -> int:
         """Return the number of steps of the progress bar for one scene."""
-        cycles = len(FIRST_SEEDS) * sum(self.samples) * (_STEPS["random-walk"] + _STEPS["burley"])
-        ours = (len(FIRST_SEEDS) * len(METHODS) + 2) * _STEPS["ours"]
-        return ours + cycles + self.paths * _STEPS["path-traced"]
+        cycles = (
+            len(FIRST_SEEDS)
+            * sum(self.samples)
+            * (_PROGRESS_STEPS["random-walk"] + _PROGRESS_STEPS["burley"])
+        )
+        ours = (len(FIRST_SEEDS) * len(CYCLES_METHODS) + 2) * _PROGRESS_STEPS["ours"]
+        return ours + cycles + self.paths * _PROGRESS_STEPS["path-traced"]
 
 
 @dataclass
@@ -126,31 +130,31 @@ def render_peers(
     """
     medium = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
-    cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in METHODS}
+    cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in CYCLES_METHODS}
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
 
     def per_pass(done: int, total: int) -> None:
-        on_progress(SAMPLES_PER_PASS * _STEPS["path-traced"])
+        on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEEDS:
-            for method in METHODS:
+            for method in CYCLES_METHODS:
                 _add_frames(ours, renderer, scene, plan)
-                on_progress(_STEPS["ours"])
+                on_progress(_PROGRESS_STEPS["ours"])
                 try:
                     cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                on_progress(_STEPS[method] * sum(plan.samples))
+                on_progress(_PROGRESS_STEPS[method] * sum(plan.samples))
         _add_frames(ours, renderer, scene, plan)
-        on_progress(_STEPS["ours"])
+        on_progress(_PROGRESS_STEPS["ours"])
         cpu_started = time.process_time()
         reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=per_pass)
         core_seconds = time.process_time() - cpu_started
         _add_frames(ours, renderer, scene, plan)
-        on_progress(_STEPS["ours"])
+        on_progress(_PROGRESS_STEPS["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
     return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 

@@ -23,7 +23,7 @@ from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
 
-FIGURES, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
+RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
 DEFAULT_LIGHTS = ("front", "back")
 QUICK_PLAN = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
 TARGET_RATIO = 50.0
@@ -56,7 +56,7 @@ def peers(
     adapter:
         Adapter of dermis: cpu, so that all renderers use the same processor.
     """
-    target = output or (None if quick else FIGURES)
+    target = output or (None if quick else RESULTS_FILE)
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         check_output(target, (".json",), "Choose such a name")
@@ -66,7 +66,7 @@ def peers(
     machine, scenes = machine_text(report), scenes_text(report)
     if target is not None:
         write_results(target, report)
-    if target == FIGURES:
+    if target == RESULTS_FILE:
         fill_page(PAGE, machine=machine, scenes=scenes)
     print_lines(machine, "", scenes)
 
