@@ -94,7 +94,7 @@ def test_the_ball_is_whole_and_has_the_published_shape() -> None:
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((facing * corners.mean(axis=1)).sum(axis=1) >= 0.0).all()
     assert (np.einsum("vc,vc->v", normals, positions) > 0.0).all()
-    assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.UV_RADIUS)
+    assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.EYE_UV_RADIUS)
 
 
 def test_the_white_turns_clear_at_the_limbus() -> None:
@@ -102,7 +102,7 @@ def test_the_white_turns_clear_at_the_limbus() -> None:
     middle = len(found) // 2
     assert found[middle, middle] == 1.0 and found[0, 0] == 0.0
     row = found[middle, middle:]
-    half = np.arcsin(LIMBUS_MM / SCLERA_MM) / np.pi * eyes.UV_RADIUS * len(found)
+    half = np.arcsin(LIMBUS_MM / SCLERA_MM) / np.pi * eyes.EYE_UV_RADIUS * len(found)
     assert abs(int(np.argmin(np.abs(row - 0.5))) - half) < 8
 
 

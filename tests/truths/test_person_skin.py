@@ -33,7 +33,7 @@ SHORT = np.full(3, 0.02)
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Use a coarse colour grid, which is enough for balls of one colour."""
-    monkeypatch.setattr(medium, "VOXELS", 8)
+    monkeypatch.setattr(medium, "GRID_VOXELS", 8)
 
 
 def middle(person: Any, paths: NDArray[np.float64] = SHORT, samples: int = 256, **given: Any) -> Any:

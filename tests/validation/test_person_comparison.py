@@ -100,7 +100,7 @@ def test_an_eye_is_close_to_its_path_traced_image(
     renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mitsuba")
-    monkeypatch.setattr(medium, "VOXELS", 8)
+    monkeypatch.setattr(medium, "GRID_VOXELS", 8)
     pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, use_cache=False)
     assert pair.samples == 16  # views of eyes use twice as many
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0

@@ -123,8 +123,8 @@ def cycles_passes(
     """
     for sample_count in samples:
         _check_samples(sample_count)
-    if method not in FALLOFFS:
-        refuse("method", f"one of {', '.join(FALLOFFS)}", f"got {method!r}", "Correct it")
+    if method not in CYCLES_METHOD_NAMES:
+        refuse("method", f"one of {', '.join(CYCLES_METHOD_NAMES)}", f"got {method!r}", "Correct it")
     size = (settings or Settings()).size
     scene_dict, arrays = describe_scene(scene, medium, method, size)
     scene_dict["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
@@ -201,7 +201,7 @@ class PrincipledSkin:
 
 
 SkinMaterial = Medium | Lambertian | BeckmannSurface | PrincipledSkin
-FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
+CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 """Cycles' names of the subsurface methods, by their names here."""
 
 
@@ -284,7 +284,7 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     (layer,) = medium.layers
     radius_cycles = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
     colour = [diffuse_albedo(float(alpha)) for alpha in layer.alpha_prime]
-    return {"method": FALLOFFS[method], "colour": colour, "radius": radius_cycles.tolist()}
+    return {"method": CYCLES_METHOD_NAMES[method], "colour": colour, "radius": radius_cycles.tolist()}
 
 
 def cycles_camera(scene: Scene) -> SceneDict:

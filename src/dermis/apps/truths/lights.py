@@ -196,7 +196,7 @@ def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0,
 def facing_irradiance(width: float, height: float, distance: float) -> float:
     """Return the irradiance of a rectangle of radiance 1 on a parallel surface in front of its centre.
 
-    width, height, distance : size of the rectangle, and its distance from the surface, in one unit
+    width, height, distance : size of the rectangle, and its distance from the surface, all in the same unit
 
     Source: view factor from a corner, [Baum1989].
     """

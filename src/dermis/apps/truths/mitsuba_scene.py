@@ -33,7 +33,7 @@ ROULETTE_DEPTH = 100
 """Scattering events before Russian roulette. Earlier roulette leaves few paths of high weight: red on skin2
 then has nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
 _DIRECT_DEPTH = 2
-_GAP_STEPS = 0.97
+_GAP_FLOAT_STEPS = 0.97
 """Distance between the two surfaces of an interface, over the offset by which Mitsuba avoids a second hit of
 the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean free path of
 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower one, an outward
@@ -72,7 +72,7 @@ def mitsuba_variant(mi: Mitsuba, name: str) -> Iterator[None]:
 
 
 def check_traceable(medium: Medium | Lambertian) -> None:
-    """Raise DermisError for a refracting surface, and for media with other than three channels.
+    """Raise DermisError for media that have a refracting surface or a number of channels other than three.
 
     No path connects to a point light through a refracting surface.
     """
@@ -215,7 +215,7 @@ def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
 
     skin : closed skin surface relative to the head's centre
     """
-    return np.asarray(_GAP_STEPS * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
+    return np.asarray(_GAP_FLOAT_STEPS * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
 def _homogeneous_medium(layer: Layer) -> SceneDict:

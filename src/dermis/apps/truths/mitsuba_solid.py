@@ -108,7 +108,7 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return the directed edges (n, 2) that lack an opposite edge, once for each missing one.
+    """Return directed edges (n, 2) that lack an opposite edge, repeated as often as opposites are missing.
 
     count : number of points
     """

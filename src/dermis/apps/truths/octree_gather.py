@@ -26,7 +26,8 @@ _MAX_SUBDIVISIONS = 20
 class TriangleStack(NamedTuple):
     """Stack of triangle pieces that are still to be gathered.
 
-    It has their corners (p, 3, 3) [mm], irradiance at the corners (p, 3, 3), and areas (p,) [mm²].
+    Its fields are the corners of the pieces (p, 3, 3) [mm], the irradiance at the corners (p, 3, 3), and the
+    areas of the pieces (p,) [mm²].
     """
 
     corners: Floats

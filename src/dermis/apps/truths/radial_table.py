@@ -22,7 +22,9 @@ _FAR_ERROR_FRACTION = 0.2
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Diffusion profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v), apart from the renderer's own class.
+    """Diffusion profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v), not the renderer's own class.
+
+    It is separate so that the reference shares no code with the renderer.
 
     weight : (k, 3) energy of each Gaussian, by channel [-]
     variance_mm2 : (k,) variance v of each Gaussian [mm²]

@@ -27,7 +27,7 @@ EDGES_PER_SIGMA = 2.0
 MARGIN_SIGMAS = 4.0
 """Standard deviations beyond which a Gaussian has 0.03 % of its energy."""
 
-_GAMMA = 2 - np.sqrt(2)
+_TRAPEZOIDAL_FRACTION = 2 - np.sqrt(2)
 """Fraction of the step by the trapezoidal stage; this value gives both stages the same matrix."""
 
 
@@ -119,9 +119,9 @@ def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: fl
     steps : number of time steps
     """
     step = variance / 2 / steps
-    solve = _lu_solver((mass + (_GAMMA / 2 * step) * stiffness).tocsc())
-    explicit = (mass - (_GAMMA / 2 * step) * stiffness).tocsr()
-    first = 1 / (_GAMMA * (2 - _GAMMA))
+    solve = _lu_solver((mass + (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsc())
+    explicit = (mass - (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsr()
+    first = 1 / (_TRAPEZOIDAL_FRACTION * (2 - _TRAPEZOIDAL_FRACTION))
     lumped = mass.tocsr()
     for _ in range(steps):
         intermediate = solve(explicit @ values)
@@ -177,9 +177,9 @@ def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, st
         refuse("surface diffusion", expected, actual, "Refine the surface (refine_patch) or use wider levels")
 
 
-_SLACK = 1e-5
+_MIN_TRIANGLE_SLACK = 1e-5
 """Least slack of the triangle inequality, over the mean edge; angles of flatter triangles are not usable."""
-_COCIRCULAR = 1e-6
+_FLIP_TOLERANCE = 1e-6
 """Edges whose cotangents sum to less than minus this are flipped; four points on a circle sum to 0."""
 _MAX_SWEEPS = 1000
 
@@ -222,7 +222,7 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTri
     """
     _, side, length = triangle_edges(positions, triangles)
     slack = length[side].sum(axis=1) - 2 * length[side].max(axis=1)
-    missing = max(0.0, _SLACK * float(length.mean()) - float(slack.min()))
+    missing = max(0.0, _MIN_TRIANGLE_SLACK * float(length.mean()) - float(slack.min()))
     return IntrinsicTriangulation(triangles, side, length + missing)
 
 
@@ -241,7 +241,7 @@ def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulatio
     # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
     for _ in range(_MAX_SWEEPS):
         weight = sum_by_index(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
-        illegal = flippable & (weight < -_COCIRCULAR)
+        illegal = flippable & (weight < -_FLIP_TOLERANCE)
         if not illegal.any():
             break
         _flip_edges(flipped, _independent_flips(side, illegal, weight))

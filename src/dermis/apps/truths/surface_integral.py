@@ -68,9 +68,11 @@ def integrate_exitance(
 
 
 def _weight_error_bounds(tree: Octree, factor: float) -> Octree:
-    """Return the octree with a larger weight of those error bounds whose errors do not cancel.
+    """Return the octree with a larger weight of `moment_error` and `centroid_error`, which do not cancel.
 
-    factor : factor of these bounds
+    The weighted `moment_error` is added to `second_moment`.
+
+    factor : factor of both bounds
     """
     second_moment = tree.second_moment + factor * tree.moment_error
     return tree._replace(second_moment=second_moment, centroid_error=factor * tree.centroid_error)

@@ -19,8 +19,9 @@ Counts = NDArray[np.int64]
 
 @compiled
 def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: RandomState) -> float:
-    """Return where a photon leaves that enters at normal incidence at x [mm]; NaN if it is absorbed.
+    """Return the x at which a photon leaves the surface [mm]; NaN if it is absorbed.
 
+    x : position where the photon enters, at normal incidence [mm]
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
     eta : index of refraction of both media
     """

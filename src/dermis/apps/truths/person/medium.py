@@ -21,7 +21,7 @@ Floats = NDArray[np.float32]
 COAT_TRANSMITTANCE = 0.98
 """Fraction of light that the coat transmits, see `coat_bsdf`; the medium compensates for it."""
 COAT_INDEX = SKIN_ETA
-VOXELS = 96
+GRID_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, over the height of the picture, and its lower limit."""
@@ -50,9 +50,9 @@ def single_scattering_albedo(colour: ArrayLike) -> Doubles:
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """Return the mean free paths (3,) with which light leaves at a given mean distance from its entry [mm].
+    """Return mean free paths (3,) of media in which light leaves at given mean distances from entry [mm].
 
-    The offsets of media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
+    The mean distances in media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
 
     colour : (3,) diffuse albedo of the medium
     distance_mm : (3,) mean lateral offset of exit points [mm]
@@ -77,7 +77,7 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
     """Return Mitsuba's medium below the skin, with a grid of albedos around the camera's target."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _grid_box(person, camera)
-    grid = single_scattering_albedo(colour_grid(person, low, high, VOXELS)).astype(np.float32)
+    grid = single_scattering_albedo(colour_grid(person, low, high, GRID_VOXELS)).astype(np.float32)
     to_world = mi.ScalarTransform4f().translate([float(c) for c in low])
     return mi.load_dict(
         {

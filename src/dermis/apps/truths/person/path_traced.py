@@ -23,7 +23,7 @@ from dermis.apps.truths.path_traced import (
     pass_count,
     render_passes,
 )
-from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, VOXELS, mean_free_paths, skin_medium
+from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, GRID_VOXELS, mean_free_paths, skin_medium
 from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
 from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, mitsuba_texture, skin_shapes
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
@@ -66,7 +66,7 @@ def path_trace_person(
     """
     target_count, mi = pass_count(samples), load_mitsuba()
     person, path = posed_person(scene, textures), mean_free_paths(colour, distance_mm)
-    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {VOXELS}"
+    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
     key = person_key(scene, person, path, trace_settings) if use_cache else None
     return render_passes(

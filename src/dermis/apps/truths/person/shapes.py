@@ -87,9 +87,9 @@ TEAR_ROUGHNESS = 0.06
 """Roughness of the tear film over the white of the eye [-]."""
 LIMBUS_BLUR_MM = 0.55
 """Half the width of the transition from white to cornea [mm]."""
-UV_RADIUS = 0.49
+EYE_UV_RADIUS = 0.49
 """Distance in uv from the middle that corresponds to half a turn from the axis."""
-_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
+_STEPS_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
 """Steps of the eyeball mesh around the axis, and from the apex over cornea and sclera."""
 _TEXTURE_SIDE = 1024
 _IRIS_GAP_MM = 0.02  # between the edge of the disc and the eyeball [mm]
@@ -101,7 +101,7 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     angle = np.concatenate(
         [np.linspace(0.0, limbus, _CORNEA_STEPS, endpoint=False), np.linspace(limbus, np.pi, _SCLERA_STEPS)]
     )
-    azimuth = 2.0 * np.pi * np.arange(_AROUND + 1) / _AROUND
+    azimuth = 2.0 * np.pi * np.arange(_STEPS_AROUND + 1) / _STEPS_AROUND
     a, t = (grid.ravel() for grid in np.meshgrid(angle, azimuth, indexing="ij"))
     outwards = np.stack([np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)], axis=-1)
     positions = profile_mm(a)[:, None] * outwards
@@ -110,8 +110,8 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     clear = cornea_weight(np.hypot(positions[:, 0], positions[:, 1]), positions[:, 2])[:, None]
     normals = outwards + clear * (cornea - outwards)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    uv = 0.5 + UV_RADIUS * (a / np.pi)[:, None] * np.stack([np.cos(t), -np.sin(t)], axis=-1)
-    return positions, _grid_triangles(len(angle), _AROUND + 1), normals, uv
+    uv = 0.5 + EYE_UV_RADIUS * (a / np.pi)[:, None] * np.stack([np.cos(t), -np.sin(t)], axis=-1)
+    return positions, _grid_triangles(len(angle), _STEPS_AROUND + 1), normals, uv
 
 
 def _grid_triangles(rows: int, columns: int) -> Index:
@@ -137,7 +137,7 @@ def cornea_weight(axis_distance_mm: Doubles, z_mm: Doubles) -> Doubles:
 def cornea_weight_map() -> Doubles:
     """Return `cornea_weight` as a texture (n, n) by the polar uv of the eyeball."""
     u = (np.arange(_TEXTURE_SIDE) + 0.5) / _TEXTURE_SIDE - 0.5
-    angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / UV_RADIUS, 1.0) * np.pi
+    angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / EYE_UV_RADIUS, 1.0) * np.pi
     radius = profile_mm(angle)
     return cornea_weight(radius * np.sin(angle), radius * np.cos(angle))
 
@@ -145,10 +145,12 @@ def cornea_weight_map() -> Doubles:
 def iris_disc() -> tuple[Doubles, Index, float]:
     """Return the iris as a disc in its plane: positions, triangles and radius, up to the eyeball [mm]."""
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _IRIS_GAP_MM
-    azimuth = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
-    rim = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_AROUND, iris_mm())], axis=-1)
-    k = np.arange(_AROUND)
-    triangles = np.stack([np.full(_AROUND, _AROUND), k, (k + 1) % _AROUND], axis=-1)
+    azimuth = 2.0 * np.pi * np.arange(_STEPS_AROUND) / _STEPS_AROUND
+    rim = np.stack(
+        [radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_STEPS_AROUND, iris_mm())], axis=-1
+    )
+    k = np.arange(_STEPS_AROUND)
+    triangles = np.stack([np.full(_STEPS_AROUND, _STEPS_AROUND), k, (k + 1) % _STEPS_AROUND], axis=-1)
     return np.concatenate([rim, [[0.0, 0.0, iris_mm()]]]), triangles, radius
 
 
@@ -227,7 +229,8 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
 def absorption_groups(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
     """Return the fibre indices of at most `MAX_HAIR_GROUPS` groups with similar absorption.
 
-    optical_depth : (n, 3) optical depth over the radius of each fibre; its sum over the channels is compared
+    optical_depth : (n, 3) absorption coefficient times radius of each fibre; its sum over the channels is
+        compared [-]
     """
     order = np.argsort(optical_depth.sum(axis=1), kind="stable")
     return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
