@@ -86,7 +86,7 @@ class FaceRenderer:
         return self._masked_radiance(self.lit_scene(point, strengths, name), "together")
 
     def lit_scene(self, point: FitPoint, strengths: Floats, name: str = "light") -> Scene:
-        """Return the scene with the skin of a point and all lights, and write the ambient light's panorama.
+        """Return the scene with the skin of `point` and all lights, and write the ambient light's panorama.
 
         strengths : (9 + k,) strengths of ambient lobes and suns
         name : file name of the panorama in the folder, without suffix

@@ -17,7 +17,7 @@ from dermis.images.colour import decode_srgb_levels
 from dermis.images.io import EmbeddedPicture, read_image
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
-from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
 from dermis.scene.camera import Camera
 from dermis.scene.conversions import as_head
 from dermis.scene.files import head_table, load_camera, load_scene
@@ -107,8 +107,7 @@ class FitSubject:
 
     scene : head, camera, pose and surface
     person : parametric person whose skin is painted, None for other heads
-    table : table [head] for the scene's file, for heads that are not a person; empty for people without a
-        name
+    table : table [head] of the scene's file; empty for a head without a name or file, which cannot be saved
     """
 
     scene: Scene
@@ -167,5 +166,5 @@ def _without_light(scene: Scene) -> Scene:
         fixed_pigments |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
     if scene.skin.pigments is not None:
         fixed_pigments |= scene.skin.pigments.overrides()
-    fixed = {"profile": SPECTRAL, "pigments": Pigments(**fixed_pigments)}
+    fixed = {"profile": SPECTRAL_PRESET, "pigments": Pigments(**fixed_pigments)}
     return replace(scene, lights=(), environment=None, skin=Skin(**(scene.skin.model_dump() | fixed)))

@@ -15,8 +15,8 @@ PANORAMA_ROWS = 32
 BASIS_SIZE = 9
 """Number of spherical harmonics up to the second order, which determine diffuse shading
 [RamamoorthiHanrahan2001]."""
-_DISTRIBUTED_LOBES = 48
-_CANDIDATES = 400
+_DISTRIBUTED_LOBE_COUNT = 48
+_CANDIDATE_COUNT = 400
 
 
 def lobe_radiance(towards: Floats, directions: Floats) -> Floats:
@@ -33,7 +33,7 @@ def lobe_radiance(towards: Floats, directions: Floats) -> Floats:
 @cache
 def lobe_directions() -> Floats:
     """Return the axes (9, 3) of the nine ambient lobes, selected greedily to be linearly independent."""
-    candidates = fibonacci_sphere(_CANDIDATES)
+    candidates = fibonacci_sphere(_CANDIDATE_COUNT)
     selected = [int(np.argmax(candidates[:, 2]))]
     for _ in range(BASIS_SIZE - 1):  # add the candidate that the selected lobes approximate worst
         basis = lobe_radiance(candidates[selected], candidates)
@@ -45,21 +45,21 @@ def lobe_directions() -> Floats:
 
 @cache
 def lobe_mixtures() -> tuple[Floats, Floats]:
-    """Return weights (9, n) that express n evenly distributed lobes by the nine lobes, and their axes.
+    """Return weights (9, n) that express n evenly distributed lobes by the 9 ambient lobes, and the n axes.
 
-    The axes of the distributed lobes have the shape (n, 3).
+    The ambient lobes are those of `lobe_directions`. The axes of the distributed lobes have the shape (n, 3).
     """
-    towards = fibonacci_sphere(_DISTRIBUTED_LOBES)
-    samples = fibonacci_sphere(_CANDIDATES)
+    towards = fibonacci_sphere(_DISTRIBUTED_LOBE_COUNT)
+    samples = fibonacci_sphere(_CANDIDATE_COUNT)
     basis, mixed = (lobe_radiance(lobes, samples) for lobes in (lobe_directions(), towards))
     weights = np.linalg.lstsq(basis, mixed, rcond=None)[0]
     return np.asarray(weights, np.float64), towards
 
 
 def panorama(strengths: Floats) -> Floats:
-    """Return a panorama (h, w) of ambient radiance, the weighted sum of the nine lobes, at least 0.
+    """Return a panorama (h, w) of ambient radiance, the weighted sum of the 9 ambient lobes, at least 0.
 
-    strengths : (9,) weights of the lobes
+    strengths : (9,) weights of the lobes with the axes `lobe_directions`
     """
     texels = directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)
     return np.maximum(lobe_radiance(lobe_directions(), texels) @ strengths, 0.0)
@@ -93,10 +93,11 @@ def solve_normal_equations(gram: Floats, right: Floats) -> Floats:
 
 
 def mixing_matrix(suns: int) -> Floats:
-    """Return the matrix (9 + k, n + k) from n evenly distributed lobes and k suns to nine lobes and k suns.
+    """Return the matrix (9 + k, n + k) from the strengths of distributed lobes to those of ambient lobes.
 
-    It converts light strengths. Non-negative strengths of the distributed lobes make ambient light
-    non-negative.
+    The n distributed lobes are those of `lobe_mixtures`, and the 9 ambient lobes those of `lobe_directions`;
+    the strengths of k suns follow in both and do not change. Non-negative strengths of the distributed lobes
+    make ambient light non-negative.
     """
     weights, _ = lobe_mixtures()
     matrix = np.zeros((BASIS_SIZE + suns, weights.shape[1] + suns))

@@ -17,7 +17,7 @@ from dermis.base.reading import parse_json, parsing, read_text
 from dermis.base.tables import parse_rows
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
 from dermis.human.landmarks.sets import LANDMARK_SETS
-from dermis.human.makehuman import OLD, YOUNG, human_targets
+from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
@@ -34,12 +34,12 @@ _TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "
 _TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
 _ITERATIONS = 2
 _IDENTITY_STEP = 0.2  # step of finite differences, in standard deviations of the prior
-_DISTANCE_MM = 1100.0
-_FRAME_MM = 300.0
+_PORTRAIT_DISTANCE_MM = 1100.0
+_PORTRAIT_HEIGHT_MM = 300.0
 
 
 def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[int, int]) -> FitSubject:
-    """Return the subject with the camera, and for a human the identity, that project landmarks onto a photo.
+    """Fit the camera, and the identity of a human, to landmarks in a photograph; return the changed subject.
 
     For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors centred
     on the given person. Other heads keep their shape and need a file with landmarks of the head.
@@ -54,7 +54,7 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
     model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
     pixels = np.array([pixels_by_name[one] for one in model.names])
     solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.count)])
-    solution[:3], solution[5] = (np.pi, 0.0, 0.0), _DISTANCE_MM
+    solution[:3], solution[5] = (np.pi, 0.0, 0.0), _PORTRAIT_DISTANCE_MM
     for _ in range(_ITERATIONS if person else 1):
         solution = _fit_camera_and_identity(model, pixels, size, solution)
         if person is not None:
@@ -145,7 +145,7 @@ class _LandmarkModel:
 def _derivative(model: _LandmarkModel, positions_of: Callable[[Human], Floats], k: int) -> Floats:
     """Return the derivative (n, 3) of landmark positions by the k-th unknown of the identity.
 
-    The finite difference is taken away from the limit of the unknown, if the prior is at it.
+    The finite difference steps upwards, or downwards if the prior is at the upper limit of the unknown.
     """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
         identity = np.zeros(len(_MACRO_NAMES) + len(model.details))
@@ -161,15 +161,15 @@ def _log_focal(size: tuple[int, int]) -> float:
 
     size : width and height of the photograph [pixel]
     """
-    return float(np.log(size[1] * _DISTANCE_MM / _FRAME_MM))
+    return float(np.log(size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
 def _macro_prior_sd(name: str) -> float:
-    return _MACRO_SD * (OLD - YOUNG if name == "age" else 1.0)
+    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if name == "age" else 1.0)
 
 
 def _macro_limits(name: str) -> tuple[float, float]:
-    return {"age": (YOUNG, OLD), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
+    return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
 
 
 def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:

@@ -34,7 +34,7 @@ from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 
 FIT_SUMMARY_FILE = "fit.json"
-_GREY = 0.5
+_ZERO_DIFFERENCE_GREY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,7 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
 
 
 def fitted_scene(result: FitResult, folder: Path) -> Scene:
-    """Return the scene with the fitted skin and lights; its ambient light is light.exr in a folder."""
+    """Return the scene with the fitted skin and lights; the ambient light is read from `folder`/light.exr."""
     suns = sun_lights(result.point.suns, result.strengths[BASIS_SIZE:], result.white)
     has_sky = panorama(result.strengths[:BASIS_SIZE]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
@@ -187,4 +187,4 @@ def result_pictures(result: FitResult) -> dict[str, Floats]:
     difference = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)
     pictures_by_name = {"photo": result.photo / max(peak, 1.0), "fit": result.picture / max(peak, 1.0)}
     pictures_by_name = {name: np.clip(image, 0.0, 1.0) for name, image in pictures_by_name.items()}
-    return pictures_by_name | {"difference": np.clip(_GREY + difference, 0.0, 1.0) ** 2.2}
+    return pictures_by_name | {"difference": np.clip(_ZERO_DIFFERENCE_GREY + difference, 0.0, 1.0) ** 2.2}

@@ -92,7 +92,10 @@ def prior_point(suns: Floats) -> FitPoint:
 
 
 def tangents(towards: Floats) -> Floats:
-    """Return two perpendicular unit vectors in the plane normal to each direction (k, 3), (k, 2, 3)."""
+    """Return two unit vectors (k, 2, 3) that are perpendicular to each direction and to each other.
+
+    towards : (k, 3) directions, unit vectors
+    """
     helper = np.where(np.abs(towards[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     first = np.cross(helper, towards)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -100,9 +103,9 @@ def tangents(towards: Floats) -> Floats:
 
 
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
-    """Return the scene with the skin of a point.
+    """Return the scene with the skin that the unknowns of a fit describe.
 
-    A painted person is painted with the pigments of the point, but diffused with the profile of pigments
+    A painted person is painted with the pigments of `point`, but diffused with the profile of pigments
     rounded to a coarse grid, as profiles are slow to compute. Other heads get the uniform colour of the
     pigments, since the pigments of their colour map are unknown.
     """

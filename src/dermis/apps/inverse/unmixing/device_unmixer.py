@@ -33,7 +33,7 @@ _FOLDER = Path(__file__).parent
 _GUESS_SIDE = 96  # number of nodes along each side of the grid of initial guesses
 _MAX_STEPS = 8
 _STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
-_FORMAT = "rgba32float"
+_TEXTURE_FORMAT = "rgba32float"
 
 
 class Unmixer:
@@ -69,7 +69,7 @@ class Unmixer:
         estimate, sd, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in row_strips(height, width):
             frame = CommandList(self.device, timed=False)
-            strip = texture_from_array(self.device, _rgba(colours[rows]), _FORMAT, "colours")
+            strip = texture_from_array(self.device, _rgba(colours[rows]), _TEXTURE_FORMAT, "colours")
             textures = self.record(frame, strip)
             frame.submit()
             fractions, residual_and_third = (download(self.device, texture) for texture in textures)
@@ -87,7 +87,10 @@ class Unmixer:
         size = colours.size[:2]
         shader = _unmixing_program(self.device, "unmix", self.model)
         if self._outputs is None or self._outputs[0].size[:2] != size:
-            self._outputs = make_texture(self.device, size, _FORMAT), make_texture(self.device, size, _FORMAT)
+            self._outputs = (
+                make_texture(self.device, size, _TEXTURE_FORMAT),
+                make_texture(self.device, size, _TEXTURE_FORMAT),
+            )
         fractions, residual = self._outputs
         bound = {"colours": colours, "fractions": fractions, "residual": residual}
         frame.compute("unmix", shader, bound | self._shader_bindings(shader, _MAX_STEPS), size)
@@ -113,9 +116,9 @@ def recolour(
     output = np.empty(residual.shape, np.float32)
     for rows in row_strips(*estimate.shape[:2]):
         maps = (_rgba(one[rows]) for one in (estimate, residual))
-        inputs = [texture_from_array(device, one, _FORMAT, "maps") for one in maps]
+        inputs = [texture_from_array(device, one, _TEXTURE_FORMAT, "maps") for one in maps]
         size = inputs[0].size[:2]
-        texture = make_texture(device, size, _FORMAT)
+        texture = make_texture(device, size, _TEXTURE_FORMAT)
         bound: MutableBindings = {"model": _model_record(shader, model, 1.0, 0), "table": table}
         bound |= {"estimate": inputs[0], "residual": inputs[1], "recoloured": texture, "change": change}
         frame = CommandList(device, timed=False)
@@ -137,7 +140,7 @@ def _rgba(colours: Pixels) -> Pixels:
 
 def _table_texture(device: Device, model: SkinModel) -> Texture:
     layers = [_rgba(layer.astype(np.float32)) for layer in model.log_colours]
-    texture = make_texture(device, layers[0].shape[1::-1], _FORMAT, layers=len(layers), use="map")
+    texture = make_texture(device, layers[0].shape[1::-1], _TEXTURE_FORMAT, layers=len(layers), use="map")
     for number, layer in enumerate(layers):
         upload(device, texture, layer, layer=number)
     return texture

@@ -26,7 +26,7 @@ PROFILE_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": 
 """File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
 skin with blood, and dark skin with blood."""
 MAP_NAME = "profile_map"
-_NODES = 4  # number of grid nodes along the logarithms of melanin and of blood
+_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
 _PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
 # Smallest volume fraction of a grid axis, and smallest ratio of its ends.
 _MIN_FRACTION, _MIN_RATIO = 1e-3, 1.02
@@ -64,12 +64,14 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
     axes = [_fraction_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
     tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
-    corners = [(m % _NODES) * _NODES + b % _NODES for m, b in PROFILE_CORNERS.values()]
+    corners = [
+        (m % _NODES_PER_AXIS) * _NODES_PER_AXIS + b % _NODES_PER_AXIS for m, b in PROFILE_CORNERS.values()
+    ]
     weights = _mixture_weights(nodes, nodes[corners])
-    middle = nodes[(_NODES // 2) * _NODES + _NODES // 2]
+    middle = nodes[(_NODES_PER_AXIS // 2) * _NODES_PER_AXIS + _NODES_PER_AXIS // 2]
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
     profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_CORNERS, strict=True)]
-    weight_map = _interpolate_map(weights[:, 1:].reshape(_NODES, _NODES, 2), axes, unmixed)
+    weight_map = _interpolate_map(weights[:, 1:].reshape(_NODES_PER_AXIS, _NODES_PER_AXIS, 2), axes, unmixed)
     errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
     return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
 
@@ -90,7 +92,7 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
 
 def _fraction_axis(fractions: Pixels) -> Floats:
     low, high = np.maximum(np.percentile(fractions, _PERCENTILES), _MIN_FRACTION)
-    return np.geomspace(low, max(high, _MIN_RATIO * low), _NODES)
+    return np.geomspace(low, max(high, _MIN_RATIO * low), _NODES_PER_AXIS)
 
 
 def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
@@ -105,7 +107,7 @@ def _ring_fractions(tissue: Tissue) -> Floats:
 
 
 def _mixture_weights(nodes: Floats, corners: Floats) -> Floats:
-    """Fit the ring fractions of each node by a mixture of corner profiles; return the weights (n, k).
+    """Return the weights (n, k) with which mixtures of k corner profiles fit the ring fractions of n nodes.
 
     The weights are non-negative and sum to 1 for each node.
 

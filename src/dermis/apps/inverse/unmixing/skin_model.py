@@ -20,7 +20,7 @@ MIN_REFLECTANCE = 1e-4
 BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
 """Mean and standard deviation of the prior of the blood fraction's square root. The prior only matters where
 melanin hides the blood."""
-_NODES = 129  # number of table nodes along melanin and along blood
+_TABLE_NODES = 129  # number of table nodes along melanin and along blood
 _OXYGEN_COUNT = 5
 _OXYGEN_SD, _SHADE_SD, _FIXED_SD = 0.1, 0.3, 1e-3
 _SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
@@ -121,12 +121,12 @@ def _cached_skin_model(skin: SkinParameters, third: ThirdUnknown) -> SkinModel:
 
 
 def _log_colour_tables(skin: SkinParameters, oxygens: Floats | list[float]) -> Floats:
-    tables = [colour_table(replace(skin, oxygen=float(one)), _NODES).colours for one in oxygens]
+    tables = [colour_table(replace(skin, oxygen=float(one)), _TABLE_NODES).colours for one in oxygens]
     return np.log(np.maximum(np.stack(tables), MIN_REFLECTANCE))
 
 
 MAX_STEPS = 40  # colours of skin need four to six steps
-_TOLERANCE = 1e-10
+_STEP_TOLERANCE = 1e-10
 _MIN_CURVATURE = 1e-9  # added to curvatures, for nodes where an unknown has no effect
 COLOUR_FLOOR = 2e-4
 """Absolute standard deviation of colours: half a step of 8-bit sRGB near black, in linear light [-]."""
@@ -185,7 +185,7 @@ def solve_pigments(
         better = trial_cost <= cost
         x[better], cost = trial[better], np.minimum(cost, trial_cost)
         damping = np.where(better, 0.2 * damping, 8.0 * damping)
-        if np.max(np.abs(step[better]), initial=0.0) < _TOLERANCE:
+        if np.max(np.abs(step[better]), initial=0.0) < _STEP_TOLERANCE:
             break
     return _pigment_estimate(model, x, logs, weights)
 
