@@ -60,7 +60,7 @@ def _contents_entry(picture: GalleryPicture) -> str:
 
 def _section(picture: GalleryPicture) -> str:
     script = picture.script
-    equation = f'<p class="equation">{_equation(script.equation)}</p>' if script.equation else ""
+    equation = f'<p class="equation">{_equation_html(script.equation)}</p>' if script.equation else ""
     return (
         f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
         f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
@@ -68,7 +68,7 @@ def _section(picture: GalleryPicture) -> str:
     )
 
 
-def _equation(text: str) -> str:
+def _equation_html(text: str) -> str:
     """Convert an equation in one line to HTML; _ begins a subscript and ^ a superscript."""
     text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
@@ -124,9 +124,9 @@ def _short_number(value: float) -> str:
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
-    """Return table rows for the rows of the 2007 talk, with links to pictures, and commands.
+    """Return HTML table rows for the slides of the 2007 talk, with links to pictures, and commands.
 
-    The command of a row draws its picture.
+    The command in a row draws its picture.
     """
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")

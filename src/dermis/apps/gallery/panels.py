@@ -102,7 +102,7 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
 
 
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
-_LABEL_COLOURS = 8192
+_LABEL_COLOUR_COUNT = 8192
 _SHOWN_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 
 
@@ -117,8 +117,8 @@ def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
     if name in _LIGHT_FACTORS:
         return encode_srgb8(_LIGHT_FACTORS[name] * values)
     if OUTPUTS[name].kind != "float32":
-        colours = np.random.default_rng(8).integers(40, 255, (_LABEL_COLOURS, 3), np.uint8)
-        colours = colours[values.astype(int) % _LABEL_COLOURS]
+        colours = np.random.default_rng(8).integers(40, 255, (_LABEL_COLOUR_COUNT, 3), np.uint8)
+        colours = colours[values.astype(int) % _LABEL_COLOUR_COUNT]
         return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
     channels = values.reshape(*values.shape[:2], -1)[..., :3]
     nonzero = (channels != 0).any(axis=-1)

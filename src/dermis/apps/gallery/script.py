@@ -30,7 +30,7 @@ class Script:
 
     path : file of the script
     title, caption : first line of the docstring, and the explanation below it
-    deck : rows of the table of the talk's slides that the picture shows, such as "S11"
+    deck : slides of the 2007 talk that the picture shows, by their row in the table of slides, such as "S11"
     equation : equation of the technique, or ""
     sources : keys of the bibliography
     slider : captions of two panels that are compared with a slider, or None
