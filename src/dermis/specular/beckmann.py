@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-TABLE_SIZE = 512
-_EXPONENT = 0.1
+BECKMANN_TABLE_SIZE = 512
+_TABLE_EXPONENT = 0.1
 
 
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
@@ -27,7 +27,7 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 
 @cache
-def beckmann_table(size: int = TABLE_SIZE) -> NDArray[np.float32]:
+def beckmann_table(size: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
     """Return beckmann(cos_h, m)^0.1 / 2 as a table (size, size) for the shader.
 
     Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
@@ -39,5 +39,5 @@ def beckmann_table(size: int = TABLE_SIZE) -> NDArray[np.float32]:
     cos_h = np.arange(size) / (size - 1)
     m = (np.arange(size) + 0.5) / size
     with np.errstate(under="ignore"):
-        table = 0.5 * beckmann(cos_h[None, :], m[:, None]) ** _EXPONENT
+        table = 0.5 * beckmann(cos_h[None, :], m[:, None]) ** _TABLE_EXPONENT
     return table.astype(np.float32)

@@ -12,8 +12,8 @@ from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
-ROUGHNESSES = np.round(np.arange(1, 6) / 10, 1)
-COSINES = np.round(np.arange(1, 21) / 20, 2)
+COMPARED_ROUGHNESSES = np.round(np.arange(1, 6) / 10, 1)
+COMPARED_COSINES = np.round(np.arange(1, 21) / 20, 2)
 _DIRECTION_PAIRS = 4000
 _NORMAL = np.array([0.0, 0.0, 1.0])
 
@@ -26,28 +26,28 @@ def normal_incidence_peak(model: str, m: float) -> float:
 def reciprocity_error(model: str) -> float:
     """Return the largest change of a model's BRDF when light and view are exchanged, over its maximum [-].
 
-    Light and view are random directions up to 85 degrees from the normal; the roughnesses are ROUGHNESSES.
+    Light and view are random directions up to 85 degrees from the normal. All compared roughnesses are tried.
     """
     rng = np.random.default_rng(1)
     l, v = (_random_directions(rng) for _ in range(2))
     lobe = MODELS[model].lobe
     errors = []
-    for m in ROUGHNESSES:
+    for m in COMPARED_ROUGHNESSES:
         forward, backward = lobe(cosines(_NORMAL, l, v), m), lobe(cosines(_NORMAL, v, l), m)
         errors.append(np.abs(forward - backward).max() / max(forward.max(), backward.max()))
     return float(max(errors))
 
 
 def albedo_rows(model: str) -> list[dict[str, float]]:
-    """Return the directional albedo rho of a model at all ROUGHNESSES m and COSINES cos_theta.
+    """Return the directional albedo rho of a model for all compared roughnesses and cosines.
 
     Each row of the result has the keys m, cos_theta and rho, for a CSV file.
     """
-    rho = directional_albedo(COSINES, ROUGHNESSES[:, None], MODELS[model].lobe)
+    rho = directional_albedo(COMPARED_COSINES, COMPARED_ROUGHNESSES[:, None], MODELS[model].lobe)
     return [
         {"m": float(m), "cos_theta": float(c), "rho": float(rho[i, k])}
-        for i, m in enumerate(ROUGHNESSES)
-        for k, c in enumerate(COSINES)
+        for i, m in enumerate(COMPARED_ROUGHNESSES)
+        for k, c in enumerate(COMPARED_COSINES)
     ]
 
 

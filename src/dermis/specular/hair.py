@@ -18,8 +18,8 @@ LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 FIBRE_SAMPLES = 16
 """Number of rays across the width of the fibre over which scattering is averaged."""
 _MIN_COS_SQUARED = 1e-5
-_EUMELANIN, _PHEOMELANIN = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
-_REFERENCE_RADIUS_MM = 0.04  # radius of a hair, over which the absorptions above are given
+_EUMELANIN_ABSORPTION, _PHEOMELANIN_ABSORPTION = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
+_ABSORPTION_RADIUS_MM = 0.04  # radius of a hair, over which the absorptions above are given
 
 
 class FibreParameters(NamedTuple):
@@ -69,7 +69,7 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
     Source: [dEon2011] section 6.1.
     """
     brown, red = (np.asarray(c, float)[..., None] for c in (eumelanin, pheomelanin))
-    return np.asarray((brown * _EUMELANIN + red * _PHEOMELANIN) / _REFERENCE_RADIUS_MM)
+    return np.asarray((brown * _EUMELANIN_ABSORPTION + red * _PHEOMELANIN_ABSORPTION) / _ABSORPTION_RADIUS_MM)
 
 
 def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
