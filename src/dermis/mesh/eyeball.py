@@ -23,8 +23,8 @@ SIDE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
 UV_RIM = 0.49
 """Distance from the centre of the uv layout for the back of the eye."""
-UV_FALLOFF = 0.9
-"""Angle from the axis over which that distance increases more slowly [rad]."""
+UV_DECAY_RADIANS = 0.9
+"""Constant a of that distance at an angle t from the axis, which is proportional to 1 - exp(-t / a) [rad]."""
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
@@ -178,6 +178,6 @@ def eye_uv(points: Doubles) -> Floats:
     """
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])
-    radius = UV_RIM * np.expm1(-angle / UV_FALLOFF) / np.expm1(-np.pi / UV_FALLOFF)
+    radius = UV_RIM * np.expm1(-angle / UV_DECAY_RADIANS) / np.expm1(-np.pi / UV_DECAY_RADIANS)
     direction = points[:, :2] * [1.0, -1.0] / np.maximum(across, 1e-12)[:, None]
     return np.asarray(0.5 + radius[:, None] * direction, np.float32)

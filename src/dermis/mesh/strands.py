@@ -74,7 +74,7 @@ class Strands(ShortRepr):
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
-    """Convert offsets of knots from their roots to the frames of the roots, as `Strands.knots_mm` has them.
+    """Express knot offsets from each root in the frame of that root, as `Strands.knots_mm` has them.
 
     offsets_mm : (n, k, 3) in head space, on the mesh at rest
     """
@@ -82,9 +82,9 @@ def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
 
 
 def to_frames(frame: Doubles, offsets_mm: Doubles) -> Floats:
-    """Convert offsets (n, k, 3) of knots from their roots to the frames of the roots, whose rows are axes.
+    """Express knot offsets (n, k, 3), measured from each root, in the frame of that root.
 
-    frame : (n, 3, 3) as returned by `root_frames`
+    frame : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`
     """
     return np.asarray(np.einsum("nic,nkc->nki", frame, offsets_mm), np.float32)
 

@@ -37,21 +37,21 @@ class Lids:
 
     @cached_property
     def ray_positions(self) -> Doubles:
-        """Return the positions (n, 2) of the rays across and up, relative to the ball's centre [mm]."""
+        """Return x (to the side) and y (up) of each ray (n, 2), relative to the ball's centre [mm]."""
         line = np.linspace(-_HALF_SIDE_RADII, _HALF_SIDE_RADII, _RAYS_PER_SIDE) * self.ball.radius
         x, y = np.meshgrid(line, line)
         return np.stack([x.ravel(), y.ravel()], axis=1)
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return the height (n,) of the ball's front above its centre along each ray [mm]."""
+        """Return how far in front of its centre each ray meets the ball (n,); 0 for rays beside it [mm]."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return the height (n,) of the frontmost lid or skin above the ball's centre, along each ray [mm].
+        """Return how far in front of the ball's centre each ray meets the frontmost lid or skin (n,) [mm].
 
-        It is -inf for rays that hit none.
+        The distance is -inf for rays that meet none.
         """
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
         triangle, ray = self._candidate_pairs(corners)
@@ -82,7 +82,7 @@ class Lids:
 
     @property
     def opening_angles(self) -> tuple[float, float]:
-        """Return the angles across and up that point an eye at the middle of the lids' opening [rad].
+        """Return the angles (side, up) at which an eye looks through the middle of the lids' opening [rad].
 
         They are 0 if there are no lids on some side. In files, the lids are the best indication of the gaze,
         as eyeballs and lids seldom have the same centre.
