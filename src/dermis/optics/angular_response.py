@@ -33,7 +33,7 @@ def interpolate_table(column: Callable[[float], Floats], position: float) -> Flo
 
 
 def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
-    """Interpolate a table at c positions in [0, 1]; the last axis of the result is c.
+    """Interpolate a table at c positions in [0, 1]; the last axis of the result has one entry for each.
 
     column : function that returns a column of the table, see `interpolate_table`
     """

@@ -107,7 +107,10 @@ def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> fl
 
 
 def _reflectance_transform(medium: Medium, frequency: float) -> float:
-    """Return the Hankel transform of R(r) of a half-space with one channel at a frequency [1/mm] [-]."""
+    """Return the Hankel transform of R(r) of a half-space with one channel at one frequency [-].
+
+    frequency : frequency [1/mm]
+    """
     A = boundary_mismatch(medium.eta, "exact")
     return float(layered_diffusion.solve_reflectance(np.array([frequency]), medium, A)[0, 0])
 

@@ -72,7 +72,7 @@ def radius_grid(count: int = 600) -> Floats:
 
 
 def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
-    """Resample (m, c) values from a log-spaced grid at n radii, by a cubic spline in log r, (n, c)."""
+    """Resample values (m, c) from a log-spaced grid to n radii by a cubic spline in log r, (n, c)."""
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))

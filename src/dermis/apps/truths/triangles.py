@@ -24,7 +24,7 @@ Two halved sides leave a quadrilateral; the last entry splits it along the other
 
 
 def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
-    """Return the edges' ends (e, 2), each triangle side's edge (f, 3), and the edges' lengths (e,) [mm].
+    """Return the ends (e, 2) of edges, the edge of each triangle side (f, 3), and edge lengths (e,) [mm].
 
     positions : (n, 3) vertex positions [mm]
     corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1

@@ -158,10 +158,11 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return how many texels of one piece follow to the left, right, up and down before a gap, (h, w, 4).
+    """Return the number of texels of the same piece before a gap, in four directions, (h, w, 4).
 
-    There is a gap between two texels if their surface points are farther apart than `gap_limit_mm` and their
-    anchors are farther apart than either texel is from its anchor.
+    The directions are left, right, up and down. There is a gap between two texels if their surface points are
+    farther apart than `gap_limit_mm` and their anchors are farther apart than either texel is from its
+    anchor.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)

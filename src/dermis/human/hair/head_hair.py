@@ -230,7 +230,7 @@ def _interpolate_guides(weight: Doubles, guide_index: NDArray[np.int64], offsets
 def _vary_directions(
     offsets: Floats, normal: Floats, variation: HairVariation, rng: np.random.Generator
 ) -> Floats:
-    """Return knot offsets (k, 3, n) with a random rotation about the normal, tilt and scale for each hair."""
+    """Return knot offsets (k, 3, n), for each hair randomly rotated about the normal, tilted and scaled."""
     n = offsets.shape[-1]
     angle = variation.angle_deviation * rng.standard_t(4, size=n)
     lean = 1.0 + variation.angle_deviation * rng.normal(size=n)

@@ -100,7 +100,7 @@ class Lids:
         return angles[0], angles[1]
 
     def direction(self, across: float, up: float) -> Doubles:
-        """Return the unit vector (3,) in head space at angles across and up from straight ahead [rad]."""
+        """Return the unit vector (3,) in head space at angles (side, up) from straight ahead [rad]."""
         local = np.sin(across) * np.cos(up), np.sin(up), np.cos(across) * np.cos(up)
         return np.asarray(np.array(local) @ self.axes)
 
