@@ -102,7 +102,7 @@ class _Baker:
         """Return the values (h, w, k) of a role over a tile, factors included."""
         material, (width, height) = self._material(tile), tile.size
         texture = material.textures.get(role)
-        factor = _factor(material, role)
+        factor = _factor(material, role, self.surface.colours is not None)
         if texture is None:
             default = np.array([*_DEFAULTS[role], *((1.0,) if role == "colour" else ())], np.float32)
             values = np.broadcast_to(default, (height, width, len(default))).copy()
@@ -115,7 +115,7 @@ class _Baker:
 
     def _sampled(self, tile: Tile, texture: Texture, role: Role) -> Floats:
         """Return the values (h, w, k) of a picture over a tile."""
-        picture = _read(texture, role)
+        picture = read_role(texture, role)
         base = base_texture(self._material(tile))
         if base is not None and base.mapping == texture.mapping:
             (width, height), span = tile.size, tile.high - tile.low
@@ -158,9 +158,10 @@ def _barycentric(corners: Doubles, points: Doubles) -> Doubles:
     return np.asarray(np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0))
 
 
-def _factor(material: FileMaterial, role: Role) -> Floats:
+def _factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
     """Return the factor of a material for a role, (k,)."""
-    colour = material.colour or ((1.0, 1.0, 1.0) if "colour" in material.textures else GREY)
+    has_colour = has_vertex_colours or "colour" in material.textures
+    colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else GREY)
     factors: dict[Role, Sequence[float]] = {
         "colour": (*colour, material.alpha),
         "normal": (material.normal_scale, material.normal_scale),
@@ -171,7 +172,7 @@ def _factor(material: FileMaterial, role: Role) -> Floats:
     return np.array(factors[role], np.float32)
 
 
-def _read(texture: Texture, role: Role) -> Floats:
+def read_role(texture: Texture, role: Role) -> Floats:
     """Return the picture of a role as linear values (H, W, k)."""
     if role == "normal":
         return slope_map(texture.picture, "up")

@@ -110,7 +110,7 @@ def _picture_size(material: FileMaterial) -> tuple[int, int]:
 def _move_charts(
     mesh: Mesh, texture: Texture, uv: Doubles, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
 ) -> Doubles:
-    """Return uv with connected charts moved by whole pictures towards the first one, where pictures repeat."""
+    """Return uv with charts moved by whole pictures towards the first one where pictures repeat."""
     if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
         return uv
     corner = np.searchsorted(vertices, mesh.triangles[triangles])
@@ -142,7 +142,7 @@ def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMat
 
 
 def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
-    """Return placed tiles, the side of the map, and the scale by which tiles shrank to fit the largest map."""
+    """Return placed tiles, the side of the map, and the scale of tiles that makes them fit."""
     scale = 1.0
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]

@@ -12,7 +12,7 @@ from dermis.base.arrays import Doubles
 from dermis.formats.maps import PathLike
 
 Wrap = Literal["repeat", "mirror", "clamp"]
-Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "occlusion", "emission"]
+Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "emission"]
 AlphaMode = Literal["opaque", "mask", "blend"]
 UvTransform = tuple[float, float, float, float, float, float]
 
@@ -54,7 +54,7 @@ class FileMaterial:
     textures : pictures by role; factors multiply them
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
-    metalness, emission, normal_scale, occlusion_strength : as in glTF
+    metalness, emission, normal_scale : as in glTF
     is_unlit : whether the base colour is the radiance, and light is ignored
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
@@ -71,8 +71,13 @@ class FileMaterial:
     metalness: float = 0.0
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal_scale: float = 1.0
-    occlusion_strength: float = 1.0
     is_unlit: bool = False
     scatters: bool = False
     maps: Mapping[str, object] | None = None
     unused: tuple[str, ...] = ()
+
+    def skin_pictures(self) -> dict[str, object]:
+        """Return keyword arguments of `load_maps` for skin that has the uv of its pictures."""
+        if self.maps is not None:
+            return dict(self.maps)
+        return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}

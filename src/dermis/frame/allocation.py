@@ -27,7 +27,7 @@ from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
 from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
 from dermis.frame.features.shape.shape import Shape
-from dermis.frame.features.surface.maps import detail_bindings, upload_maps
+from dermis.frame.features.surface.maps import detail_bindings, has_parts, upload_maps
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
@@ -107,6 +107,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
+    used["PARTS"] = has_parts(request.head)
     return tuple((name, 1) for name, value in used.items() if value)
 
 

@@ -91,7 +91,7 @@ def program(
     source, store : formats of the textures from which the shader reads and to which it stores light
     labels : whether a hair pass stores labels besides the picture
     """
-    active = shader_options(source, store, labels)
+    active = shader_options(source, store, labels, parts=dict(constants).get("PARTS") == 1)
 
     def compile_program() -> ComputeProgram:
         file, folders = FEATURES_FOLDER / path, shader_folders(*active)
@@ -100,12 +100,13 @@ def program(
     return cached_program(device, (path, active, registry_version()), constants, compile_program)
 
 
-def shader_options(source: str, store: str, labels: bool) -> tuple[str, ...]:
+def shader_options(source: str, store: str, labels: bool, parts: bool = False) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {
         "FILTERED_SOURCE": source == HALF_FORMAT,
         "STORED_HALVES": store == HALF_FORMAT,
         "HAIR_LABELS": labels,
+        "PARTS": parts,
     }
     return tuple(name for name, value in values.items() if value)
 

@@ -7,13 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from dermis.base.arrays import Floats
+from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
+from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone, is_head_sized
 from dermis.mesh.strands import Strands
+
+_HEAD_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,17 +122,51 @@ class Head:
         skeleton = self.control.skeleton
         return skeleton.names if skeleton else ()
 
+    @cached_property
+    def skull_mm(self) -> Point | None:
+        """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm].
+
+        The skull of a body is at its head bone, if it has one.
+        """
+        skeleton = None if is_head_sized(self.mesh.positions) or self.rig is None else self.rig.skeleton
+        bone = None if skeleton is None else head_bone(skeleton.names)
+        if skeleton is None or bone is None:
+            return self.mesh.skull_mm
+        follows = ((skeleton.bone == bone) & (skeleton.weight > _HEAD_WEIGHT)).any(axis=1)
+        points = self.control.positions_mm[follows]
+        return centre_of_box(points) if len(points) else self.mesh.skull_mm
+
+    @cached_property
+    def centre_mm(self) -> Point:
+        """Return the origin of the scene: the skull, or the centre of a mesh without a head [mm]."""
+        return self.skull_mm or centre_of_box(self.mesh.positions)
+
+    @cached_property
+    def axes(self) -> Doubles:
+        """Return the directions (3, 3), in rows, to the right, upwards and to the front of what is seen.
+
+        They are x, y and z for a head. A flat piece of skin is seen from the side that it faces.
+        """
+        return np.eye(3) if self.skull_mm is not None else facing_axes(self.mesh.positions, self.mesh.normals)
+
     @property
-    def centre_mm(self) -> tuple[float, float, float]:
-        """Return the centre of the skull, without neck and shoulders, at which cameras look [mm]."""
-        return self.mesh.skull_centre_mm
+    def seen_positions_mm(self) -> Floats:
+        """Return the vertices (v, 3) relative to the centre, to the right, upwards and to the front [mm]."""
+        positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
+        return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
+
+    @property
+    def reach_mm(self) -> float:
+        """Return the largest distance of a vertex from the centre [mm]."""
+        corners = self.mesh.outline.points_mm - np.array(self.centre_mm)
+        return float(np.linalg.norm(corners, axis=1).max())
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
-        """Return the frontmost vertex near a position across and up, relative to the head's centre [mm].
+        """Return the frontmost vertex near (x_mm, y_mm), both measured from the head's centre [mm].
 
-        x_mm, y_mm : position relative to the centre
+        The position of the vertex is measured from the centre, too.
         """
-        p = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
+        p = self.seen_positions_mm
         distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
         near = distance <= max(6.0, float(distance.min()) + 1.0)
         x, y, z = p[near][np.argmax(p[near][:, 2])]

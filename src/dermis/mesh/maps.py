@@ -15,6 +15,20 @@ _MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # for means: samples along each side, and l
 
 
 @dataclass(frozen=True, repr=False)
+class PartMaps(ShortRepr):
+    """Common texture maps of the groups that are not skin, whose uv refer to these maps.
+
+    colour : (H, W, 4) base colour, linear Rec. 709, and opacity [-]
+    surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
+    emission : (H, W, 3) emitted radiance, or None
+    """
+
+    colour: Floats
+    surface: Floats
+    emission: Floats | None = None
+
+
+@dataclass(frozen=True, repr=False)
 class Maps(ShortRepr):
     """Texture maps of the skin; None for a map that a head does not have.
 
@@ -26,6 +40,7 @@ class Maps(ShortRepr):
     specular : (H, W) grey 0..1, which the renderer scales to a mean over the skin [-]
     roughness : (H, W) grey 0..1 [-]
     region : (H, W) uint8 index of the facial region
+    parts : maps of the groups that are not skin
     """
 
     colour: Floats | None = None
@@ -34,6 +49,7 @@ class Maps(ShortRepr):
     specular: Floats | None = None
     roughness: Floats | None = None
     region: Bytes | None = None
+    parts: PartMaps | None = None
     is_painted: ClassVar[bool] = False
     """Whether the device paints those that are None."""
 

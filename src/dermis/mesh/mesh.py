@@ -14,8 +14,7 @@ from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, convex_hull
-
-_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
+from dermis.mesh.skull import Point, body_skull, is_head_sized, skull_below
 
 MouthPart = Literal["upper teeth", "lower teeth", "tongue"]
 MOUTH_PARTS: tuple[MouthPart, ...] = ("upper teeth", "lower teeth", "tongue")
@@ -30,6 +29,11 @@ class Material:
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
     part : which teeth, or the tongue, for the colours of mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
+    has_maps : whether `Maps.parts` has the colour and the surface of an opaque group, factors included
+    roughness : perceptual roughness of an opaque group, see glTF [-]; None for the wet surface of eyes and teeth
+    metalness : 1 for metal [-]
+    emission : radiance that the group emits, linear Rec. 709
+    opacity_cutoff : opacity below which the group is cut out; 0 for none
     """
 
     name: str
@@ -37,6 +41,11 @@ class Material:
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
     part: MouthPart | None = None
     eye: bool = False
+    has_maps: bool = False
+    roughness: float | None = None
+    metalness: float = 0.0
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    opacity_cutoff: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,13 +91,12 @@ class Mesh(ShortRepr):
         return convex_hull(self.positions)
 
     @cached_property
-    def skull_centre_mm(self) -> tuple[float, float, float]:
-        """Return the centre of the skull, without neck and shoulders [mm]."""
-        x, y, z = self.positions.T
-        top = float(y.max())
-        skull = y > top - 2 * _CROWN_TO_CENTRE_MM
-        centre_x, centre_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
-        return centre_x, top - _CROWN_TO_CENTRE_MM, centre_z
+    def skull_mm(self) -> Point | None:
+        """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm]."""
+        if is_head_sized(self.positions):
+            return skull_below(self.positions, float(self.positions[:, 1].max()))
+        is_eye = np.array([one.eye for one in self.materials])[self.material]
+        return body_skull(self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()])
 
     @cached_property
     def topology_key(self) -> bytes:

@@ -12,24 +12,27 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn
 from dermis.base.errors import format_value, notify, refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import is_file
-from dermis.formats.gltf.embedded import embedded_eye_look, embedded_maps
-from dermis.formats.load import load_rigged
+from dermis.formats.axes import Axis, Front
+from dermis.formats.gltf.embedded import embedded_eye_look, embedded_materials
+from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.formats.maps import load_maps
-from dermis.formats.mesh_checks import check_head_height
+from dermis.formats.materials import FileMaterial
 from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES, Sample, fetch_sample
+from dermis.formats.units import with_settled_unit
 from dermis.human.regions.apply import with_default_regions
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import subdivide_head
+from dermis.scene.file_surfaces import direct_material, with_factors, with_file_textures
 from dermis.scene.head_table import (
     AUTO,
     EyeMode,
     NormalY,
-    UpAxis,
     VOrigin,
     check_files_and_lengths,
     check_options,
@@ -61,7 +64,8 @@ def load_head(
     roughness: MapFile = None,
     unit_mm: float | None = None,
     v_origin: VOrigin = "auto",
-    up: UpAxis = "y",
+    up: Axis = "y",
+    front: Front = "auto",
     normal_y: NormalY = "up",
     opaque: Sequence[str] | str = (),
     eyes: EyeMode = "fitted",
@@ -85,11 +89,14 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the file's unit [mm]; by default 1000 for glTF and 1 for other formats.
+        Length of the file's unit [mm]; by default 1000 for glTF. OBJ and PLY do not state one: then it is 1 if that
+        makes the mesh 100 to 1000 mm large, else a guess from the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
-    up : {"y", "z"}
+    up : {"y", "z", "x", "-y", "-z", "-x"}
         Upward axis of the file.
+    front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
+        Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     opaque : str or sequence of str
@@ -141,6 +148,7 @@ def load_head(
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
     mesh_options: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
+    mesh_options["front"] = front
     mesh_options["eye_groups"], levels = eye_groups, resolve_levels(subdivide)
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
     check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
@@ -149,6 +157,7 @@ def load_head(
         mesh_options["eyes"] = eyes
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
+    materials: tuple[FileMaterial, ...] = ()
     if sample is not None:
         _check_sample_kind(sample)
         files = fetch_sample(name)
@@ -159,25 +168,27 @@ def load_head(
     elif not is_file(path):
         _refuse_name(name)
     elif is_gltf(path):
-        files, look = embedded_maps(path), embedded_eye_look(path)
-    chosen = _select_map_files(map_files, files)
-    if height is None and height_mm is None:
-        height_mm = files.get("height_mm")
+        materials, look = embedded_materials(path), embedded_eye_look(path)
     obj = path if sample is None and path.suffix.lower() == ".obj" else None
     with ThreadPoolExecutor(1) as pool:
-        pending_maps = pool.submit(_read_maps, obj, chosen, mesh_options["opaque"], height_mm, normal_y)
+        if not materials:
+            chosen = _select_map_files(map_files, files)
+            pending_maps = pool.submit(_read_maps, obj, chosen, mesh_options["opaque"], height_mm, normal_y)
         rigged = load_rigged(path, **mesh_options)
-        check_head_height(rigged.mesh, name, mesh_options["unit_mm"])
-        maps, notice = pending_maps.result()
+        rigged = with_settled_unit(rigged, path, mesh_options["unit_mm"], name)
+        if not materials:
+            mesh, (maps, notice) = rigged.mesh, pending_maps.result()
+        else:
+            mesh, maps, height_mm, notice = _file_surfaces(rigged, materials, map_files, height_mm, normal_y)
     check_relief(height_mm, maps.height, f"{name}: height_mm")
     for note in rigged.notes:
         notify(f"{path}: {note}")
     if notice:
         notify(notice)
     credit = f"{sample.attribution}, {sample.licence}" if sample else ""
-    loaded = _subdivide_with_points(Head(name, rigged.mesh, maps, credit, rigged.rig), levels)
+    loaded = _subdivide_with_points(Head(name, mesh, maps, credit, rigged.rig), levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
-    return _with_look(with_fitted_eyes(loaded, rigged.mesh, look) if eyes == "fitted" else loaded, eye)
+    return _with_look(with_fitted_eyes(loaded, mesh, look) if eyes == "fitted" else loaded, eye)
 
 
 def is_person_name(name: str) -> bool:
@@ -233,6 +244,33 @@ def _read_maps(
     return replace(obj_file_maps, **{role: getattr(loaded, role) for role in map_files}), notice
 
 
+def _file_surfaces(
+    rigged: RiggedMesh,
+    materials: Sequence[FileMaterial],
+    map_files: dict[str, MapFile],
+    height_mm: float | None,
+    normal_y: NormalY,
+) -> tuple[Mesh, Maps, float | None, str]:
+    """Return mesh and maps of a file with materials, the relief of its height map, and a notice.
+
+    map_files : files of maps that replace those of the skin
+    """
+    given = {role: file for role, file in map_files.items() if file is not None}
+    direct = direct_material(rigged, materials)
+    mesh, packed, notes = with_file_textures(rigged, materials, pack_skin=direct is None and not given)
+    files = dict[str, Any]() if direct is None else direct.skin_pictures()
+    if map_files["height"] is None and height_mm is None:
+        height_mm = files.get("height_mm")
+    chosen = _select_map_files(map_files, files)
+    loaded, _ = _read_maps(None, chosen, (), height_mm, normal_y)
+    if direct is not None:
+        loaded = with_factors(loaded, direct, given)
+    maps = replace(
+        packed, **{one.name: own for one in fields(Maps) if (own := getattr(loaded, one.name)) is not None}
+    )
+    return mesh, maps, height_mm, "\n".join(notes)
+
+
 def _refuse_name(name: str) -> NoReturn:
     known = ", ".join(_head_names())
     if name in REMOVED_HEADS:
@@ -263,7 +301,7 @@ def _load_human(
     mesh_options : options that apply only to mesh files; DermisError unless they have their defaults
     levels : subdivision levels, or a function of the head that returns them
     """
-    texts = {"v_origin": "auto", "up": "y", "eyes": "fitted"}
+    texts = {"v_origin": "auto", "up": "y", "front": "auto", "eyes": "fitted"}
     defaults = {"unit_mm": None, "opaque": (), "eye_groups": (), **texts}
     for option, value in mesh_options.items():
         if value != defaults[option]:

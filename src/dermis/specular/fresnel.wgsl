@@ -2,6 +2,10 @@
 
 override EXACT_FRESNEL: bool = false;
 
+//#if PARTS
+var<private> metalness: f32; // of the surface, whose reflectance is that of metal where it is 1
+//#end
+
 fn schlick(cos_theta: f32, f0: f32) -> f32 {
     let c = clamp(1.0 - cos_theta, 0.0, 1.0);
     let c2 = c * c;
@@ -18,8 +22,12 @@ fn dielectric(cos_theta: f32, eta: f32) -> f32 {
 }
 
 fn fresnel(cos_theta: f32) -> f32 {
+    var reflectance = schlick(cos_theta, skin.f0);
     if (EXACT_FRESNEL) {
-        return dielectric(cos_theta, skin.eta);
+        reflectance = dielectric(cos_theta, skin.eta);
     }
-    return schlick(cos_theta, skin.f0);
+    //#if PARTS
+    reflectance = mix(reflectance, 1.0, metalness);
+    //#end
+    return reflectance;
 }

@@ -60,7 +60,7 @@ class SkinAdditions:
 def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
     """Return PNG files of a skin's maps by name, and the entries of the material's extras by map role.
 
-    The extras reference pictures as {"index": name}; `embedded_maps` reads them.
+    The extras reference pictures as {"index": name}; `embedded_materials` reads them.
 
     slopes : (n, n, 2) of the relief, written as normal map for other programs if `maps` has none
     """

@@ -13,8 +13,11 @@ from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
 from dermis.formats.parts import Colour, parse_colour
 from dermis.formats.referenced_files import resolve_uri
+from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.images.io import EmbeddedPicture
 
+EMBEDDED_ROLES = ("normal", "height", "specular", "roughness", "region")
+"""Maps besides the colour that files of this package store in the extras of the skin's material."""
 _WRAPS: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _NEAREST = 9728
 _SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
@@ -80,6 +83,8 @@ class _Reader:
         if "emission" in textures and "colour" not in textures and (factor is None or max(factor[:3]) == 0):
             textures["colour"], factor, is_unlit = textures.pop("emission"), [*emission, 1.0], True
             emission = (0.0, 0.0, 0.0)
+        if "occlusionTexture" in self.material:
+            self.unused.append("picture of occlusion, which is computed from the shape")
         self.unused += [text for name, text in _NOT_DRAWN.items() if name in self.extensions]
         self.unused += [name for name in self.extensions if name not in KNOWN_EXTENSIONS]
         return FileMaterial(
@@ -93,12 +98,26 @@ class _Reader:
             metalness=float(pbr.get("metallicFactor", 1.0)),
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
-            occlusion_strength=float((self.material.get("occlusionTexture") or {}).get("strength", 1.0)),
             is_unlit=is_unlit,
             scatters=any(name in self.extensions for name in _SCATTERING),
-            maps=own if isinstance(own, dict) else None,
+            maps=self._own_maps(own) if isinstance(own, dict) else None,
             unused=tuple(self.unused),
         )
+
+    def _own_maps(self, own: Tree) -> dict[str, object]:
+        """Return keyword arguments of `load_maps` from the extras of a file that this package wrote."""
+        colour = own.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
+            "baseColorTexture"
+        )
+        references = {"colour": colour, **{role: own.get(role) for role in EMBEDDED_ROLES}}
+        pictures = {
+            role: self._picture(self.document.item("textures", reference["index"]))
+            for role, reference in references.items()
+            if reference is not None
+        }
+        maps: dict[str, object] = {role: picture for role, picture in pictures.items() if picture is not None}
+        height_mm = _checked_relief(own.get("height_mm"))
+        return maps if height_mm is None else maps | {"height_mm": height_mm}
 
     def _from_glossiness(self, gloss: Tree) -> Tree:
         """Return metallic-roughness properties of a specular-glossiness material."""
@@ -122,7 +141,6 @@ class _Reader:
             "normal": (self.material.get("normalTexture"), None),
             "roughness": (gloss, _ROUGHNESS_CHANNEL),
             "metalness": (gloss, _METALNESS_CHANNEL),
-            "occlusion": (self.material.get("occlusionTexture"), 0),
             "emission": (self.material.get("emissiveTexture"), None),
         }
         found = {role: self._texture(reference, channel) for role, (reference, channel) in references.items()}
@@ -177,6 +195,16 @@ def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
     if uri.startswith("data:"):
         return EmbeddedPicture(name, base64.b64decode(uri.partition(",")[2]))
     return resolve_uri(document.path, uri)
+
+
+def _checked_relief(height_mm: object) -> float | None:
+    """Return the relief of one grey level of an embedded 8-bit height map [mm], after checking its range."""
+    if height_mm is None:
+        return None
+    number = height_mm if isinstance(height_mm, int | float) and not isinstance(height_mm, bool) else 0
+    if not 0 < number <= MAX_RELIEF_MM:
+        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not above 0 and up to {MAX_RELIEF_MM:g}")
+    return float(number)
 
 
 def _transform(extension: Tree) -> UvTransform:

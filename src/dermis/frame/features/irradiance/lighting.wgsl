@@ -153,7 +153,10 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         lit.entered += entering;
     }
     if (ENVIRONMENT) {
-        let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
+        var albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
+        //#if PARTS
+        albedo = mix(albedo, 1.0, metalness);
+        //#end
         lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);
     }
     return lit;

@@ -21,17 +21,13 @@ fn shading_point_from_above(triangle: u32, weights: vec3f) -> ShadingPoint {
     var point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), weights, t.w);
     point.atlas_uv = atlas_position(triangle, weights);
     point.curvature = dot(weights, vec3f(curvatures[t.x], curvatures[t.y], curvatures[t.z]));
-    var surface: Surface;
-    if (is_opaque(point)) {
-        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, WET_ROUGHNESS, 1.0);
-    } else {
-        surface = surface_at(point, baking.footprint);
-    }
+    let part = surface_or_part(point, baking.footprint);
+    let surface = part.surface;
     let open = open_sky(point, t, weights);
     let film = Film(surface.normal, vec3f(0.0));
     let side = f32(textureDimensions(scattered).x);
     let texel = texel_axes(triangle, corner_at(t.x), corner_at(t.y), corner_at(t.z), side);
-    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel);
+    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel, part.metalness, part.emission);
     if (EYES) {
         apply_modelled_parts(&shading_point);
     }

@@ -1,6 +1,7 @@
 // Shading of a point of the surface: light scattered below the skin, relit at its finest level, and the specular reflection. The
 // picture and the outputs of light call the same functions.
 //#include "irradiance/lighting.wgsl"
+//#include "parts.wgsl"
 //#include "mouth.wgsl"
 //#include "occlusion/open_sky.wgsl"
 //#include "lids.wgsl"
@@ -12,8 +13,6 @@
 override SPLIT: bool = false; // whether light below the skin is stored in layers of its own, to be diffused over the picture
 override MIXED: bool = false; // whether a map mixes profiles: the alpha of `scattered` then holds their blend weights
 override EYES: bool = false; // whether there are modelled eyes and teeth
-
-const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 
 struct Shade {
     eye: vec3f,
@@ -31,6 +30,7 @@ struct Shade {
     eyes: array<Eye, 2>,
     lids: array<vec4f, 112>, // edges of the lids in the space of each eye, half of the points for each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
+    part_materials: array<PartMaterial, 64>,
     jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
 }
 
@@ -47,6 +47,8 @@ struct ShadingPoint {
     footprint: f32, // side of the filter over the side of the maps
     open: f32, // visible fraction of the sky
     texel: TexelAxes, // if there is light that is finer than texels
+    metalness: f32, // of parts that are not skin
+    emission: vec3f, // radiance that such parts emit
 }
 
 struct Shaded {
@@ -110,9 +112,24 @@ fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shade
     return Shaded(below, leaving, local, reflected, dot(point.position - shade.eye, shade.forward));
 }
 
-fn shaded_plain(surface: Surface, lit: Lit, exit_factor: f32) -> Shaded {
-    let below = lit.entered * surface.colour * exit_factor;
-    return Shaded(vec3f(0.0), vec3f(0.0), shade.light_factors.x * below, shade.light_factors.y * lit.reflected, 0.0);
+fn shaded_plain(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shaded {
+    let surface = shading_point.surface;
+    var below = lit.entered * surface.colour * exit_factor;
+    var reflected = lit.reflected;
+    if (PARTS) {
+        below = below * (1.0 - shading_point.metalness) + shading_point.emission;
+        reflected *= mix(vec3f(1.0), surface.colour, shading_point.metalness);
+    }
+    return Shaded(vec3f(0.0), vec3f(0.0), shade.light_factors.x * below, shade.light_factors.y * reflected, 0.0);
+}
+
+// Surface of the skin, or of a part that is not skin.
+fn surface_or_part(point: Point, footprint: f32) -> PartSurface {
+    if (is_opaque(point)) {
+        let index = point.flags >> 8u;
+        return part_at(point, shade.material_colour[index].rgb, shade.part_materials[index], footprint);
+    }
+    return PartSurface(surface_at(point, footprint), 0.0, vec3f(0.0));
 }
 
 fn ray_to_position(position: vec2f, size: vec2f) -> vec3f {
@@ -138,12 +155,8 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
     let wx = meet(weights, ray_to_position(position + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_to_position(position + vec2f(0.0, spacing), size)) - w;
     let footprint = footprint_of(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv, wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
-    var surface: Surface;
-    if (is_opaque(point)) {
-        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, WET_ROUGHNESS, 1.0);
-    } else {
-        surface = surface_at(point, footprint);
-    }
+    let part = surface_or_part(point, footprint);
+    let surface = part.surface;
     var texel: TexelAxes;
     if (STRIPE_LIGHT) {
         texel = texel_axes(triangle, a, b, c, f32(textureDimensions(scattered).x));
@@ -154,7 +167,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
     let film = Film(surface.normal, vec3f(0.0));
-    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), v, footprint, open, texel);
+    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), v, footprint, open, texel, part.metalness, part.emission);
     if (EYES) {
         apply_modelled_parts(&shading_point);
     }
@@ -191,6 +204,9 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
 }
 
 fn lit_at(shading_point: ShadingPoint) -> Lit {
+    //#if PARTS
+    metalness = shading_point.metalness;
+    //#end
     // The only call: software adapters run both sides of a branch for all pixels.
     return illuminate_film(shading_point.point, shading_point.surface, shading_point.film, shading_point.v, shading_point.open);
 }
@@ -198,7 +214,7 @@ fn lit_at(shading_point: ShadingPoint) -> Lit {
 fn shaded(shading_point: ShadingPoint, lit: Lit) -> Shaded {
     let exit_factor = leaves(dot(shading_point.film.normal, shading_point.v), shading_point.surface.roughness, shading_point.surface.rho_s) / PI;
     if (is_opaque(shading_point.point)) {
-        return shaded_plain(shading_point.surface, lit, exit_factor);
+        return shaded_plain(shading_point, lit, exit_factor);
     }
     return shaded_skin(shading_point, lit, exit_factor);
 }

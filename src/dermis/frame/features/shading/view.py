@@ -31,6 +31,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import MAX_OTHER_PROFILES
 
 _MAX_MATERIALS = 64
+_WET = -1.0  # roughness of plain materials, see parts.wgsl
 # Factors of light from below the surface and of reflected light, by `Settings.parts`.
 _LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
 _RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
@@ -104,6 +105,11 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
         material_colour=colours,
         jitter=jitter,
     )
+    for index, material in enumerate(materials):
+        part = record["part_materials"][index]
+        part["emission"], part["metalness"] = material.emission, material.metalness
+        part["roughness"] = _WET if material.roughness is None else material.roughness
+        part["has_maps"] = material.has_maps
     for name, value in split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:

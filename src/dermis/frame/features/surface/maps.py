@@ -21,6 +21,7 @@ from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.head import Head
+from dermis.mesh.maps import PartMaps
 from dermis.mesh.mesh import Mesh
 from dermis.specular.beckmann import beckmann_table
 
@@ -112,11 +113,28 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decoded: boo
         "slope_map": map_mips.upload_slopes(device, maps.normal),
         "colour_map": map_mips.upload_colours(device, colour),
         "specular_map": _upload_grey(device, _relative_to_mean(maps.specular, head.mesh)),
+        **_part_bindings(device, maps.parts),
         "roughness_map": _upload_grey(device, _factor_channel(maps.roughness)),
         "beckmann_table": device.cached(
             "Beckmann's distribution", lambda: texture_from_array(device, beckmann_table(), "r32float")
         ),
     }
+
+
+def has_parts(head: Head) -> bool:
+    """Return whether a head has parts with maps or a metallic-roughness surface, see parts.wgsl."""
+    return head.maps.parts is not None or any(one.roughness is not None for one in head.mesh.materials)
+
+
+def _part_bindings(device: Device, maps: PartMaps | None) -> MutableBindings:
+    """Upload the maps of parts that are not skin as layers of one texture, by its name in parts.wgsl."""
+    if maps is None:
+        flat = np.zeros((1, 1, 4), np.float32)
+        return {"part_maps": map_mips.upload_layers(device, [flat, flat], "part maps")}
+    layers = [maps.colour, maps.surface]
+    if maps.emission is not None:
+        layers.append(np.pad(maps.emission, ((0, 0), (0, 0), (0, 1))))
+    return {"part_maps": map_mips.upload_layers(device, layers, "part maps")}
 
 
 def _factor_channel(values: NDArray[np.float32] | None) -> NDArray[np.float32]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -75,10 +75,19 @@ def upload_detail(device: Device, slopes: Floats) -> Texture:
     """
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
-    layers = slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))
-    height, width = slopes.shape[:2]
+    return upload_layers(device, [slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))], "texture")
+
+
+def upload_layers(device: Device, layers: Sequence[Floats], name: str) -> Texture:
+    """Upload maps (h, w, 4) of one size as layers of a texture of half floats, with all mip levels.
+
+    name : name of the texture, for error messages
+    """
+    height, width = layers[0].shape[:2]
     mips = max(height, width).bit_length()
-    texture = make_texture(device, (width, height), HALF_FORMAT, layers=len(layers), mips=mips, use="map")
+    texture = make_texture(
+        device, (width, height), HALF_FORMAT, layers=len(layers), mips=mips, use="map", name=name
+    )
     for layer, texels in enumerate(layers):
         for mip, level in enumerate(mip_chain(texels)):
             upload(device, texture, level, mip=mip, layer=layer)

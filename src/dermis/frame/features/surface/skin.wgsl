@@ -8,8 +8,11 @@
 @group(0) @binding(7) var specular_map: texture_2d<f32>; // filtered: factor of rho_s
 @group(0) @binding(8) var roughness_map: texture_2d<f32>; // filtered: factor of the roughness
 
+//#if PARTS
+//#else
 @group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered, a tile: slopes of pores and of furrows, then their squares
 @group(0) @binding(15) var detail_sampler: sampler;
+//#end
 
 override DETAIL: bool = false; // whether the skin has relief finer than its maps
 //#fill const TILE_MM: f32 = {tile_mm};
@@ -59,6 +62,12 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     return out;
 }
 
+//#if PARTS
+// Heads with parts from files have no relief finer than their maps.
+fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32) -> vec3f {
+    return vec3f(0.0);
+}
+//#else
 // Slopes of pores and furrows along u and down, and the variance of slopes finer than the footprint.
 // amounts : of pores and furrows; density : log2 of the mm per unit of uv
 // Tiles are scaled by powers of two, so that pores have their true size to a factor of 1.4 in all charts.
@@ -83,6 +92,7 @@ fn tiled(uv: vec2f, footprint: f32, amounts: vec2f, tiles: f32) -> vec3f {
     let hidden = max(squares - vec2f(dot(slopes.xy, slopes.xy), dot(slopes.zw, slopes.zw)), vec2f(0.0));
     return vec3f(amounts.x * slopes.xy + amounts.y * slopes.zw, dot(amounts * amounts, hidden));
 }
+//#end
 
 // Colour map applied before (mix) or after (1 - mix) scattering; black is clamped, as pow(0, 0) is undefined.
 fn colour_power(colour: vec3f, exponent: f32) -> vec3f {

@@ -1,0 +1,151 @@
+"""Position of the skull in a mesh: a head or bust, or a body with a head bone or eyes, or that stands."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles, Floats, Ints
+
+Point = tuple[float, float, float]
+_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
+_HEAD_HEIGHT_MM = 100.0, 1000.0  # of heads and busts
+_MIN_BODY_HEIGHT_MM = 300.0
+MAX_ELONGATION = 2.4
+"""Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
+_MAX_RELATIVE_WIDTH = 3.0  # of a bust
+_EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
+_MAX_FLATNESS = 0.5  # thickness relative to width of what is seen from its flat side
+_MIN_MEAN_NORMAL = 0.2  # of an open piece; of closed meshes it is 0
+_WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+# Sections of a standing figure, as fractions of its height, and widths relative to its height.
+_HEAD_SECTION, _NECK_SECTIONS, _SHOULDER_SECTIONS = 0.95, (0.82, 0.85, 0.88), (0.74, 0.77, 0.8)
+_MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
+
+
+def is_head_sized(positions: Floats) -> bool:
+    """Return whether vertices (v, 3) have the size and proportions of a head or bust [mm]."""
+    width, height, depth = np.ptp(positions, axis=0)
+    low, high = _HEAD_HEIGHT_MM
+    if not (low <= height <= high and max(width, depth) <= _MAX_RELATIVE_WIDTH * height):
+        return False
+    _, across, along = principal_sizes(positions)
+    return bool(along <= MAX_ELONGATION * across)
+
+
+def principal_sizes(positions: Floats) -> Doubles:
+    """Return the sizes (3,) of vertices (v, 3) along their principal axes, the main axis last."""
+    points = positions.astype(np.float64)
+    return np.asarray(np.ptp(points @ np.linalg.eigh(np.cov(points.T)).eigenvectors, axis=0))
+
+
+def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
+    """Return whether a mesh, of any unit, has a small head above a narrow neck and wide shoulders.
+
+    positions : (v, 3) vertices, Y up
+    triangles : (f, 3) vertex indices
+    """
+    bottom, height = float(positions[:, 1].min()), float(np.ptp(positions[:, 1]))
+    if height == 0:
+        return False
+    levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
+    sections = [_section(positions, triangles, bottom + level * height) for level in levels]
+    head, *others = sections
+    neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
+    shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
+    return (
+        all(one.parts == 1 for one in (head, neck, shoulders))
+        and 0 < head.width < _MAX_HEAD_WIDTH * height
+        and 0 < neck.width < _MAX_NECK_WIDTH * height
+        and shoulders.width > _MIN_SHOULDERS_TO_NECK * neck.width
+        and abs(neck.middle - shoulders.middle) < 0.5 * neck.width
+    )
+
+
+def skull_below(positions: NDArray[np.floating], top: float) -> Point:
+    """Return the centre of a skull from the vertices of a head (v, 3) and the height of its crown [mm]."""
+    x, y, z = positions.T
+    skull = y > top - 2 * _CROWN_TO_CENTRE_MM
+    centre_x, centre_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
+    return centre_x, top - _CROWN_TO_CENTRE_MM, centre_z
+
+
+def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
+    """Return the centre of the skull of a body: at the level of its eyes, or at the top of a standing figure.
+
+    positions : (v, 3) vertices, Y up [mm]
+    triangles : (f, 3) vertex indices
+    eyes : (n, 3) vertices of eyeballs [mm]
+
+    The result is None for a mesh without eyes that does not stand, and for one smaller than a body.
+    """
+    if np.ptp(positions[:, 1]) < _MIN_BODY_HEIGHT_MM:
+        return None
+    if len(eyes):
+        x, y, z = 0.5 * (eyes.min(axis=0) + eyes.max(axis=0))
+        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _EYES_TO_HAIR_MM
+        return skull_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
+    if is_standing_figure(positions, triangles):
+        return skull_below(positions, float(positions[:, 1].max()))
+    return None
+
+
+def head_bone(names: tuple[str, ...]) -> int | None:
+    """Return the index of the bone of the head, such as "head" or "mixamorig:Head"; None without one."""
+    last_words = ([word.casefold() for word in _WORD_PATTERN.findall(name)[-1:]] for name in names)
+    return next((k for k, word in enumerate(last_words) if word == ["head"]), None)
+
+
+def centre_of_box(positions: Floats) -> Point:
+    """Return the centre of the bounding box of vertices (v, 3) [mm]."""
+    x, y, z = 0.5 * (positions.min(axis=0) + positions.max(axis=0)).astype(np.float64)
+    return float(x), float(y), float(z)
+
+
+def facing_axes(positions: Floats, normals: Floats) -> Doubles:
+    """Return the directions (3, 3) to the right, upwards and to the front of a mesh without a head, in rows.
+
+    They are x, y and z, unless the mesh is flat: then its front is the side to which its normals point.
+
+    positions, normals : (v, 3) vertices, Y up [mm], and their normals
+    """
+    sizes = np.ptp(positions, axis=0)
+    thin = int(sizes.argmin())
+    front, up = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+    if sizes[thin] < _MAX_FLATNESS * np.partition(sizes, 1)[1]:
+        front = np.eye(3)[thin] * (-1.0 if normals[:, thin].mean() < -_MIN_MEAN_NORMAL else 1.0)
+        up = up if thin != 1 else np.array([0.0, 0.0, -front[1]])
+    return np.array([np.cross(up, front), up, front])
+
+
+class _Section(NamedTuple):
+    """Section of a mesh with a horizontal plane, seen from the front.
+
+    parts : number of separate intervals along x
+    width, middle : sum of the lengths of the intervals, and centre of their range
+    """
+
+    parts: int
+    width: float
+    middle: float
+
+
+def _section(positions: Floats, triangles: Ints, height: float) -> _Section:
+    x, y = positions[:, 0].astype(np.float64), positions[:, 1].astype(np.float64)
+    above = y[triangles] > height
+    cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
+    if not len(cut):
+        return _Section(0, 0.0, 0.0)
+    a, b = cut, np.roll(cut, 1, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing: Doubles = x[a] + (x[b] - x[a]) * (height - y[a]) / (y[b] - y[a])
+    crossing[(y[a] > height) == (y[b] > height)] = np.nan
+    low, high = np.nanmin(crossing, axis=1), np.nanmax(crossing, axis=1)
+    order = np.argsort(low)
+    low, reached = low[order], np.maximum.accumulate(high[order])
+    gaps = np.maximum(low[1:] - reached[:-1], 0.0)
+    width = reached[-1] - low[0] - gaps.sum()
+    return _Section(1 + int(np.count_nonzero(gaps)), float(width), float(low[0] + reached[-1]) / 2)

@@ -1,0 +1,162 @@
+"""Maps and materials of heads from mesh files: the pictures of each material on the parts that have it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dermis.atlas.texture_baking import PackedTextures, pack_textures, read_role
+from dermis.atlas.texture_tiles import UV_TOLERANCE
+from dermis.base.arrays import Floats, Mask
+from dermis.formats.load import FileSurface, RiggedMesh
+from dermis.formats.materials import IDENTITY, FileMaterial, Role
+from dermis.mesh.maps import Maps, PartMaps
+from dermis.mesh.mesh import Material, Mesh
+
+_SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
+_OPACITY_CUTOFF = 0.5  # of materials that are blended
+
+
+def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
+    """Return the material whose pictures are the maps of the skin as they are, None if they must be packed.
+
+    rigged, materials : mesh and materials of a file
+    """
+    mesh, surface = rigged.mesh, rigged.surface
+    skin = _members(mesh, "skin")
+    used = {index for index, own in zip(surface.in_file, skin, strict=True) if own}
+    if len(used) != 1 or not all(has for has, own in zip(surface.has_uv, skin, strict=True) if own):
+        return None
+    index = used.pop()
+    material = materials[index] if index >= 0 else FileMaterial()
+    if material.maps is not None:
+        return material
+    uv = mesh.uv[np.unique(mesh.triangles[skin[mesh.material]])]
+    inside = uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE
+    plain = all(texture.mapping == (0, IDENTITY) for texture in material.textures.values())
+    return material if inside and plain and not _has_colours(mesh, surface, skin) else None
+
+
+def with_factors(maps: Maps, material: FileMaterial, given: Collection[str]) -> Maps:
+    """Return the maps of a skin material with its factors; roughness is the square of the file's.
+
+    given : roles of maps that users replace, to which the factors do not apply
+    """
+    changed: dict[str, Floats] = {}
+    if material.maps is None and "colour" not in given and material.colour not in (None, (1.0, 1.0, 1.0)):
+        white = np.ones((1, 1, 3), np.float32)
+        changed["colour"] = (white if maps.colour is None else maps.colour) * np.float32(material.colour)
+    if maps.normal is not None and "normal" not in given and material.normal_scale != 1.0:
+        changed["normal"] = maps.normal * np.float32(material.normal_scale)
+    if material.maps is None and "roughness" not in given and "roughness" in material.textures:
+        values = read_role(material.textures["roughness"], "roughness")[..., 0]
+        changed["roughness"] = (values * np.float32(material.roughness)) ** 2
+    return replace(maps, **changed)
+
+
+def _members(mesh: Mesh, kind: str) -> Mask:
+    """Return the mask (m,) of the mesh's materials of a kind."""
+    return np.array([material.kind == kind for material in mesh.materials])
+
+
+def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
+    """Return whether vertices of some materials have a colour other than white."""
+    if surface.colours is None:
+        return False
+    return bool((surface.colours[np.unique(mesh.triangles[members[mesh.material]])] < 1.0).any())
+
+
+def with_file_textures(
+    rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
+) -> tuple[Mesh, Maps, tuple[str, ...]]:
+    """Return the mesh with uv in common maps, the maps, and notes on what is not exact.
+
+    rigged, materials : mesh and materials of a file
+    pack_skin : whether the maps of the skin are packed, see `direct_material`
+    """
+    mesh, maps, notes = rigged.mesh, Maps(), list[str]()
+    if pack_skin:
+        packed = pack_textures(mesh, rigged.surface, materials, _members(mesh, "skin"))
+        mesh, maps = _with_uv(mesh, packed), _skin_maps(packed)
+        notes += [f"skin: {note}" for note in packed.notes]
+    pictured = _pictured_parts(mesh, rigged.surface, materials)
+    if pictured.any():
+        packed = pack_textures(mesh, rigged.surface, materials, pictured, ("colour", *_SURFACE_ROLES))
+        mesh, maps = _with_uv(mesh, packed), replace(maps, parts=_part_maps(packed))
+        notes += [f"parts that are not skin: {note}" for note in packed.notes]
+    surfaces = zip(mesh.materials, rigged.surface.in_file, pictured, strict=True)
+    changed = tuple(_with_surface(own, materials[k] if k >= 0 else None, has) for own, k, has in surfaces)
+    return _keep_outline(mesh, replace(mesh, materials=changed)), maps, tuple(notes)
+
+
+def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
+    """Return the mask (m,) of opaque materials with pictures or vertex colours."""
+    opaque = _members(mesh, "opaque")
+    pictured = np.zeros_like(opaque)
+    for index in np.flatnonzero(opaque):
+        own, in_file = np.arange(len(opaque)) == index, surface.in_file[index]
+        has_pictures = in_file >= 0 and bool(materials[in_file].textures) and surface.has_uv[index]
+        pictured[index] = has_pictures or _has_colours(mesh, surface, own)
+    return pictured
+
+
+def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
+    uv = mesh.uv.copy()
+    uv[packed.vertices] = packed.uv
+    return _keep_outline(mesh, replace(mesh, uv=uv))
+
+
+def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
+    """Return a changed mesh of the same shape with the outline of the original, a costly hull."""
+    vars(changed)["outline"] = mesh.outline
+    return changed
+
+
+def _skin_maps(packed: PackedTextures) -> Maps:
+    maps = packed.maps
+    roughness = maps.get("roughness")
+    return Maps(
+        colour=np.ascontiguousarray(maps["colour"][..., :3]),
+        normal=maps.get("normal"),
+        roughness=None if roughness is None else roughness[..., 0] ** 2,
+    )
+
+
+def _part_maps(packed: PackedTextures) -> PartMaps:
+    maps = packed.maps
+    surface = np.concatenate([maps[role] for role in _SURFACE_ROLES], axis=2)
+    return PartMaps(maps["colour"], surface, _emission(maps.get("emission")))
+
+
+def _emission(values: Floats | None) -> Floats | None:
+    return values if values is not None and values.any() else None
+
+
+def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
+    """Return an opaque material with the surface that its file states."""
+    if material.kind == "skin":
+        return material
+    if in_file is None:
+        return replace(material, has_maps=has_maps)
+    cutoffs = {"opaque": 0.0, "mask": in_file.alpha_cutoff, "blend": _OPACITY_CUTOFF}
+    return replace(
+        material,
+        has_maps=has_maps,
+        roughness=in_file.roughness,
+        metalness=in_file.metalness,
+        emission=in_file.emission,
+        opacity_cutoff=cutoffs[in_file.alpha_mode],
+    )
+
+
+def unused_properties(materials: Sequence[FileMaterial], used: Sequence[int], path: Path) -> str:
+    """Return the note on properties of materials that have no effect; empty for none."""
+    listed = [
+        f"{materials[index].name!r}: {', '.join(dict.fromkeys(materials[index].unused))}"
+        for index in sorted(set(used))
+        if index >= 0 and materials[index].unused
+    ]
+    return "\n  ".join(["properties of materials that are not drawn:", *listed]) if listed else ""
