@@ -109,6 +109,10 @@ class _Baker:
         else:
             values = self._sampled(tile, texture, role)
         values *= factor
+        if role == "colour":
+            values[..., 3] = (
+                1.0 if material.alpha_mode == "opaque" else values[..., 3] + 0.5 - material.cutoff
+            )
         if role == "colour" and self.surface.colours is not None:
             values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
         return values

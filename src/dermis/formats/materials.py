@@ -16,6 +16,7 @@ Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular
 AlphaMode = Literal["opaque", "mask", "blend"]
 UvTransform = tuple[float, float, float, float, float, float]
 
+_BLENDED_CUTOFF = 0.5
 IDENTITY: UvTransform = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -75,6 +76,11 @@ class FileMaterial:
     scatters: bool = False
     maps: Mapping[str, object] | None = None
     unused: tuple[str, ...] = ()
+
+    @property
+    def cutoff(self) -> float:
+        """Return the opacity at which the surface ends; blended materials end where they are half opaque."""
+        return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
         """Return keyword arguments of `load_maps` for skin that has the uv of its pictures."""

@@ -190,7 +190,9 @@ def _make_layout(
     index : index of the layout, which keys its resources in the cache
     """
     cached, number, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
-    geometry = cached(upload_geometry, device, head.mesh, atlas, shapes.shape, owner=number)
+    geometry = cached(
+        upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=number
+    )
     tables, settings = shapes.tables, request.settings
     at_rest = partial(rest_geometry, memo, device, geometry, tables, head, request.pair_positions_mm, index)
     bindings: MutableBindings = {**geometry.resources, **shared}

@@ -25,6 +25,8 @@ FLOAT_FORMAT = "rgba32float"
 HALF_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
 FRAME_FOLDER = Path(__file__).parent
+OPTIONAL_BINDINGS = ("PARTS", "CUTOUTS")
+"""Pipeline constants that are conditions of `//#if` as well, because bindings depend on them."""
 FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""
 SPECULAR_FOLDER = Path(str(specular.__file__)).parent
@@ -91,7 +93,7 @@ def program(
     source, store : formats of the textures from which the shader reads and to which it stores light
     labels : whether a hair pass stores labels besides the picture
     """
-    active = shader_options(source, store, labels, parts=dict(constants).get("PARTS") == 1)
+    active = shader_options(source, store, labels, constants)
 
     def compile_program() -> ComputeProgram:
         file, folders = FEATURES_FOLDER / path, shader_folders(*active)
@@ -100,15 +102,15 @@ def program(
     return cached_program(device, (path, active, registry_version()), constants, compile_program)
 
 
-def shader_options(source: str, store: str, labels: bool, parts: bool = False) -> tuple[str, ...]:
+def shader_options(source: str, store: str, labels: bool, constants: Constants = ()) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {
         "FILTERED_SOURCE": source == HALF_FORMAT,
         "STORED_HALVES": store == HALF_FORMAT,
         "HAIR_LABELS": labels,
-        "PARTS": parts,
     }
-    return tuple(name for name, value in values.items() if value)
+    options = [name for name, value in values.items() if value]
+    return (*options, *(name for name, value in constants if name in OPTIONAL_BINDINGS and value))
 
 
 def program_constants(

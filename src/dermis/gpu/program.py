@@ -199,6 +199,7 @@ class RenderProgram(Program):
 
     targets : texture formats of the colour targets; empty to draw only depth
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
+    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default with targets
     raster : depth test and format of the first target, for players of captured frames
     """
 
@@ -213,6 +214,7 @@ class RenderProgram(Program):
         *,
         targets: Sequence[str],
         depth_compare: str | None = None,
+        has_fragment: bool | None = None,
     ) -> None:
         super().__init__(device, path, folders, constants)
         self.raster = {"target": next(iter(targets), None), "depth_compare": depth_compare}
@@ -222,7 +224,7 @@ class RenderProgram(Program):
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
             vertex={**stage, "entry_point": "vertex"},
-            fragment=fragment if targets else None,
+            fragment=fragment if (targets if has_fragment is None else has_fragment) else None,
             primitive={"topology": "triangle-list"},
             depth_stencil=depth if depth_compare else None,
         )

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.base.arrays import Doubles, Floats, Ints
+from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, convex_hull
@@ -30,7 +30,7 @@ class Material:
     part : which teeth, or the tongue, for the colours of mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
     has_maps : whether `Maps.parts` has the colour and the surface of an opaque group, factors included
-    roughness : perceptual roughness of an opaque group, see glTF [-]; None for the wet surface of eyes and teeth
+    roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
     opacity_cutoff : opacity below which the group is cut out; 0 for none
@@ -79,6 +79,11 @@ class Mesh(ShortRepr):
         points = np.zeros((int(self.point.max()) + 1, 3))
         points[self.point] = self.positions
         return points
+
+    @property
+    def cut_out(self) -> Mask:
+        """Return the mask (f,) of triangles that are cut out by the opacity of their part."""
+        return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
     @property
     def size_mm(self) -> Floats:

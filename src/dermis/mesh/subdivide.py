@@ -188,7 +188,7 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     """Return triangles (t, 3) of a subdivided head that leave out levels of subdivision in flat regions.
 
-    The vertices are those of the subdivided mesh.
+    The vertices are those of the subdivided mesh. Triangles that are cut out by their opacity are left out.
 
     min_faces : smallest number of faces of the coarsest level
     tolerance_mm : largest distance of a left out vertex from the coarse edge that replaces it
@@ -200,11 +200,12 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
         levels, count = levels - 1, count // 4
     skipped = head.levels - levels
     if skipped == 0:
-        return mesh.triangles
+        return mesh.triangles[~mesh.cut_out]
     if by_quads:
-        quads = np.column_stack((mesh.triangles[mesh.quads[:, 0]], mesh.triangles[mesh.quads[:, 1], 1]))
+        solid = mesh.quads[~mesh.cut_out[mesh.quads[:, 0]]]
+        quads = np.column_stack((mesh.triangles[solid[:, 0]], mesh.triangles[solid[:, 1], 1]))
         return _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
-    return _coarsen_triangles(mesh.triangles, mesh.positions, skipped, tolerance_mm)
+    return _coarsen_triangles(mesh.triangles[~mesh.cut_out], mesh.positions, skipped, tolerance_mm)
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:

@@ -17,7 +17,6 @@ from dermis.mesh.maps import Maps, PartMaps
 from dermis.mesh.mesh import Material, Mesh
 
 _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
-_OPACITY_CUTOFF = 0.5  # of materials that are blended
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
@@ -141,14 +140,13 @@ def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bo
         return material
     if in_file is None:
         return replace(material, has_maps=has_maps)
-    cutoffs = {"opaque": 0.0, "mask": in_file.alpha_cutoff, "blend": _OPACITY_CUTOFF}
     return replace(
         material,
         has_maps=has_maps,
         roughness=in_file.roughness,
         metalness=in_file.metalness,
         emission=in_file.emission,
-        opacity_cutoff=cutoffs[in_file.alpha_mode],
+        opacity_cutoff=0.0 if in_file.alpha_mode == "opaque" else in_file.cutoff,
     )
 
 

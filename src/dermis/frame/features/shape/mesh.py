@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.frame.features.shape.shape import VERTEX_RESOURCES, Shape, ShapeTables, evaluate_rest_shape
-from dermis.gpu import Buffer, Device, Memo, Texture
+from dermis.gpu import Buffer, Constants, Device, Memo, Texture
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.head import Head
+from dermis.mesh.maps import PartMaps
 from dermis.mesh.mesh import Mesh
 
+_CUT_OUT = 4  # flag of triangles that are cut out, see cutouts.wgsl
 _TRIANGLES_PER_ROW = 2048  # width of the texture; shaders query it
 
 
@@ -24,11 +26,18 @@ class HeadGeometry:
     resources : textures and buffers by their names in geometry.wgsl
     indices : index buffer for the rasteriser
     triangles : number of triangles
+    has_cutouts : whether the opacity of some parts has holes, see cutouts.wgsl
     """
 
     resources: dict[str, Texture | Buffer]
     indices: Buffer
     triangles: int
+    has_cutouts: bool = False
+
+    @property
+    def constants(self) -> Constants:
+        """Return the pipeline constants of passes that find the nearest surface."""
+        return (("CUTOUTS", 1),) if self.has_cutouts else ()
 
     def with_shape(self, shape: Shape) -> HeadGeometry:
         """Return these triangles with the posed vertices of a shape."""
@@ -41,9 +50,21 @@ class HeadGeometry:
         )
 
 
-def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> HeadGeometry:
-    """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape."""
-    return _uploaded(device, _triangle_table(mesh, atlas), shape.vertices)
+def upload_geometry(
+    device: Device, mesh: Mesh, atlas: Atlas, shape: Shape, parts: PartMaps | None = None
+) -> HeadGeometry:
+    """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
+
+    parts : maps of the parts that are not skin, whose opacity cuts them out; without them, such parts are
+        left out
+    """
+    table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
+    if parts is None or not cut_out.any():
+        table[0, cut_out, :3] = 0
+        return _uploaded(device, table, shape.vertices)
+    table[0, cut_out, 3] |= _CUT_OUT
+    opacity = texture_from_array(device, parts.colour[..., 3:].astype(np.float16), "r16float")
+    return replace(_uploaded(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True)
 
 
 def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:

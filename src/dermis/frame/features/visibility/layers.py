@@ -147,7 +147,7 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     work, count = _work_split(triangles, len(clips), len(positions))
     groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
     for recorded in passes:
-        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work)
+        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
         shader = program(device, "visibility/visibility_buffer.wgsl", constants)
         graph.dispatch(stage, shader, resources, groups)
     graph.dispatch(stage, resolve, resources, (*_tile_counts(layers.size), layers.count))
@@ -167,21 +167,29 @@ def _pass_modes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int,
 
 
 def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> None:
-    shader = _raster_program(graph.device, layers.triangles)
+    shader = _raster_program(graph.device, layers.triangles, head.has_cutouts)
     resources = {**head.resources, "views": _views_record(shader, layers, clips, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
-        indices, into = None if layers.triangles else head.indices, DrawTarget(depth, 0.0, target)
+        indexed = not (layers.triangles or head.has_cutouts)  # else the shader finds the corners itself
+        indices, into = head.indices if indexed else None, DrawTarget(depth, 0.0, target)
         graph.draw(stage, shader, resources, 3 * head.triangles, into, indices=indices, layer=layer)
 
 
-def _raster_program(device: Device, triangles: bool) -> RenderProgram:
-    def make() -> RenderProgram:
-        name = "visibility/visibility_buffer_raster.wgsl" if triangles else "visibility/depth_raster.wgsl"
-        path, folders = FEATURES_FOLDER / name, shader_folders()
-        constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
-        return RenderProgram(device, path, folders, constants, targets=targets, depth_compare="greater")
+def _raster_program(device: Device, triangles: bool, has_cutouts: bool) -> RenderProgram:
+    """Return the program that rasterises triangles or depth.
 
-    return cached_program(device, ("visibility buffer", triangles), (), make)
+    has_cutouts : whether a fragment shader leaves holes, also where only depth is drawn
+    """
+
+    def make() -> RenderProgram:
+        by_triangle = triangles or has_cutouts
+        name = "visibility/visibility_buffer_raster.wgsl" if by_triangle else "visibility/depth_raster.wgsl"
+        path, folders = FEATURES_FOLDER / name, shader_folders(*(("CUTOUTS",) if has_cutouts else ()))
+        constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
+        options = {"depth_compare": "greater", "has_fragment": by_triangle}
+        return RenderProgram(device, path, folders, constants, targets=targets, **options)
+
+    return cached_program(device, ("visibility buffer", triangles, has_cutouts), (), make)
 
 
 def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> UniformRecord:

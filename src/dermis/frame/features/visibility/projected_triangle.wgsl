@@ -1,6 +1,7 @@
 // Setup of triangles in a view: barycentric weights and depth as planes over its pixels, and blocks that a triangle may cover.
 //#include "shape/geometry.wgsl"
 //#include "views.wgsl"
+//#include "cutouts.wgsl"
 
 override SAMPLES: u32 = 1u; // samples of a pixel, a layer for each
 override BLOCK: u32 = select(8u, 4u, SAMPLES > 1u); // pixels along a side of a block
@@ -26,6 +27,9 @@ struct ProjectedTriangle {
     along_x: vec4f, // change of the weights of a, b, c and of the depth per pixel
     along_y: vec4f,
     at_low: vec4f, // at the corner of the first pixel of the box
+    //#if CUTOUTS
+    weight_scale: vec3f, // factor of the weights, which makes their sum the inverse distance
+    //#end
 }
 
 fn project(vertex: u32, view: u32) -> ClipCorner {
@@ -63,18 +67,22 @@ fn setup_triangle(index: u32, view: u32) -> ProjectedTriangle {
     let pc = c.position - vec3f(low * w.z, 0.0);
     let volume = dot(pa, cross(pb, pc));
     if (volume == 0.0) {
-        return ProjectedTriangle(Box(vec2u(0u), vec2u(0u)), vec4f(0.0), vec4f(0.0), vec4f(0.0));
+        var none: ProjectedTriangle;
+        return none;
     }
     let weights = transpose(mat3x3f(cross(pb, pc) / volume, cross(pc, pa) / volume, cross(pa, pb) / volume));
     let z = vec3f(a.z, b.z, c.z);
     let distances = abs(w);
     let scale = max(distances, vec3f(MIN_DISTANCE_RATIO * max(max(distances.x, distances.y), distances.z)));
-    return ProjectedTriangle(
-        box,
-        vec4f(weights[0] * scale, dot(weights[0], z)),
-        vec4f(weights[1] * scale, dot(weights[1], z)),
-        vec4f(weights[2] * scale, dot(weights[2], z)),
-    );
+    var projected: ProjectedTriangle;
+    projected.box = box;
+    projected.along_x = vec4f(weights[0] * scale, dot(weights[0], z));
+    projected.along_y = vec4f(weights[1] * scale, dot(weights[1], z));
+    projected.at_low = vec4f(weights[2] * scale, dot(weights[2], z));
+    //#if CUTOUTS
+    projected.weight_scale = 1.0 / scale;
+    //#end
+    return projected;
 }
 
 fn first_block(box: Box) -> vec2u {

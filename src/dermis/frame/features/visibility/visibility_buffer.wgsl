@@ -179,9 +179,34 @@ fn draw_four(index: u32, triangle: ProjectedTriangle, x: vec4f, y: vec4f, tested
     let b = triangle.at_low.y + x * triangle.along_x.y + y * triangle.along_y.y;
     let c = triangle.at_low.z + x * triangle.along_x.z + y * triangle.along_y.z;
     let depth = triangle.at_low.w + x * triangle.along_x.w + y * triangle.along_y.w;
-    let covered = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & tested;
+    var covered = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & tested;
+    //#if CUTOUTS
+    covered &= solid(index, a * triangle.weight_scale.x, b * triangle.weight_scale.y, c * triangle.weight_scale.z);
+    //#end
     record_four(index, depth, covered, texels);
 }
+
+//#if CUTOUTS
+// Whether four positions with weights a, b, c of the corners are not in holes.
+fn solid(index: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4<bool> {
+    let t = triangle_at(index);
+    if ((t.w & CUT_OUT) == 0u) {
+        return vec4<bool>(true);
+    }
+    let sum = a + b + c;
+    let p = corner_at(t.x).uv;
+    let q = corner_at(t.y).uv;
+    let r = corner_at(t.z).uv;
+    let u = (a * p.x + b * q.x + c * r.x) / sum;
+    let v = (a * p.y + b * q.y + c * r.y) / sum;
+    return vec4<bool>(
+        is_solid(vec2f(u.x, v.x)),
+        is_solid(vec2f(u.y, v.y)),
+        is_solid(vec2f(u.z, v.z)),
+        is_solid(vec2f(u.w, v.w)),
+    );
+}
+//#end
 
 fn texel_of(pixel: vec2u, layer: u32) -> u32 {
     return (layer * views.height + pixel.y) * views.width + pixel.x;
