@@ -13,6 +13,7 @@ import re
 import stat
 import struct
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,14 +89,15 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
-    """Return the text of a UTF-8 file with or without a byte order mark.
+    """Return the text of a file of UTF-8 with or without a byte order mark, or of UTF-16 with one.
 
     expected : what the file should be, for error messages
 
     Raises DermisError as `read_file` does, and for files that are not text.
     """
     with parsing(path, expected):
-        return read_file(path, expected, max_bytes).decode("utf-8-sig")
+        data = read_file(path, expected, max_bytes)
+        return data.decode("utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
 
 
 def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]:

@@ -29,6 +29,14 @@ def parse_rows(text: str) -> Rows:
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
+def column_separator(line: str) -> str:
+    """Return the separator of a line of a table: a tab, a semicolon or a comma, the first of these in it.
+
+    Beside tabs and semicolons commas are decimal signs.
+    """
+    return next((mark for mark in "\t;" if mark in line), ",")
+
+
 def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
     """Return selected columns of a table as floats, (rows, columns).
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from dermis.base.arrays import Doubles
-from dermis.base.errors import refuse
+from dermis.base.errors import notify, refuse
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
@@ -20,6 +21,27 @@ MAX_CLIP_BYTES = 48 << 20
 """Largest capture file."""
 MAX_FRAMES, MAX_NAMES = 200_000, 500
 """Largest number of frames of a capture, almost an hour at 60 per second, and of its columns."""
+TIME_UNITS: Mapping[str, float | None] = {
+    "time": 1.0,
+    "times": 1.0,
+    "timestamps": 1.0,
+    "seconds": 1.0,
+    "timems": 1e-3,
+    "timestampms": 1e-3,
+    "timestampinmilliseconds": 1e-3,
+    "timestampus": 1e-6,
+    "timestamp": None,
+}
+"""Unit of the time of a frame by its plain key [s]; None for a key that does not state it."""
+FRAME_KEYS = ("frame", "frameindex", "framenumber", "frameid")
+"""Plain keys of the number of a frame."""
+NEUTRAL_SCORE = "_neutral"
+"""MediaPipe's score of the neutral face, which is not a blend shape."""
+MAX_TIME = 1e19
+"""Largest time of a frame in any unit: nanoseconds of three centuries."""
+_MAX_STEP_S = 2.0  # largest plausible median step between frames of a capture
+_TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
+_PERCENT_RANGE = (10.0, 200.0)  # largest weight of a capture in percent: more than any pose as a fraction
 _COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
@@ -100,16 +122,70 @@ def frame_rate(times: Doubles) -> float | None:
     return nearest if abs(nearest / rate - 1) < _RATE_TOLERANCE else rate
 
 
-def check_weights(culprit: object, names: Sequence[str], values: Doubles) -> None:
-    """Refuse blend shape weights (n,) that are NaN or implausibly large.
+@lru_cache(4096)
+def plain_key(key: str) -> str:
+    """Return a key or column name without case and punctuation: timestamp_ms and timestampMs are one."""
+    return re.sub(r"[\W_]", "", key).casefold()
 
-    names : (n,) of the blend shapes, for errors
+
+def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
+    """Return times (k,) in seconds.
+
+    unit : unit of the times [s]; None for the largest one in which frames are at most 2 s apart, with a note
     """
-    invalid = ~(np.abs(values) <= MAX_WEIGHT)
-    if invalid.any():
+    if unit is None:
+        steps = np.diff(times)
+        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        unit = next((unit for unit in _TIME_UNIT_NAMES if unit * step <= _MAX_STEP_S), 1.0)
+        notify(f"{culprit}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit]}")
+    return times * unit
+
+
+def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
+    """Return the frame rate of a capture without times: the given one, or the default, with a note."""
+    if fps is None:
+        assumed = f"{default:g} frames per second are assumed"
+        notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
+    return fps or default
+
+
+def note_lost_frames(culprit: object, count: int, total: int) -> None:
+    """Issue a note that a number of frames show no face, if there are any."""
+    if count:
+        notify(f"{culprit}: {count} of {total} frames show no face; their pose is interpolated")
+
+
+def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
+    """Replace NaN in values (k, n) by linear interpolation over time; the first and last numbers are held.
+
+    times_s : (k,) times of the rows [s]
+    """
+    filled = values.copy()
+    for column, known in zip(filled.T, ~np.isnan(values).T, strict=True):
+        column[~known] = np.interp(times_s[~known], times_s[known], column[known])
+    return filled
+
+
+def to_fractions(culprit: object, weights: Doubles) -> Doubles:
+    """Return blend shape weights (k, n) as fractions; those in percent are divided by 100, with a note."""
+    largest = float(np.nanmax(np.abs(weights), initial=0.0))
+    if not _PERCENT_RANGE[0] < largest <= _PERCENT_RANGE[1]:
+        return weights
+    notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
+    return weights / 100
+
+
+def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doubles) -> None:
+    """Refuse blend shape weights (k, n) that are implausibly large; NaN for missing ones are accepted.
+
+    culprits, names : (k,) frames and (n,) blend shapes, for errors
+    """
+    invalid = np.argwhere(np.abs(values) > MAX_WEIGHT)
+    if len(invalid):
+        row, column = invalid[0]
         expected = f"numbers from -{MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
-        first = int(invalid.argmax())
-        refuse(culprit, expected, f"{names[first]} is {values[first]:g}", "Correct or remove the line")
+        actual = f"{names[column]} is {values[row, column]:g}"
+        refuse(culprits[row], expected, actual, "Correct or remove the line")
 
 
 def check_size(culprit: object, frames: int, names: int) -> None:

@@ -5,44 +5,61 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles
-from dermis.base.errors import refuse
+from dermis.base.arrays import Doubles, Mask
+from dermis.base.errors import notify, refuse
+from dermis.base.quantities import checked_number
 from dermis.base.reading import parsing, read_text
+from dermis.base.tables import column_separator
 from dermis.formats.motion.captures import (
+    FRAME_KEYS,
     MAX_CLIP_BYTES,
+    MAX_TIME,
+    NEUTRAL_SCORE,
+    TIME_UNITS,
     CaptureSamples,
     RotationBones,
+    assumed_rate,
     capture_clip,
     check_size,
     check_weights,
+    fill_gaps,
     find_rotation_bones,
     head_bone_angles,
+    note_lost_frames,
+    plain_key,
+    to_fractions,
+    to_seconds,
     unwrap_degrees,
 )
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.rotations import angles_matrix, matrix_quaternion
 
-_TIME_COLUMN, _COUNT_COLUMN = "timecode", "blendshapecount"
+_COUNT_COLUMN = "blendshapecount"
+_TIME_COLUMNS: Mapping[str, float | None] = {"timecode": None, **TIME_UNITS}
+_OTHER_COLUMNS = (*_TIME_COLUMNS, *FRAME_KEYS, _COUNT_COLUMN, plain_key(NEUTRAL_SCORE), "")
 _ROTATED_OBJECTS = ("head", "lefteye", "righteye")
-_ANGLE_COLUMNS = {f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")}
-_TIMECODE = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,4}(?:\.\d{1,12})?)")
+_ANGLE_COLUMNS = [f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")]
+_TIMECODE = re.compile(
+    r"(\d{1,3}):(\d{1,2}):(\d{1,2}(?:\.\d{1,12})?)(?:[:;](\d{1,4}(?:\.\d{1,12})?))?", re.ASCII
+)
 _TIMECODE_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
 _APP_RATE = 60.0
 _DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
+_MAX_ANGLE = 2 * np.pi  # of a head in radians; larger angles are degrees
 
 
 class _Timecode(NamedTuple):
-    """Timecode of a frame: whole seconds since midnight, and frames after the last whole second."""
+    """Timecode of a frame: seconds since midnight, and frames after them."""
 
-    seconds: int
+    seconds: float
     frames: float
 
 
@@ -57,54 +74,66 @@ class _CaptureTable(NamedTuple):
 def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
-    Columns are identified by name, in any order: Timecode, blend shapes, and angles [rad] HeadPitch, HeadYaw
-    and HeadRoll about the head's x, y and z axes, likewise LeftEye... and RightEye.... They rotate the bones
-    found by `find_rotation_bones`.
+    Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise LeftEye... and RightEye....
+    They rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or tabs.
+    Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
+    converted, each with a note.
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
 
     Raises DermisError for a file with other columns or invalid lines, which it names.
     """
     table = _read_table(path, fps)
-    shapes = [k for k, name in enumerate(table.names) if name.casefold() not in _ANGLE_COLUMNS]
+    is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in table.names])
     bones = find_rotation_bones(head.control.skeleton)
     angles, unused = _bone_angles(table, bones)
-    names = tuple(table.names[k] for k in shapes)
-    samples = CaptureSamples(table.times_s, names, table.values[:, shapes], angles, unused)
+    names = tuple(name for name, angle in zip(table.names, is_angle, strict=True) if not angle)
+    samples = CaptureSamples(table.times_s, names, table.values[:, ~is_angle], angles, unused)
     return capture_clip(path, path.stem, samples, head)
 
 
 def _read_table(path: Path, fps: float | None) -> _CaptureTable:
     expected = "a CSV of Live Link Face"
-    reader = csv.reader(io.StringIO(read_text(path, expected, MAX_CLIP_BYTES), newline=""))
+    text = read_text(path, expected, MAX_CLIP_BYTES)
+    separator = column_separator(next(filter(str.strip, io.StringIO(text)), ""))
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     with parsing(path, expected, csv.Error):
         header = [cell.strip() for cell in next(filter(_has_text, reader), [])]
         if not header:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
         _check_header(f"{path}, line {reader.line_num}", header)
-        folded = [name.casefold() for name in header]
-        columns = [k for k, name in enumerate(folded) if name not in (_TIME_COLUMN, _COUNT_COLUMN, "")]
-        lines: list[int] = []
-        codes: list[_Timecode] = []
-        rows: list[Doubles] = []
+        keys = [plain_key(name) for name in header]
+        columns = [k for k, key in enumerate(keys) if key not in _OTHER_COLUMNS]
+        time = next((keys.index(key) for key in (*_TIME_COLUMNS, *FRAME_KEYS) if key in keys), None)
+        count = keys.index(_COUNT_COLUMN) if _COUNT_COLUMN in keys else None
+        lines, times, rows, counted = [], [], [], []
         for row in filter(_has_text, reader):
             culprit = f"{path}, line {reader.line_num}"
-            _check_row(culprit, header, row)
-            lines.append(reader.line_num)
-            codes.append(_timecode(culprit, row[folded.index(_TIME_COLUMN)]))
+            _check_row(culprit, header, row, count)
+            lines.append(culprit)
+            times.append("" if time is None else row[time].strip().replace(",", "."))
+            counted.append(count is not None and row[count].strip() not in ("", "0"))
             rows.append(_row_values(culprit, header, row, columns))
             check_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
-    times = _row_times(path, lines, codes, fps)
-    return _CaptureTable([header[k] for k in columns], times, np.array(rows))
+    times_s = _row_times(path, lines, times, None if time is None else keys[time], fps)
+    names = [header[k] for k in columns]
+    return _complete_table(path, lines, _CaptureTable(names, times_s, np.array(rows)), np.array(counted))
 
 
 def _has_text(row: Sequence[str]) -> bool:
     return any(map(str.strip, row))
 
 
-def _check_row(culprit: str, header: Sequence[str], row: Sequence[str]) -> None:
+def _check_row(culprit: str, header: Sequence[str], row: list[str], count: int | None) -> None:
+    """Refuse a row with too many or too few cells; one that counts no blend shapes is completed.
+
+    count : column of the number of blend shapes
+    """
+    if count is not None and count < len(row) < len(header) and row[count].strip() == "0":
+        row += [""] * (len(header) - len(row))
     if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
         refuse(culprit, f"{len(header)} cells", f"got {len(row)}", "Correct or remove the line")
 
@@ -112,54 +141,109 @@ def _check_row(culprit: str, header: Sequence[str], row: Sequence[str]) -> None:
 def _check_header(culprit: str, header: Sequence[str]) -> None:
     check_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
-    if _TIME_COLUMN not in folded:
-        actual = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
-        refuse(culprit, "a column Timecode", actual, "Export it from Live Link Face as it is")
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:
         refuse(culprit, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
-    if not set(folded) - {_TIME_COLUMN, _COUNT_COLUMN}:
+    if all(plain_key(name) in _OTHER_COLUMNS for name in header):
         refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
 
 
 def _row_values(culprit: str, header: Sequence[str], row: Sequence[str], columns: Sequence[int]) -> Doubles:
-    values = np.zeros(len(columns))
+    """Return the values of a row, NaN for empty cells; numbers may have a decimal comma."""
+    values = np.full(len(columns), np.nan)
     for index, column in enumerate(columns):
+        cell = row[column].strip()
         try:
-            values[index] = float(row[column])
+            values[index] = float(cell.replace(",", ".") or "nan")
         except ValueError:
-            actual = f"{header[column]} is {row[column]!r}"
-            refuse(culprit, "numbers", actual, "Correct or remove the line")
-    check_weights(culprit, [header[column] for column in columns], values)
+            refuse(culprit, "numbers", f"{header[column]} is {cell!r}", "Correct or remove the line")
     return values
 
 
-def _timecode(culprit: str, cell: str) -> _Timecode:
-    match = _TIMECODE.fullmatch(cell.strip())
-    if match is None:
-        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {cell!r}", "Correct or remove the line")
-    hours, minutes, seconds = (int(match[k]) for k in (1, 2, 3))
-    return _Timecode(3600 * hours + 60 * minutes + seconds, float(match[4]))
+def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted: Mask) -> _CaptureTable:
+    """Return a table without gaps, with weights as fractions and angles in radians.
+
+    lines : name of each row, for errors
+    counted : (k,) whether each row counts its blend shapes
+    """
+    values, names = table.values, table.names
+    is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
+    lost = _rows_without_face(values, is_angle, counted)
+    values[lost] = np.nan
+    empty = np.isnan(values).all(axis=0)
+    if empty.all():
+        refuse(path, "frames with a face", "all rows are empty", "Record it again")
+    if empty.any():
+        left_out = ", ".join(name for name, none in zip(names, empty, strict=True) if none)
+        notify(f"{path}: columns without values are left out: {left_out}")
+    names, values, is_angle = [names[k] for k in np.flatnonzero(~empty)], values[:, ~empty], is_angle[~empty]
+    note_lost_frames(path, int(lost.sum()), len(lost))
+    if cells := np.isnan(values[~lost]).sum():
+        notify(f"{path}: {cells} empty cells are interpolated between those of other frames")
+    values[:, ~is_angle] = to_fractions(path, values[:, ~is_angle])
+    if np.nanmax(np.abs(values[:, is_angle]), initial=0.0) > _MAX_ANGLE:
+        notify(f"{path}: its angles are taken as degrees")
+        values[:, is_angle] = np.radians(values[:, is_angle])
+    check_weights(lines, names, values)
+    return _CaptureTable(names, table.times_s, fill_gaps(table.times_s, values))
 
 
-def _row_times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
+def _rows_without_face(values: Doubles, is_angle: Mask, counted: Mask) -> Mask:
+    """Return which rows (k,) show no face: those that are empty, or zero where a face is never zero.
+
+    Faces are never zero if most other rows have a turned head, or if others count their blend shapes.
+    """
+    numbers = np.nan_to_num(values)
+    zero = ~numbers.any(axis=1)
+    turned = numbers[:, is_angle].any(axis=1)
+    always_turned = bool(turned[~zero].sum() > 0.5 * (~zero).sum())
+    return np.isnan(values).all(axis=1) | (zero & (always_turned | (~counted & counted.any())))
+
+
+def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, fps: float | None) -> Doubles:
     """Return the time of each row [s]; times continue to increase when the timecode passes midnight.
 
-    lines : line number of each row in the file, for errors
-    codes : timecode of each row
+    lines : name of each row, for errors
+    cells : time of each row: a timecode or a number, as text
+    key : plain name of the column of times or frame numbers; None for none
     fps : frame rate of the timecode; None to estimate it
     """
-    rate = fps or _timecode_rate(codes)
-    times = np.array([code.seconds + code.frames / rate for code in codes])
-    days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
-    times += _DAY_S * days
+    if key is None:
+        return np.arange(len(lines)) / assumed_rate(path, fps, _APP_RATE)
+    if any(":" in cell for cell in cells):
+        codes = [_timecode(line, cell) for line, cell in zip(lines, cells, strict=True)]
+        rate = fps or _timecode_rate(codes)
+        times = np.array([code.seconds + code.frames / rate for code in codes])
+        days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
+        times += _DAY_S * days
+    else:
+        times = np.array([_plain_time(line, cell) for line, cell in zip(lines, cells, strict=True)])
+        if key in FRAME_KEYS:
+            times = times / assumed_rate(path, fps, _APP_RATE)
+        else:
+            times = to_seconds(path, times, _TIME_COLUMNS[key])
     backwards = np.flatnonzero(np.diff(times) < 0)
     if len(backwards):
         row = int(backwards[0]) + 1
         actual = f"this line is {times[row - 1] - times[row]:.3f} s before the previous one"
-        culprit = f"{path}, line {lines[row]}"
-        refuse(culprit, "increasing Timecodes", actual, "Sort the lines, or remove this one")
+        refuse(lines[row], "increasing Timecodes", actual, "Sort the lines, or remove this one")
     return times
+
+
+def _timecode(culprit: str, cell: str) -> _Timecode:
+    match = _TIMECODE.fullmatch(cell)
+    if match is None:
+        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {cell!r}", "Correct or remove the line")
+    hours, minutes, seconds, frames = match.groups(default="0")
+    return _Timecode(3600 * int(hours) + 60 * int(minutes) + float(seconds), float(frames))
+
+
+def _plain_time(culprit: str, cell: str) -> float:
+    try:
+        return checked_number(culprit, float(cell), -MAX_TIME, MAX_TIME)
+    except ValueError:
+        actual = f"got {cell!r}"
+        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff, or a number", actual, "Correct or remove the line")
 
 
 def _timecode_rate(codes: Sequence[_Timecode]) -> float:
@@ -175,7 +259,7 @@ def _timecode_rate(codes: Sequence[_Timecode]) -> float:
 
 def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
     """Return angles (k, 3) by bone name [degrees], and the angle columns for which the head has no bone."""
-    columns = {name.casefold(): k for k, name in enumerate(table.names)}
+    columns = {plain_key(name): k for k, name in enumerate(table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []
     for part in _ROTATED_OBJECTS:

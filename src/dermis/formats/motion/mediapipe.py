@@ -1,134 +1,215 @@
-"""Captures of MediaPipe's face landmarker: one line of JSON per frame."""
+"""Captures of MediaPipe's face landmarker: one result per frame in JSON, as its APIs return them."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base import quantities
 from dermis.base.arrays import Doubles, Intp
-from dermis.base.errors import format_value, refuse
+from dermis.base.errors import DermisError, format_value, notify, refuse
+from dermis.base.quantities import checked_array, checked_number
 from dermis.base.reading import parse_json, read_text
 from dermis.formats.motion.captures import (
+    FRAME_KEYS,
     MAX_CLIP_BYTES,
+    MAX_TIME,
+    NEUTRAL_SCORE,
+    TIME_UNITS,
     CaptureSamples,
+    RotationBones,
+    assumed_rate,
     capture_clip,
     check_size,
     check_weights,
+    fill_gaps,
     find_rotation_bones,
     head_bone_angles,
+    note_lost_frames,
+    plain_key,
     rotation_quaternions,
+    to_fractions,
+    to_seconds,
 )
-from dermis.mesh.clip import Clip
+from dermis.mesh.clip import Clip, check_rate
 from dermis.mesh.head import Head
 
-_TIME_KEYS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
-_SHAPE_KEYS = ("blendshapes", "face_blendshapes", "faceBlendshapes")
-_MATRIX_KEYS = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
-_NEUTRAL_SCORE = "_neutral"  # score of the neutral face, not a blend shape
-_MAX_TIME_MS = 1e15  # milliseconds
+_SHAPE_KEYS = ("blendshapes", "faceblendshapes")
+_MATRIX_KEYS = (
+    "matrix",
+    "facialtransformationmatrix",
+    "facialtransformationmatrixes",
+    "facialtransformationmatrices",
+)
+_FACE_KEYS = ("faces", "landmarks", "facelandmarks")
+"""Plain keys of lists with one entry for each face, of which those of landmarks are not used."""
+_LIST_KEYS = ("categories", "classification")
+_DATA_KEYS = ("data", "packeddata", "value")
+_NAME_KEYS = ("categoryname", "label", "name", "displayname")
+_SCORE_KEYS = ("score", "value", "weight")
+_RATE_KEYS = ("fps", "framerate")
+_DEFAULT_RATE = 30.0
 _MAX_MATRIX_VALUE = 1e6
+_EXPECTED = "results of MediaPipe in JSON"
 _LINE_ADVICE = "Correct or remove the line"
+_RECORD_ADVICE = "Record with output_face_blendshapes (JavaScript: outputFaceBlendshapes) set to true"
 
 
 class _CapturedFrame(NamedTuple):
     """Blend shape weights of one captured frame.
 
-    line : line number in the file
-    seconds : time of the frame [s]
-    columns, weights : (n,) indices of the blend shapes of the frame, and their weights
+    culprit : file with line or number of the frame, for errors
+    number : number of the frame
+    time : time of the frame in units of `unit` [s], or in an unknown unit if that is None; NaN if it has none
+    columns, weights : (n,) indices of the blend shapes of the frame, and their weights; empty without a face
     matrix : (4, 4) facial transformation; None if the frame has none
+    faces : number of faces
     """
 
-    line: int
-    seconds: float
+    culprit: str
+    number: float
+    time: float
+    unit: float | None
     columns: Intp
     weights: Doubles
     matrix: Doubles | None
+    faces: int
 
 
 def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
-    """Load lines of JSON with one frame each as a clip for a head.
+    """Load results of MediaPipe's face landmarker as a clip for a head.
 
-    Each line has "time" [s] or "timestamp_ms", "blendshapes" as {name: score} or as MediaPipe's list of
-    {"categoryName", "score"}, and optionally "matrix", the facial transformation (4, 4), which rotates the
-    bones found by `find_rotation_bones`. Frames without blend shapes, in which no face was found, are
-    skipped.
+    The file has one result per line, a list of them, or an object with such a list. Keys are those of any
+    API, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or a list of names and
+    scores for each face; facial transformations (4, 4) are nested or flat lists or objects with data, and
+    rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
+    first face is used. Frames without a face are interpolated. Notes say what was assumed.
 
-    fps : frame rate if the lines have no time
+    fps : frame rate if the frames have no time; by default that of the file, or 30
 
-    Raises DermisError for a file without frames, and for invalid lines, which it names.
+    Raises DermisError for a file without a face, and for invalid frames, which it names.
     """
+    rate, records = _read_records(path)
     columns: dict[str, int] = {}
-    rows = list(_captured_frames(path, fps, columns))
-    if not rows:
-        refuse(path, "lines of JSON with blend shapes", "there are none", "Record it again")
-    _check_order(path, rows)
-    names, weights = tuple(columns), np.zeros((len(rows), len(columns)))
-    for index, row in enumerate(rows):
-        weights[index, row.columns] = row.weights
-    matrices = [row.matrix for row in rows if row.matrix is not None]
-    bones = find_rotation_bones(head.control.skeleton)
-    angles: dict[str, Doubles] = {}
-    unused: tuple[str, ...] = ()
-    if matrices and bones.head:
-        angles = head_bone_angles(bones, rotation_quaternions(_fill_matrices(rows)))
-    elif matrices:
-        unused = ("matrix",)
-    samples = CaptureSamples(np.array([row.seconds for row in rows]), names, weights, angles, unused)
+    frames: list[_CapturedFrame] = []
+    record: object = None
+    for index, (culprit, record) in enumerate(records):
+        frames.append(_parse_frame(culprit, index, record, columns))
+        check_size(path, len(frames), len(columns))
+    lost, several = sum(frame.faces == 0 for frame in frames), sum(frame.faces > 1 for frame in frames)
+    if lost == len(frames):
+        found = ", ".join(record) if isinstance(record, dict) and record else "nothing"
+        actual = f"no frame has any (the last one has {found})"
+        refuse(path, f"{_EXPECTED} with blendshapes", actual, _RECORD_ADVICE)
+    note_lost_frames(path, lost, len(frames))
+    if several:
+        notify(f"{path}: {several} of {len(frames)} frames show several faces; the first one is used")
+    times, names = _frame_times(path, frames, fps or rate), tuple(columns)
+    weights = np.full((len(frames), len(columns)), np.nan)
+    for row, frame in zip(weights, frames, strict=True):
+        if len(frame.columns):
+            row[:] = 0.0
+            row[frame.columns] = frame.weights
+    weights = to_fractions(path, weights)
+    check_weights([frame.culprit for frame in frames], names, weights)
+    angles, unused = _head_angles(path, frames, times, find_rotation_bones(head.control.skeleton))
+    samples = CaptureSamples(times, names, fill_gaps(times, weights), angles, unused)
     return capture_clip(path, path.stem, samples, head)
 
 
-def _captured_frames(path: Path, fps: float | None, columns: dict[str, int]) -> Iterator[_CapturedFrame]:
-    """Yield the frames in which a face was found, those with blend shapes.
+def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
+    """Return the frame rate that a file states, and its frames, each with its name for errors."""
+    text = read_text(path, _EXPECTED, MAX_CLIP_BYTES)
+    lines = ((f"{path}, line {k}", line) for k, line in enumerate(io.StringIO(text), 1) if line.strip())
+    first, second = next(lines, None), next(lines, None)
+    if first is None:
+        refuse(path, _EXPECTED, "it is empty", "Record it again")
+    try:
+        document = parse_json(first[1], first[0], _EXPECTED)
+    except DermisError:
+        if second is None:
+            raise
+        document = parse_json(text, path, _EXPECTED)  # written over several lines
+    else:
+        if second is not None:
+            rest = ((name, parse_json(line, name, _EXPECTED)) for name, line in chain([second], lines))
+            return None, chain([(first[0], document)], rest)
+    fields = _plain_fields(document)
+    rate = next((check_rate(f"{path}: {key}", fields[key]) for key in _RATE_KEYS if key in fields), None)
+    return rate, ((f"{path}, frame {k}", record) for k, record in enumerate(_frame_list(document), 1))
+
+
+def _plain_fields(record: object) -> dict[str, object]:
+    return {plain_key(key): value for key, value in record.items()} if isinstance(record, dict) else {}
+
+
+def _frame_list(document: object) -> list[object]:
+    """Return the frames of a document: a list, the longest list in an object, or the document itself."""
+    if isinstance(document, list):
+        is_frame = bool(document) and isinstance(document[0], dict) and bool(document[0].keys() & _SCORE_KEYS)
+        return [document] if is_frame else document
+    fields = _plain_fields(document)
+    lists = [value for key, value in fields.items() if isinstance(value, list) and key not in _FACE_KEYS]
+    lists = [value for value in lists if any(isinstance(item, dict | list) for item in value)]
+    is_frame = bool(fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS})
+    return [document] if is_frame or not lists else max(lists, key=len)
+
+
+def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, int]) -> _CapturedFrame:
+    """Return a frame, without faces if the record has neither blend shapes nor a facial transformation.
 
     columns : column index by blend shape name; names that are not in it are added
     """
-    count = 0
-    for number, line in enumerate(io.StringIO(read_text(path, "lines of JSON", MAX_CLIP_BYTES)), start=1):
-        if line.strip():
-            row = _parse_frame(f"{path}, line {number}", number, line, fps, columns)
-            count += len(row.columns) > 0
-            check_size(path, count, len(columns))
-            if len(row.columns):
-                yield row
-
-
-def _parse_frame(
-    culprit: str, number: int, line: str, fps: float | None, columns: dict[str, int]
-) -> _CapturedFrame:
-    record = parse_json(line, culprit, "an object in JSON")
-    if not isinstance(record, dict):
-        refuse(culprit, "an object in JSON", f"got {line.strip():.40}", _LINE_ADVICE)
-    shapes = next((record[key] for key in _SHAPE_KEYS if key in record), None)
-    if shapes is None:
-        actual = f"it has {', '.join(record) or 'nothing'}"
-        refuse(culprit, "blendshapes", actual, _LINE_ADVICE)
-    matrix = next((record[key] for key in _MATRIX_KEYS if record.get(key) is not None), None)
-    seconds = _frame_seconds(culprit, number, record, fps)
-    scores = _shape_scores(culprit, shapes)
-    indices = np.array([columns.setdefault(name, len(columns)) for name in scores], np.intp)
-    weights = np.fromiter(scores.values(), np.float64, len(scores))
-    check_weights(culprit, list(scores), weights)
+    if isinstance(record, list):
+        record = {"blendshapes": record}
+    if not isinstance(record, dict | None):
+        refuse(culprit, "an object in JSON", f"got {format_value(record)}", _LINE_ADVICE)
+    fields = _plain_fields(record)
+    for value in tuple(fields.values()):  # a result in the record
+        if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
+            fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
+    shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
+    matrix = next((fields[key] for key in _MATRIX_KEYS if key in fields), None)
+    transformation = _facial_transformation(culprit, matrix)
+    scores = _shape_scores(culprit, shapes or {})
+    key = next((key for key in TIME_UNITS if fields.get(key) is not None), "")
+    number = next((fields[key] for key in FRAME_KEYS if key in fields), index)
+    listed = fields.get("faces")
+    faces = max(faces, len(listed) if isinstance(listed, list) else 0)
     return _CapturedFrame(
-        number, seconds, indices, weights, None if matrix is None else _facial_transformation(culprit, matrix)
+        culprit,
+        checked_number(f"{culprit}: frame", number, -MAX_TIME, MAX_TIME),
+        checked_number(f"{culprit}: {key}", fields[key], -MAX_TIME, MAX_TIME) if key else np.nan,
+        TIME_UNITS.get(key, 1.0),
+        np.array([columns.setdefault(name, len(columns)) for name in scores], np.intp),
+        np.fromiter(scores.values(), np.float64, len(scores)),
+        transformation,
+        faces if scores or transformation is not None else 0,
     )
 
 
-def _frame_seconds(culprit: str, number: int, record: Mapping[str, object], fps: float | None) -> float:
-    for key, scale in _TIME_KEYS.items():
-        if key in record:
-            return scale * quantities.checked_number(
-                f"{culprit}: {key}", record[key], -_MAX_TIME_MS, _MAX_TIME_MS
-            )
-    if fps is None:
-        refuse(culprit, f"a time ({', '.join(_TIME_KEYS)})", "it has none", "Set the frame rate (fps)")
-    return (number - 1) / fps
+def _first_face(value: object) -> tuple[object, int]:
+    """Return the blend shapes of the first face, None for no face, and the number of faces.
+
+    value : blend shapes of a face, an object with a list of them, or a list of either
+    """
+    faces = 1
+    while True:
+        if isinstance(value, dict) and _is_list_object(value):
+            value = next(item for key, item in value.items() if key in (*_LIST_KEYS, "value"))
+        elif isinstance(value, list) and value and (isinstance(value[0], list) or _is_list_object(value[0])):
+            faces, value = max(faces, len(value)), value[0]
+        else:
+            return value, faces
+
+
+def _is_list_object(value: object) -> bool:
+    """Return whether a value is an object that holds a list: one of categories, or an Optional of Java."""
+    return isinstance(value, dict) and (bool(value.keys() & _LIST_KEYS) or value.keys() == {"value"})
 
 
 def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
@@ -137,49 +218,91 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
     shapes : {name: score}, or MediaPipe's list of {"categoryName", "score"}
     """
     if isinstance(shapes, list):
-        categories = [item if isinstance(item, dict) else {} for item in shapes]
-        names = [item.get("categoryName", item.get("category_name")) for item in categories]
-        if None in names or any("score" not in item for item in categories):
+        categories = [_plain_fields(item) for item in shapes]
+        names = [next((item[key] for key in _NAME_KEYS if item.get(key)), None) for item in categories]
+        scores = [next((item[key] for key in _SCORE_KEYS if key in item), None) for item in categories]
+        if None in names or None in scores:
             refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _LINE_ADVICE)
-        shapes = {str(name): item["score"] for name, item in zip(names, categories, strict=True)}
+        shapes = {str(name): score for name, score in zip(names, scores, strict=True)}
     if not isinstance(shapes, dict):
         refuse(culprit, "blendshapes by name or as a list", f"got {format_value(shapes)}", _LINE_ADVICE)
     for name, score in shapes.items():
         if type(score) not in (int, float):
             refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
-    return {name: score for name, score in shapes.items() if name != _NEUTRAL_SCORE}
+    return {name: score for name, score in shapes.items() if name != NEUTRAL_SCORE}
 
 
-def _facial_transformation(culprit: str, value: object) -> Doubles:
-    """Return a facial transformation (4, 4), which may be stored by rows or by columns, nested or flat.
+def _facial_transformation(culprit: str, value: object) -> Doubles | None:
+    """Return the facial transformation (4, 4) of the first face, None if there is none.
 
-    The column with the translation is the last one of the result.
+    The column with the translation is the last one of the result. Without a translation, flat lists of an API
+    are taken by columns, as they are there.
+
+    value : matrix as a nested or flat list, an object with it, or a list of either
     """
+    by_columns = False
+    while isinstance(value, dict) or (isinstance(value, list) and value and not _is_row(value[0])):
+        by_columns = True
+        if isinstance(value, dict):
+            fields = _plain_fields(value)
+            by_columns = fields.get("layout") != "ROW_MAJOR"
+            value = next((fields[key] for key in _DATA_KEYS if key in fields), [*fields.values()])
+        else:
+            value = value[0]
+    if not value:
+        return None
     flat = isinstance(value, list) and not any(isinstance(row, list) for row in value)
     shape = (16,) if flat else (4, 4)
-    matrix = quantities.checked_array(
-        f"{culprit}: matrix", value, shape, -_MAX_MATRIX_VALUE, _MAX_MATRIX_VALUE
-    ).reshape(4, 4)
+    limit = _MAX_MATRIX_VALUE
+    matrix = checked_array(f"{culprit}: matrix", value, shape, -limit, limit).reshape(4, 4)
     if not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
         refuse(culprit, "an invertible matrix", "its determinant is 0", _LINE_ADVICE)
-    return matrix.T if matrix[3, :3].any() and not matrix[:3, 3].any() else matrix
+    last_row, last_column = np.abs(matrix[3, :3]).max(), np.abs(matrix[:3, 3]).max()
+    no_translation = last_row == last_column == 0
+    return matrix.T if last_row > last_column or (no_translation and flat and by_columns) else matrix
 
 
-def _fill_matrices(rows: list[_CapturedFrame]) -> list[Doubles]:
-    """Return the facial transformation of each frame; one without gets that of the nearest earlier frame.
-
-    Frames before the first transformation get the first one.
-    """
-    last = next(row.matrix for row in rows if row.matrix is not None)
-    matrices = []
-    for row in rows:
-        last = last if row.matrix is None else row.matrix
-        matrices.append(last)
-    return matrices
+def _is_row(value: object) -> bool:
+    """Return whether the first entry of a list belongs to a matrix, and is not a matrix itself."""
+    is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
+    return not is_nested and not isinstance(value, dict)
 
 
-def _check_order(path: Path, rows: list[_CapturedFrame]) -> None:
-    for before, after in pairwise(rows):
-        if after.seconds < before.seconds:
-            actual = f"{after.seconds:g} s comes after {before.seconds:g} s"
-            refuse(f"{path}, line {after.line}", "increasing times", actual, "Sort the lines")
+def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None) -> Doubles:
+    """Return the times of the frames (k,), which do not decrease [s]."""
+    times = np.array([frame.time for frame in frames])
+    missing = np.isnan(times)
+    if missing.all():
+        times = np.array([frame.number for frame in frames]) / assumed_rate(path, fps, _DEFAULT_RATE)
+    else:
+        unstated = np.array([frame.unit is None for frame in frames])
+        times *= [frame.unit or 1.0 for frame in frames]
+        if unstated.any():
+            times[unstated] = to_seconds(path, times[unstated], None)
+        if missing.any():
+            notify(f"{path}: {missing.sum()} of {len(frames)} frames have no time; it is interpolated")
+        times = fill_gaps(np.arange(len(frames)), times[:, None])[:, 0]
+    for (before, after), frame in zip(pairwise(times.tolist()), frames[1:], strict=True):
+        if after < before:
+            actual = f"{after:g} s comes after {before:g} s"
+            refuse(frame.culprit, "increasing times", actual, "Sort the lines")
+    return times
+
+
+def _head_angles(
+    path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
+) -> tuple[dict[str, Doubles], tuple[str, ...]]:
+    """Return angles (k, 3) by bone name [degrees], and what the head has no bone for."""
+    matrices = [frame.matrix for frame in frames if frame.matrix is not None]
+    if not matrices or not bones.head:
+        return {}, ("bone for the matrix",) if matrices else ()
+    found = np.array([frame.matrix is not None for frame in frames])
+    if missing := sum(frame.faces > 0 and frame.matrix is None for frame in frames):
+        interpolated = "the turn of the head is interpolated"
+        notify(f"{path}: {missing} of {len(frames)} frames have no matrix; {interpolated}")
+    angles: dict[str, Doubles] = {}
+    for name, rows in head_bone_angles(bones, rotation_quaternions(matrices)).items():
+        angles[name] = np.full((len(frames), 3), np.nan)
+        angles[name][found] = rows
+        angles[name] = fill_gaps(times, angles[name])
+    return angles, ()
