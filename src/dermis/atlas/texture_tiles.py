@@ -60,7 +60,7 @@ def base_texture(material: FileMaterial) -> Texture | None:
 def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.integer]) -> Doubles:
     """Return uv coordinates of vertices as in the file (n, 2), with v down."""
     uv: Floats = mesh.uv if uv_set == 0 else surface.other_uv[uv_set]
-    return uv[vertices].astype(np.float64)
+    return np.asarray(uv[vertices], np.float64)
 
 
 def lay_out_tiles(

@@ -15,7 +15,7 @@ from dermis.scene.head_table import HeadTable
 
 HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
 """Option names by field of the [head] table, where they differ from the name of the field."""
-_SHAPE_FIELDS = "unit_mm", "v_origin", "up", "opaque", "eyes", "eye_groups"
+_SHAPE_FIELDS = "unit_mm", "v_origin", "up", "front", "skin_groups", "opaque", "eyes", "eye_groups"
 _MAP_FIELDS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,10 +44,10 @@ def with_factors(maps: Maps, material: FileMaterial, given: Collection[str]) -> 
 
     given : roles of maps that users replace, to which the factors do not apply
     """
-    changed: dict[str, Floats] = {}
+    changed: dict[str, Any] = {}
     if material.maps is None and "colour" not in given and material.colour not in (None, (1.0, 1.0, 1.0)):
         white = np.ones((1, 1, 3), np.float32)
-        changed["colour"] = (white if maps.colour is None else maps.colour) * np.float32(material.colour)
+        changed["colour"] = (white if maps.colour is None else maps.colour) * np.array(material.colour, np.float32)
     if maps.normal is not None and "normal" not in given and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
     if material.maps is None and "roughness" not in given and "roughness" in material.textures:
@@ -150,11 +150,33 @@ def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bo
     )
 
 
-def unused_properties(materials: Sequence[FileMaterial], used: Sequence[int], path: Path) -> str:
-    """Return the note on properties of materials that have no effect; empty for none."""
-    listed = [
-        f"{materials[index].name!r}: {', '.join(dict.fromkeys(materials[index].unused))}"
-        for index in sorted(set(used))
-        if index >= 0 and materials[index].unused
-    ]
-    return "\n  ".join(["properties of materials that are not drawn:", *listed]) if listed else ""
+def unused_properties(mesh: Mesh, materials: Sequence[FileMaterial], in_file: Sequence[int]) -> str:
+    """Return the note on properties of a file's materials that are not drawn; empty for none.
+
+    in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    """
+    lines = dict[str, None]()
+    for material, index in zip(mesh.materials, in_file, strict=True):
+        own = materials[index] if index >= 0 else FileMaterial()
+        unused = list(own.unused)
+        if material.kind == "skin" and own.maps is None:
+            unused += _replaced_by_skin(own)
+        if unused:
+            lines[f"{own.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
+    return "\n  ".join(["not drawn, or replaced by the properties of skin:", *lines]) if lines else ""
+
+
+def _replaced_by_skin(material: FileMaterial) -> list[str]:
+    """Return the properties of a material that skin has itself."""
+    replaced = []
+    if "roughness" not in material.textures and material.roughness not in (None, 1.0):
+        replaced.append(f"roughness {material.roughness:g}")
+    if material.metalness not in (0.0, 1.0) or "metalness" in material.textures:
+        replaced.append("metalness")
+    if max(material.emission) > 0.0 or "emission" in material.textures:
+        replaced.append("emission")
+    if material.alpha_mode != "opaque":
+        replaced.append(f"opacity ({material.alpha_mode})")
+    if material.is_unlit:
+        replaced.append("unlit colours, taken for the reflectance")
+    return replaced

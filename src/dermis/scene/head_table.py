@@ -6,9 +6,10 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dermis.base.errors import format_value, refuse
+from dermis.formats.axes import Axis, Front
 from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.mesh.eye_look import EYE_LOOK_RANGES
 from dermis.scene.field_errors import InvalidFieldsError, Keywords, Reason
@@ -23,7 +24,6 @@ _Unit = Annotated[
     float | None, Field(ge=1e-3, le=1e6), Reason("mm: files count in micrometres to kilometres")
 ]
 VOrigin = Literal["auto", "top", "bottom"]
-UpAxis = Literal["y", "z"]
 NormalY = Literal["up", "down"]
 AUTO: Final = "auto"
 NO_REGIONS = "none"
@@ -75,17 +75,22 @@ class HeadTable(FrozenModel):
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
     unit_mm: _Unit = None
-    """Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out."""
+    """Length of the file's unit [mm]; when left out 1000 for glTF, for OBJ and PLY a guess from the size."""
     v_origin: VOrigin = "auto"
     """Row of the maps at v = 0; "auto" follows the format."""
-    up: UpAxis = "y"
+    up: Axis = "y"
     """Upward axis of the file."""
+    front: Front = "auto"
+    """Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z."""
     normal_y: NormalY = "up"
     """Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX)."""
+    skin_groups: tuple[str, ...] = ()
+    """Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
+    own materials. When left out they are found by their names, or by what covers the head, and a note lists
+    them."""
     opaque: tuple[str, ...] = ()
-    """Groups of the file without subsurface scattering, such as teeth or clothes. If a group has skin in its
-    name, all others are opaque already; else all groups are skin. Two balls in groups named as eyes become
-    the package's eyes and need not be listed."""
+    """Groups of the file that are not skin, such as teeth or clothes, where those found are wrong. Two balls
+    in groups named as eyes become the package's eyes and need not be listed."""
     eyes: EyeMode = "fitted"
     """Eyeballs of a file (groups named eyes, Eye_L, cornea ...): "fitted" replaces them by the package's."""
     eye_groups: tuple[str, ...] = ()
@@ -100,6 +105,12 @@ class HeadTable(FrozenModel):
     """Roughness and strength by region of the face: "auto" uses the package's table if the regions are known
     and the head has no roughness map, "none" one value everywhere; "default" is the package's table (an
     artist's), a TOML file is your own, and both then set rho_s too."""
+
+    @model_validator(mode="after")
+    def _check_axes(self) -> HeadTable:
+        if self.front[-1] == self.up[-1]:
+            raise ValueError("a front across up, such as up z and front -y")
+        return self
 
 
 def has_region_table(table: Mapping[str, Any]) -> bool:

@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-from dermis.base.errors import format_value, notify, refuse
+from dermis.base.errors import format_value, refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import is_file
 from dermis.formats.axes import Axis, Front
-from dermis.formats.gltf.embedded import embedded_eye_look, embedded_materials
-from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.formats.maps import load_maps
-from dermis.formats.materials import FileMaterial
-from dermis.formats.obj import obj_maps
-from dermis.formats.parts import is_gltf
-from dermis.formats.samples import SAMPLES, Sample, fetch_sample
-from dermis.formats.units import with_settled_unit
+from dermis.formats.samples import SAMPLES
 from dermis.human.regions.apply import with_default_regions
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.head import Head
-from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.file_surfaces import direct_material, with_factors, with_file_textures
+from dermis.scene.file_heads import MapFile, MapOptions, load_file_head
 from dermis.scene.head_table import (
     AUTO,
     EyeMode,
@@ -44,7 +35,6 @@ from dermis.scene.smoothness import Subdivide, SubdivisionLevels, resolve_levels
 if TYPE_CHECKING:
     from dermis.human.person import Human
 
-MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
 _MAX_SEED_DIGITS = 20
 MIN_HUMAN_LEVELS = 1
@@ -67,6 +57,7 @@ def load_head(
     up: Axis = "y",
     front: Front = "auto",
     normal_y: NormalY = "up",
+    skin_groups: Sequence[str] | str = (),
     opaque: Sequence[str] | str = (),
     eyes: EyeMode = "fitted",
     eye_groups: Sequence[str] | str = (),
@@ -89,8 +80,8 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the file's unit [mm]; by default 1000 for glTF. OBJ and PLY do not state one: then it is 1 if that
-        makes the mesh 100 to 1000 mm large, else a guess from the size, with a note.
+        Length of the file's unit [mm]; by default 1000 for glTF. For OBJ and PLY, which state none, it is 1 if
+        the mesh is then 100 to 1000 mm large, else a guess from the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
     up : {"y", "z", "x", "-y", "-z", "-x"}
@@ -99,9 +90,12 @@ def load_head(
         Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
+    skin_groups : str or sequence of str
+        Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
+        own materials. By default they are found by their names, or by what covers the head.
     opaque : str or sequence of str
-        Groups of the file without subsurface scattering. If a group has skin in its name, all others are
-        opaque already. Two balls in groups named as eyes become the package's eyes and need not be listed.
+        Groups of the file that are not skin, where those found are wrong. Two balls in groups named as eyes
+        become the package's eyes and need not be listed.
     eyes : {"fitted", "plain"}
         "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
     eye_groups : str or sequence of str
@@ -142,53 +136,31 @@ def load_head(
     >>> len(dermis.load_head(path, subdivide=0).mesh.triangles)
     2
     """
-    opaque, eye_groups = ((one,) if isinstance(one, str) else one for one in (opaque, eye_groups))
+    groups = {"skin_groups": skin_groups, "opaque": opaque, "eye_groups": eye_groups}
+    named = {key: (one,) if isinstance(one, str) else tuple(one) for key, one in groups.items()}
     name, path = head_name(head), Path(head)
     map_files = {"colour": colour, "normal": normal, "height": height}
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
-    mesh_options: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
-    mesh_options["front"] = front
-    mesh_options["eye_groups"], levels = eye_groups, resolve_levels(subdivide)
+    mesh_options: dict[str, Any] = {
+        "unit_mm": unit_mm,
+        "v_origin": v_origin,
+        "up": up,
+        "front": front,
+        **named,
+    }
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
     check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
-    mesh_options |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
+    levels, relief = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
     if is_person_name(name):
         mesh_options["eyes"] = eyes
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
-    sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
-    materials: tuple[FileMaterial, ...] = ()
-    if sample is not None:
-        _check_sample_kind(sample)
-        files = fetch_sample(name)
-        path = files["mesh"]
-        mesh_options["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
-        mesh_options["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
-        height_mm = sample.height_mm if height_mm is None else height_mm
-    elif not is_file(path):
+    if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
-    elif is_gltf(path):
-        materials, look = embedded_materials(path), embedded_eye_look(path)
-    obj = path if sample is None and path.suffix.lower() == ".obj" else None
-    with ThreadPoolExecutor(1) as pool:
-        if not materials:
-            chosen = _select_map_files(map_files, files)
-            pending_maps = pool.submit(_read_maps, obj, chosen, mesh_options["opaque"], height_mm, normal_y)
-        rigged = load_rigged(path, **mesh_options)
-        rigged = with_settled_unit(rigged, path, mesh_options["unit_mm"], name)
-        if not materials:
-            mesh, (maps, notice) = rigged.mesh, pending_maps.result()
-        else:
-            mesh, maps, height_mm, notice = _file_surfaces(rigged, materials, map_files, height_mm, normal_y)
-    check_relief(height_mm, maps.height, f"{name}: height_mm")
-    for note in rigged.notes:
-        notify(f"{path}: {note}")
-    if notice:
-        notify(notice)
-    credit = f"{sample.attribution}, {sample.licence}" if sample else ""
-    loaded = _subdivide_with_points(Head(name, mesh, maps, credit, rigged.rig), levels)
+    loaded, look = load_file_head(name, mesh_options, relief)
+    coarse, loaded = loaded.mesh, _subdivide_with_points(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
-    return _with_look(with_fitted_eyes(loaded, mesh, look) if eyes == "fitted" else loaded, eye)
+    return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
 
 
 def is_person_name(name: str) -> bool:
@@ -223,66 +195,12 @@ def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
     return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
 
 
-def _read_maps(
-    obj: Path | None,
-    chosen: dict[str, Any],
-    opaque: tuple[str, ...],
-    height_mm: float | None,
-    normal_y: NormalY,
-) -> tuple[Maps, str]:
-    """Load the maps of a head: given files, and those in the materials of an OBJ file for other roles.
-
-    Also returns a note about maps of the materials that are not used, or "".
-    """
-    map_files = {role: file for role, file in chosen.items() if file is not None}
-    loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y)
-    if obj is None:
-        return loaded, ""
-    obj_file_maps, notice = obj_maps(
-        obj, opaque=opaque, overridden=map_files, height_mm=height_mm, normal_y=normal_y
-    )
-    return replace(obj_file_maps, **{role: getattr(loaded, role) for role in map_files}), notice
-
-
-def _file_surfaces(
-    rigged: RiggedMesh,
-    materials: Sequence[FileMaterial],
-    map_files: dict[str, MapFile],
-    height_mm: float | None,
-    normal_y: NormalY,
-) -> tuple[Mesh, Maps, float | None, str]:
-    """Return mesh and maps of a file with materials, the relief of its height map, and a notice.
-
-    map_files : files of maps that replace those of the skin
-    """
-    given = {role: file for role, file in map_files.items() if file is not None}
-    direct = direct_material(rigged, materials)
-    mesh, packed, notes = with_file_textures(rigged, materials, pack_skin=direct is None and not given)
-    files = dict[str, Any]() if direct is None else direct.skin_pictures()
-    if map_files["height"] is None and height_mm is None:
-        height_mm = files.get("height_mm")
-    chosen = _select_map_files(map_files, files)
-    loaded, _ = _read_maps(None, chosen, (), height_mm, normal_y)
-    if direct is not None:
-        loaded = with_factors(loaded, direct, given)
-    maps = replace(
-        packed, **{one.name: own for one in fields(Maps) if (own := getattr(loaded, one.name)) is not None}
-    )
-    return mesh, maps, height_mm, "\n".join(notes)
-
-
 def _refuse_name(name: str) -> NoReturn:
     known = ", ".join(_head_names())
     if name in REMOVED_HEADS:
         actual = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
         refuse(name, f"one of {known} or a mesh file", actual, f"Write {HUMAN} instead")
     refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
-
-
-def _check_sample_kind(sample: Sample) -> None:
-    if sample.kind != "head":
-        hint = f"Use one of {', '.join(_head_names())}"
-        refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
 
 
 @logged_step("making the person")
@@ -332,15 +250,6 @@ def load_person(name: str) -> Human:
         actual = f"got {format_value(words)}"
         refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
     return Human.drawn(int(words))
-
-
-def _select_map_files(map_files: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
-    """Return the file of each map role: the given file, otherwise that of the sample or mesh file.
-
-    map_files, files : files given by the user, and files or embedded maps of the head
-    """
-    chosen = {role: files.get(role) if file is None else file for role, file in map_files.items()}
-    return chosen | {"region": files.get("region")}
 
 
 def _head_names() -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,4 +181,5 @@ def with_default_regions(head: Head) -> Head:
         arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make)
     except DermisError:  # another head with a known name
         return head
-    return replace(head, maps=replace(head.maps, **arrays))
+    changed: dict[str, Any] = dict(arrays)
+    return replace(head, maps=replace(head.maps, **changed))

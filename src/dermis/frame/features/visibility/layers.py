@@ -186,8 +186,15 @@ def _raster_program(device: Device, triangles: bool, has_cutouts: bool) -> Rende
         name = "visibility/visibility_buffer_raster.wgsl" if by_triangle else "visibility/depth_raster.wgsl"
         path, folders = FEATURES_FOLDER / name, shader_folders(*(("CUTOUTS",) if has_cutouts else ()))
         constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
-        options = {"depth_compare": "greater", "has_fragment": by_triangle}
-        return RenderProgram(device, path, folders, constants, targets=targets, **options)
+        return RenderProgram(
+            device,
+            path,
+            folders,
+            constants,
+            targets=targets,
+            depth_compare="greater",
+            has_fragment=by_triangle,
+        )
 
     return cached_program(device, ("visibility buffer", triangles, has_cutouts), (), make)
 

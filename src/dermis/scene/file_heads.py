@@ -1,0 +1,140 @@
+"""Loading of heads from samples and mesh files, with their maps."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from dermis.base.errors import notify, refuse
+from dermis.formats.gltf.embedded import embedded_eye_look, embedded_materials
+from dermis.formats.load import RiggedMesh, load_rigged
+from dermis.formats.maps import load_maps
+from dermis.formats.materials import FileMaterial
+from dermis.formats.obj import obj_maps
+from dermis.formats.parts import is_gltf
+from dermis.formats.samples import SAMPLES, Sample, fetch_sample
+from dermis.formats.units import with_settled_unit
+from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
+from dermis.scene.file_surfaces import direct_material, unused_properties, with_factors, with_file_textures
+from dermis.scene.head_table import NormalY, check_relief
+from dermis.scene.skin_tone import with_skin_tone
+
+MapFile = str | os.PathLike[str] | None
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """Maps that users choose for the skin.
+
+    files : picture files by role, which replace those of the mesh file; None for no choice
+    height_mm, normal_y : see `load_maps`
+    """
+
+    files: Mapping[str, MapFile]
+    height_mm: float | None = None
+    normal_y: NormalY = "up"
+
+    @property
+    def given(self) -> dict[str, MapFile]:
+        """Return the files that users name."""
+        return {role: file for role, file in self.files.items() if file is not None}
+
+    def load(self, files: Mapping[str, Any]) -> Maps:
+        """Return the maps of the given files and, for other roles, of those that belong to the mesh.
+
+        files : pictures of the mesh by role, and "height_mm" of its height map
+        """
+        chosen: dict[str, Any] = {role: files.get(role) if file is None else file for role, file in self.files.items()}
+        chosen["region"] = files.get("region")
+        used: dict[str, Any] = {role: file for role, file in chosen.items() if file is not None}
+        return load_maps(**used, height_mm=self.relief_mm(files), normal_y=self.normal_y)
+
+    def relief_mm(self, files: Mapping[str, Any]) -> float | None:
+        """Return the relief of one grey level of the height map [mm]."""
+        own = files.get("height_mm") if self.files["height"] is None else None
+        return own if self.height_mm is None else self.height_mm
+
+
+def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
+    """Return the head of a sample or a mesh file, and the look of its eyes that the file states.
+
+    name : of the sample or of the file
+    mesh_options : keyword arguments of `load_rigged`
+    """
+    sample = SAMPLES.get(name)
+    if sample is not None:
+        return _load_sample(sample, mesh_options, options), EyeLook()
+    path, look = Path(name), EyeLook()
+    if is_gltf(path):
+        materials, look = embedded_materials(path), embedded_eye_look(path)
+        rigged = _load_mesh(path, name, mesh_options)
+        mesh, maps, notes = _with_materials(rigged, materials, path, options)
+    else:
+        with ThreadPoolExecutor(1) as pool:
+            pending_maps = pool.submit(_load_obj_maps, path, mesh_options["opaque"], options)
+            rigged = _load_mesh(path, name, mesh_options)
+            mesh, (maps, notes) = rigged.mesh, pending_maps.result()
+    check_relief(options.height_mm, maps.height, f"{name}: height_mm")
+    maps, tone_note = (maps, "") if "colour" in options.given else with_skin_tone(mesh, maps)
+    for note in filter(None, (*rigged.notes, tone_note, *notes)):
+        notify(f"{path}: {note}")
+    return Head(name, mesh, maps, "", rigged.rig), look
+
+
+def _load_mesh(path: Path, name: str, mesh_options: dict[str, Any]) -> RiggedMesh:
+    return with_settled_unit(load_rigged(path, **mesh_options), path, mesh_options["unit_mm"], name)
+
+
+def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptions) -> Head:
+    """Return the head of a sample, whose unit and maps are known."""
+    if sample.kind != "head":
+        hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
+        refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
+    files = fetch_sample(sample.name)
+    own = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
+    if own["v_origin"] == "auto":
+        own["v_origin"] = sample.v_origin or "auto"
+    with ThreadPoolExecutor(1) as pool:
+        pending_maps = pool.submit(options.load, {**files, "height_mm": sample.height_mm})
+        rigged = _load_mesh(files["mesh"], sample.name, own)
+        maps = pending_maps.result()
+    check_relief(options.height_mm, maps.height, f"{sample.name}: height_mm")
+    return Head(sample.name, rigged.mesh, maps, f"{sample.attribution}, {sample.licence}", rigged.rig)
+
+
+def _with_materials(
+    rigged: RiggedMesh, materials: Sequence[FileMaterial], path: Path, options: MapOptions
+) -> tuple[Mesh, Maps, list[str]]:
+    """Return mesh and maps of a file with materials, and notes on properties that are not drawn."""
+    direct = direct_material(rigged, materials)
+    pack_skin = direct is None and not options.given
+    mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
+    loaded = options.load({} if direct is None else direct.skin_pictures())
+    if direct is not None:
+        loaded = with_factors(loaded, direct, options.given)
+    roles = [one.name for one in fields(Maps)]
+    maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
+    return mesh, maps, [*notes, unused_properties(mesh, materials, rigged.surface.in_file)]
+
+
+def _load_obj_maps(path: Path, opaque: tuple[str, ...], options: MapOptions) -> tuple[Maps, list[str]]:
+    """Return the maps of given files and, for other roles, of the materials of an OBJ file; and notes."""
+    loaded = options.load({})
+    if path.suffix.lower() != ".obj":
+        return loaded, []
+    own, note = obj_maps(
+        path,
+        opaque=opaque,
+        overridden=options.given,
+        height_mm=options.height_mm,
+        normal_y=options.normal_y,
+    )
+    given: dict[str, Any] = {role: getattr(loaded, role) for role in options.given}
+    return replace(own, **given), [note.removeprefix(f"{path}: ")]
