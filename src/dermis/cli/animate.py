@@ -91,7 +91,7 @@ def animate(
     head:
         Mesh (.glb .gltf .obj .ply), sample name or scene (.toml).
     motion:
-        File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .jsonl of MediaPipe, or a
+        File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .json of MediaPipe, or a
         sequence of meshes such as face_%05d.obj. [default: the file of the head]
     output:
         Movie (.mp4) or numbered images such as frames/%05d.png or .exr; their folder is created if necessary.
@@ -289,7 +289,7 @@ def motion_file(name: str, motion: str | None) -> str:
         return motion
     own_file = str(_head_table(name).get("name", name))
     if not is_gltf(own_file):
-        advice = "Add --motion with a .glb, .csv or .jsonl file, or a sequence of .obj files"
+        advice = "Add --motion with a .glb, .csv or .json file, or a sequence of .obj files"
         refuse("--motion", "a file", f"it is missing, and {own_file} cannot contain clips", advice)
     return own_file
 
@@ -301,7 +301,7 @@ def load_clip(
 
     name : head or scene file as named on the command line
     motion, clip : motion file, and name of one of its clips
-    head_options : options of the head, of which `unit_mm` and `up` also apply to mesh sequences
+    head_options : options of the head, of which `unit_mm`, `up` and `front` also apply to mesh sequences
     span : time span, of which the frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
@@ -311,7 +311,7 @@ def load_clip(
     if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
         rate = float(span.rate)
     fields = {**_head_table(name), **head_options}
-    units = {key: fields[key] for key in ("unit_mm", "up") if key in fields}
+    units = {key: fields[key] for key in ("unit_mm", "up", "front") if key in fields}
     return load_motion(motion, head, clip=clip, fps=rate, **units)
 
 

@@ -79,8 +79,8 @@ class SceneOptions:
     camera: Annotated[
         str | None,
         Parameter(
-            help="Camera: portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]. "
-            "[default: portrait]"
+            help="Camera: portrait, three-quarter, profile, ear, cheek, full_body, or a TOML file with "
+            "[camera]. [default: portrait]"
         ),
     ] = None
     head: HeadOptions = field(default_factory=dict)
@@ -210,7 +210,7 @@ def _select_lights(
 
     if name is None:
         return () if replaced else tuple(scene.lights)
-    lights = load_lights(name)
+    lights = load_lights(name, scene.head)
     if not lights and environment is None:
         refuse("--lights", "at least one light", f"{name!r} has none", "Add --env, or choose another rig")
     return lights

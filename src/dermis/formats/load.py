@@ -18,14 +18,16 @@ from dermis.base.disk import Arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
+from dermis.formats.axes import Axes, Axis, Front, to_y_up
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
+from dermis.formats.mesh_repair import RawMesh, mend
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_gltf
-from dermis.formats.read import Origin, Up, join_parts, read_mesh_file, select_vertices, to_y_up
+from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
 from dermis.formats.skin_groups import choose_skin, describe_choice
 from dermis.mesh.geometry import compact_vertices, weld
-from dermis.mesh.mesh import Material, Mesh, build_mesh
+from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
@@ -60,7 +62,8 @@ def load_rigged(
     *,
     unit_mm: float | None = None,
     v_origin: Origin = "auto",
-    up: Up = "y",
+    up: Axis = "y",
+    front: Front = "auto",
     skin_groups: tuple[str, ...] = (),
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
@@ -73,7 +76,7 @@ def load_rigged(
     unit_mm : length of the file's unit [mm]; None for that of the format (`default_unit_mm`)
     v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
         format
-    up : up axis of the file; with "z" the face looks along -Y, as in Blender
+    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`
     skin_groups : names of the groups that are skin; empty to find them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
@@ -83,20 +86,21 @@ def load_rigged(
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
     groups = GroupNames(skin_groups, opaque, eye_groups)
-    load = partial(_load_uncached, source, unit, v_origin, up, groups)
+    axes = Axes(up, front)
+    load = partial(_load_uncached, source, unit, v_origin, axes, groups)
     is_glb = source.suffix.lower() == ".glb" and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
     if not data or b'"uri"' in data:  # parts of it are in other files
         return load()
     default_name = source.stem  # of groups without a name
-    return cached_rigged(data, repr((default_name, unit, v_origin, up, groups)), load)
+    return cached_rigged(data, repr((default_name, unit, v_origin, axes, groups)), load)
 
 
 def _load_uncached(
     source: Path,
     unit: float,
     v_origin: Origin,
-    up: Up,
+    axes: Axes,
     groups: GroupNames,
 ) -> RiggedMesh:
     """Load mesh and rig without the disk cache; for the parameters see `load_rigged`.
@@ -107,8 +111,9 @@ def _load_uncached(
         mesh_file = read_mesh_file(source)
         part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None
-        to_head[:3, :3] = to_y_up(unit * np.eye(3), up).T
-        positions, normals = to_y_up(unit * part.positions, up).astype(np.float32), to_y_up(part.normals, up)
+        to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
+        positions = to_y_up(unit * part.positions, axes).astype(np.float32)
+        normals = to_y_up(part.normals, axes)
         uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
         check_arrays(positions, uv, part.triangles, source)
         assigned, note = _assign_materials(mesh_file, groups, source)
@@ -119,13 +124,14 @@ def _load_uncached(
             point = split_points(point, vertices, to_head[:3, :3], source)
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
-        arrays = positions[used], uv[used], corners, material, assigned.materials, normals[used], point
-        mesh = build_mesh(*arrays, part.quads)
+        arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
+        raw, mended = mend(RawMesh(*arrays))
+        mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         check_mesh(mesh, source)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
-    notes = (*((note,) if note else ()), *mesh_file.notes)
+    notes = (*((note,) if note else ()), *mesh_file.notes, *mended)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
     return RiggedMesh(mesh, rig, notes, FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv))

@@ -7,19 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Mask
 from dermis.base.errors import refuse
 from dermis.formats import size_limits as limits
-from dermis.formats.parts import MeshPart, default_unit_mm
-from dermis.mesh.geometry import edges, triangle_areas
+from dermis.formats.parts import MeshPart
+from dermis.mesh.geometry import cross_columns, dot_columns, edge_keys, edges
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
 MAX_DISTANCE_MM = 1e6
 """Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
-HEAD_HEIGHT_MM = (100.0, 1000.0)
-LIKELY_HEAD_HEIGHT_MM = (150.0, 500.0)
-UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 MIN_RELATIVE_AREA = 1e-6
 """Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
@@ -99,10 +97,23 @@ def _check_uv_range(mesh: Mesh, culprit: object) -> None:
         refuse(culprit, "uv in [0, 1], without UDIM tiles and repeats", actual, advice)
 
 
+def flat_triangles(positions: NDArray[np.floating], triangles: NDArray[np.integer]) -> Mask:
+    """Return which triangles have no area in single precision, (f,).
+
+    positions : (v, 3) [mm]
+    triangles : (f, 3) vertex indices
+    """
+    columns = np.ascontiguousarray(positions.T, np.float64)
+    a, b, c = (columns.take(corner, axis=1) for corner in np.ascontiguousarray(triangles.T))
+    ab, bc, ca = b - a, c - b, a - c
+    squares = [dot_columns(side, side) for side in (ab, bc, ca)]
+    normal = cross_columns(ab, ca)
+    longest = np.maximum(np.maximum(squares[0], squares[1]), squares[2])
+    return np.asarray(np.sqrt(dot_columns(normal, normal)) / 2 <= MIN_RELATIVE_AREA * longest)
+
+
 def _check_areas(mesh: Mesh, culprit: object) -> None:
-    corners = mesh.positions[mesh.triangles].astype(np.float64)
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    flat = np.flatnonzero(triangle_areas(corners) <= MIN_RELATIVE_AREA * longest**2)
+    flat = np.flatnonzero(flat_triangles(mesh.positions, mesh.triangles))
     if len(flat):
         actual = f"{len(flat)} have none (zero area): the first are {', '.join(map(str, flat[:5]))}"
         advice = "In Blender: Edit Mode, Mesh > Clean Up > Degenerate Dissolve"
@@ -110,7 +121,11 @@ def _check_areas(mesh: Mesh, culprit: object) -> None:
 
 
 def _check_manifold(mesh: Mesh, culprit: object) -> None:
-    ends, _, counts = edges(mesh.point[mesh.triangles])
+    corners = mesh.point[mesh.triangles]
+    keys = np.sort(edge_keys(corners), axis=None)
+    if not (keys[2:] == keys[:-2]).any():
+        return
+    ends, _, counts = edges(corners)
     non_manifold = np.flatnonzero(counts > 2)
     if len(non_manifold):
         position = mesh.positions[np.flatnonzero(mesh.point == ends[non_manifold[0], 0])[0]]
@@ -138,22 +153,3 @@ def _check_skin(mesh: Mesh, culprit: object) -> None:
         actual = f"skin group {empty[0]!r} has no triangles" if empty else no_skin
         advice = "Assign the skin's faces to a material called skin, or name fewer groups opaque"
         refuse(culprit, "a group of triangles that is skin", actual, advice)
-
-
-def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> None:
-    """Refuse a head that is not 100 to 1000 mm high, usually because the unit of its file was not set.
-
-    culprit : the file, for errors
-    unit_mm : unit with which the file was read [mm]; None for the default of its format
-    """
-    height = float(mesh.size_mm[1])
-    if HEAD_HEIGHT_MM[0] <= height <= HEAD_HEIGHT_MM[1]:
-        return
-    unit_mm = default_unit_mm(str(culprit)) if unit_mm is None else unit_mm
-    low, high = LIKELY_HEAD_HEIGHT_MM
-    fitting = [unit for unit in UNITS_MM if low <= height / unit_mm * unit <= high]
-    advice = _UNIT_ADVICE
-    if fitting:
-        advice += f": {fitting[0]:g} would make it {height / unit_mm * fitting[0]:.4g} mm high"
-    actual = f"it is {height:.4g} mm high at {unit_mm:g} mm per unit (a forgotten unit?)"
-    refuse(culprit, f"a head {HEAD_HEIGHT_MM[0]:g} to {HEAD_HEIGHT_MM[1]:g} mm high", actual, advice)

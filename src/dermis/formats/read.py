@@ -1,4 +1,4 @@
-"""Reading of mesh files by format, with the reader of PLY files."""
+"""Reading of mesh files by format."""
 
 from __future__ import annotations
 
@@ -12,70 +12,19 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.base.reading import is_file, parsing, read_file
+from dermis.base.reading import is_file, parsing
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf.triangles import read_gltf
 from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
-from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, trimesh_parts
+from dermis.formats.parts import MeshFile, MeshPart
+from dermis.formats.ply import read_ply
+from dermis.mesh.geometry import expand_runs
 
-_MAX_HEADER_BYTES = 1 << 16  # bytes
-_MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
-_MAX_PROPERTIES = 256
 MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
-Up = Literal["y", "z"]
-
-
-def check_ply(path: Path, data: bytes) -> bytes:
-    """Return the header of a PLY file after checking its counts of elements and properties.
-
-    data : bytes of the whole file
-
-    Raises DermisError for an invalid header.
-    """
-    end = data.find(b"end_header", 0, _MAX_HEADER_BYTES)
-    if not data.startswith(b"ply") or end < 0:
-        refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
-    header = data[:end]
-    lines = [line.split() for line in header.splitlines()]
-    properties = sum(line[:1] == [b"property"] for line in lines)
-    limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
-    for line in lines:
-        if line[:1] == [b"element"]:
-            _check_element(path, line, len(data) - end)
-    return header
-
-
-def _check_element(path: Path, line: list[bytes], remaining_bytes: int) -> None:
-    """Refuse an "element" line of a PLY header with an implausible count for a mesh or for the file size.
-
-    line : words of the line
-    """
-    name, count = (line[1].decode("latin-1"), line[2]) if len(line) == 3 else ("", b"")
-    if not (count.isdigit() and len(count) < 12):
-        actual = f"got {b' '.join(line)[:80]!r}"
-        refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
-    limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
-    limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
-
-
-def read_ply(path: Path) -> MeshFile:
-    """Read a .ply file.
-
-    uv are read from the vertex properties s, t or u, v or texture_u, texture_v, or from the face property
-    texcoord.
-    """
-    data = read_file(path, "a PLY file", limits.MAX_FILE_BYTES)
-    header = check_ply(path, data)
-    # uv coordinates by face corner require split vertices, for which the file's normals may be wrong;
-    # for uv by vertex, splitting would drop the normals of files with unused vertices
-    by_corner = b"texcoord" in header
-    groups = [MaterialGroup((path.stem,))]
-    parts = list(trimesh_parts(data, "ply", groups, fix_texture=by_corner, skip_materials=True))
-    return MeshFile([replace(part, normals=None) for part in parts] if by_corner else parts)
 
 
 MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
@@ -130,18 +79,17 @@ def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
-    """Return a mesh part with a subset of its vertices, their morph targets and bones.
+    """Return a mesh part with some of its vertices, their morph targets and bones.
 
-    used : (n,) indices of the vertices to keep
+    used : (n,) indices of the vertices; they may repeat
 
     Triangles, uv and normals are not changed.
     """
-    number = np.full(len(part.positions), -1)
-    number[used] = np.arange(len(used))
-    targets = {
-        name: (number[vertex][number[vertex] >= 0], delta[number[vertex] >= 0])
-        for name, (vertex, delta) in part.targets.items()
-    }
+    order, count = np.argsort(used, kind="stable"), np.bincount(used, minlength=len(part.positions))
+    first, targets = np.cumsum(count) - count, {}
+    for name, (vertex, delta) in part.targets.items():
+        row, copy = expand_runs(first[vertex], count[vertex])
+        targets[name] = order[copy], delta[row]
     bone = None if part.bone is None else part.bone[used]
     weight = None if part.weight is None else part.weight[used]
     return replace(
@@ -201,7 +149,7 @@ def read_mesh_file(source: Path) -> MeshFile:
         refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, "Export it as one of these")
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
-    # trimesh raises any exception for damaged files
+    # readers may raise any exception for damaged files
     with parsing(source, f"a valid {source.suffix} mesh", Exception):
         mesh_file = reader(source)
     parts = [part for part in mesh_file.parts if len(part.triangles)]
@@ -213,11 +161,3 @@ def read_mesh_file(source: Path) -> MeshFile:
         refuse(source, "a group of triangles that is skin", actual, "Assign its faces to it, or rename it")
     check_counts(parts, source)
     return replace(mesh_file, parts=parts)
-
-
-def to_y_up(vectors: Doubles, up: Up) -> Doubles:
-    """Rotate vectors (v, 3) of a file with up axis `up` to Y up.
-
-    A z-up head faces -Y, as in Blender; this direction becomes +Z.
-    """
-    return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))

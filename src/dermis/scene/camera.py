@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.mesh.head import Head
 from dermis.scene.field_errors import Reason
@@ -17,6 +18,9 @@ from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
 _DISTANCE_MM = 1100.0  # of portrait photography; from a shorter distance the nose looks large
+_RELATIVE_DISTANCE = 3.0  # to the size of what is shown as a whole
+_MARGIN = 1.08
+_UP = (0.0, 1.0, 0.0)
 
 
 _Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
@@ -140,12 +144,12 @@ class Camera(FrozenModel):
 
 
 def portrait(head: Head) -> Camera:
-    """Return a camera that shows head and shoulders from the front.
+    """Return a camera that shows head and shoulders from the front, also those of a body.
 
     Parameters
     ----------
     head : Head
-        Not used; all camera presets are functions of the head.
+        The head. A mesh without a head, such as a hand, is shown as a whole.
 
     Returns
     -------
@@ -160,7 +164,7 @@ def portrait(head: Head) -> Camera:
     >>> dermis.portrait(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())).position
     (0.0, -25.0, 1100.0)
     """
-    return _camera_at_azimuth(0.0)
+    return _camera_at_azimuth(head, 0.0)
 
 
 def three_quarter(head: Head) -> Camera:
@@ -169,7 +173,7 @@ def three_quarter(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        Not used; all camera presets are functions of the head.
+        The head. A mesh without a head, such as a hand, is shown as a whole.
 
     Returns
     -------
@@ -185,7 +189,7 @@ def three_quarter(head: Head) -> Camera:
     >>> round(camera.position[0])
     707
     """
-    return _camera_at_azimuth(40.0)
+    return _camera_at_azimuth(head, 40.0)
 
 
 def side(head: Head) -> Camera:
@@ -194,7 +198,7 @@ def side(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        Not used; all camera presets are functions of the head.
+        The head. A mesh without a head, such as a hand, is shown as a whole.
 
     Returns
     -------
@@ -209,24 +213,51 @@ def side(head: Head) -> Camera:
     >>> round(dermis.side(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())).position[0])
     1100
     """
-    return _camera_at_azimuth(90.0)
+    return _camera_at_azimuth(head, 90.0)
+
+
+def full_body(head: Head) -> Camera:
+    """Return a camera that shows all of a mesh from the front, such as a whole body.
+
+    Parameters
+    ----------
+    head : Head
+        The head, with everything that its file has.
+
+    Returns
+    -------
+    Camera
+        Camera at a distance of 1.1 m, or three times the size of what it shows.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> camera = dermis.full_body(dermis.Head("ball", uv_sphere(450.0, 8, 4), Maps()))
+    >>> round(camera.position[2]), round(camera.frame_mm)
+    (2700, 1006)
+    """
+    return _show_all(head, 0.0)
 
 
 def cheek(head: Head) -> Camera:
     """Return a camera for a close-up of the left cheek, where the studio's key light grazes pores."""
-    focus = head.frontmost(40.0, -35.0)
-    view_direction = _azimuth_direction(58.0)
-    return Camera(position=_offset_point(focus, view_direction, 300.0), target=focus, frame_mm=48.0)
+    beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
+    focus = _to_scene(head, head.frontmost(*beside))
+    view_direction = _to_scene(head, _azimuth_direction(58.0))
+    position = _offset_point(focus, view_direction, 300.0)
+    return Camera(position=position, target=focus, up=_to_scene(head, _UP), frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
     """Return a camera for a close-up of the left ear."""
-    p = head.mesh.positions - np.array(head.centre_mm, dtype=np.float32)
+    p = head.seen_positions_mm
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
-    focus = float(x), float(y), float(z)
-    position = _offset_point(focus, _azimuth_direction(75.0), 600.0)
-    return Camera(position=position, target=focus, frame_mm=120.0)
+    focus = _to_scene(head, (float(x), float(y), float(z)))
+    position = _offset_point(focus, _to_scene(head, _azimuth_direction(75.0)), 600.0)
+    return Camera(position=position, target=focus, up=_to_scene(head, _UP), frame_mm=120.0)
 
 
 CAMERA_PRESETS = {
@@ -235,7 +266,9 @@ CAMERA_PRESETS = {
     "profile": side,
     "ear": ear,
     "cheek": cheek,
+    "full_body": full_body,
 }
+"""Functions of the head that return a camera, by name; hyphens and underscores are alike."""
 
 
 def camera_preset(name: str, head: Head) -> Camera:
@@ -243,15 +276,49 @@ def camera_preset(name: str, head: Head) -> Camera:
 
     Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
-    if name not in CAMERA_PRESETS:
+    preset = find_preset(name)
+    if preset is None:
         expected = f"one of {', '.join(CAMERA_PRESETS)} or a TOML file"
         refuse(f"camera {name}", expected, "it is neither", "Check the name")
-    return CAMERA_PRESETS[name](head)
+    return preset(head)
 
 
-def _camera_at_azimuth(degrees: float) -> Camera:
+def find_preset(name: str) -> Callable[[Head], Camera] | None:
+    """Return the function of a camera preset, or None for another name."""
+    by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
+    return by_name.get(name.replace("-", "_"))
+
+
+def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
+    if head.skull_mm is None:
+        return _show_all(head, degrees)
     middle = (0.0, -25.0, 0.0)
     return Camera(position=_offset_point(middle, _azimuth_direction(degrees), _DISTANCE_MM), target=middle)
+
+
+def _show_all(head: Head, degrees: float) -> Camera:
+    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
+    x, _, z = _azimuth_direction(degrees)
+    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes  # to the right, up and back
+    points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))
+    across, towards = np.abs(points - middle)[:, :2].max(axis=1), (points - middle)[:, 2]
+    frame_mm = 2.0 * _MARGIN * float((across / (1.0 - towards / distance)).max())
+    target, position = (
+        _triple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
+    )
+    return Camera(position=position, target=target, up=_triple(axes[1]), frame_mm=round(frame_mm, 3))
+
+
+def _to_scene(head: Head, vector: Vector) -> Vector:
+    """Return a vector in the scene from its components to the right, upwards and to the front of a head."""
+    return _triple(np.array(vector) @ head.axes)
+
+
+def _triple(vector: Doubles) -> Vector:
+    x, y, z = (float(one) + 0.0 for one in vector)
+    return x, y, z
 
 
 def _azimuth_direction(degrees: float) -> Vector:

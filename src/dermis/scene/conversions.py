@@ -37,8 +37,10 @@ def as_head(head: object) -> Head:
     return load_head(head)
 
 
-def as_lights(lights: object) -> Sequence[Light]:
+def as_lights(lights: object, head: Head) -> Sequence[Light]:
     """Return a sequence of lights from several lights, a single light, or the name of a light preset.
+
+    head : head for which the lights of a preset are placed
 
     Raises DermisError for any other object.
     """
@@ -49,7 +51,7 @@ def as_lights(lights: object) -> Sequence[Light]:
         if lights not in light_presets():
             expected = f"lights, or one of the presets {', '.join(light_presets())}"
             refuse("lights", expected, f"got {lights!r}", advice)
-        return preset_lights(lights)
+        return preset_lights(lights, head)
     if not isinstance(lights, Iterable) or isinstance(lights, Mapping | FrozenModel):
         refuse("lights", "a list of lights", f"got {format_value(lights)}", advice)
     light_list = lights if isinstance(lights, list | tuple) else tuple(lights)

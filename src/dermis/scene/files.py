@@ -15,7 +15,7 @@ from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
-from dermis.scene.camera import CAMERA_PRESETS, Camera, camera_preset
+from dermis.scene.camera import CAMERA_PRESETS, Camera, find_preset
 from dermis.scene.environment import Environment
 from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
@@ -33,13 +33,15 @@ _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
 
 
-def load_lights(name: str | Path) -> tuple[Light, ...]:
+def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]:
     """Load the lights of a preset or of a TOML file with [[lights]] tables.
 
     Parameters
     ----------
     name : str or path
         Name of a preset ("studio", "window", ...) or a file.
+    head : Head, optional
+        Head for which the lights of a preset are placed: farther away for a body that is larger than a metre.
 
     Returns
     -------
@@ -59,7 +61,7 @@ def load_lights(name: str | Path) -> tuple[Light, ...]:
     """
     known = light_presets()
     if str(name) in known:
-        return preset_lights(str(name))
+        return preset_lights(str(name), head)
     return _parse_lights(
         name, _read_scene_file(name, f"a preset ({', '.join(known)}) or a TOML file").get("lights")
     )
@@ -67,8 +69,9 @@ def load_lights(name: str | Path) -> tuple[Light, ...]:
 
 def load_camera(name: str | Path, head: Head) -> Camera:
     """Return the camera of a preset, placed for the head, or that of the [camera] table in a TOML file."""
-    if str(name) in CAMERA_PRESETS:
-        return camera_preset(str(name), head)
+    preset = find_preset(str(name))
+    if preset is not None:
+        return preset(head)
     table = _read_scene_file(name, f"a preset ({', '.join(CAMERA_PRESETS)}) or a TOML file").get("camera")
     return _build_settings(Camera, name, "camera", table)
 
@@ -145,7 +148,7 @@ def load_scene(
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
-        lights=load_lights(_resolve_file(path.parent, lights))
+        lights=load_lights(_resolve_file(path.parent, lights), head)
         if isinstance(lights, str)
         else _parse_lights(path, lights),
         environment=environment,

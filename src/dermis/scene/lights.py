@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
+from dermis.mesh.head import Head
 from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Colour, Direction, FrozenModel, Vector, slider
 
@@ -246,6 +247,10 @@ LIGHTS: Registry[type[Light]] = Registry(
 reference; exports write a registered light as the class that it derives from."""
 
 
+_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0  # usual, and largest for which presets stay as they are
+_NARROW_DEGREES = 10.0
+_SIZES = "width_mm", "height_mm", "radius_mm"
+_VECTORS = "position", "target", "direction", "up"
 NO_LIGHTS = "none"
 """Name of the preset without lights, for an environment alone."""
 
@@ -256,11 +261,41 @@ def light_presets() -> list[str]:
     return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
-def preset_lights(name: str) -> tuple[Light, ...]:
-    """Return the lights of a light preset."""
+def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
+    """Return the lights of a light preset, placed for a head.
+
+    head : subject of the lights; None for a head of ordinary size that faces +Z
+
+    The lights of a body larger than a metre are farther away and larger in proportion; those of a flat piece
+    of skin are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
+    the head.
+    """
     if name == NO_LIGHTS:
         return ()
-    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
+    lights = tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
+    return lights if head is None else tuple(_placed(light, head) for light in lights)
+
+
+def _placed(light: Light, head: Head) -> Light:
+    reach = head.reach_mm
+    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _is_narrow(light) else 1.0
+    if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
+        return light
+    values: dict[str, Any] = {name: factor * getattr(light, name) for name in _SIZES if hasattr(light, name)}
+    for name in _VECTORS:
+        if hasattr(light, name):
+            values[name] = tuple((np.array(getattr(light, name)) @ head.axes).tolist())
+    if isinstance(light, PointLight):
+        target = np.array(light.target)
+        values["position"] = tuple(((target + factor * (light.position - target)) @ head.axes).tolist())
+    return light.replace(**values)
+
+
+def _is_narrow(light: Light) -> bool:
+    """Return whether a light is aimed at a part of a head."""
+    return not isinstance(light, PointLight) or (
+        isinstance(light, SpotLight) and light.outer_degrees < _NARROW_DEGREES
+    )
 
 
 def preset_toml(name: str) -> str:
@@ -268,8 +303,13 @@ def preset_toml(name: str) -> str:
     return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def studio() -> tuple[Light, ...]:
+def studio(head: Head | None = None) -> tuple[Light, ...]:
     """Return the preset "studio": three spot lights with shadows.
+
+    Parameters
+    ----------
+    head : Head, optional
+        Head for which the lights are placed: farther away for a body that is larger than a metre.
 
     Returns
     -------
@@ -282,4 +322,4 @@ def studio() -> tuple[Light, ...]:
     >>> [light.kind for light in dermis.studio()]
     ['spot', 'spot', 'spot']
     """
-    return preset_lights("studio")
+    return preset_lights("studio", head)

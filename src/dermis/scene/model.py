@@ -75,9 +75,9 @@ class Scene:
         self._set_field("environment", as_environment(environment))
         self._set_field("skin", Skin() if skin is None else as_model(Skin, skin, "skin", 'profile="medium"'))
         if lights is None:
-            self._set_field("lights", () if self.environment else studio())
+            self._set_field("lights", () if self.environment else studio(self.head))
         else:
-            self._set_field("lights", as_lights(lights))
+            self._set_field("lights", as_lights(lights, self.head))
         self._set_field("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
         self._set_field("pose", Pose.coerce(pose))
         if self.pose is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dermis.base.errors import refuse
 from dermis.base.reading import checked_path, is_file
+from dermis.formats.axes import Axis, Front
 from dermis.formats.motion.gltf_clip import load_gltf_clip
 from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
@@ -14,11 +15,11 @@ from dermis.formats.motion.sequence import is_sequence, load_sequence
 from dermis.formats.parts import is_gltf
 from dermis.mesh.clip import Clip, check_rate
 from dermis.mesh.head import Head
-from dermis.scene.head_table import UpAxis, check_options
+from dermis.scene.head_table import check_options
 
-_JSON_LINES = (".jsonl", ".ndjson", ".json")
+_TABLES, _JSON = (".csv", ".tsv"), (".jsonl", ".ndjson", ".json")
 _ACCEPTED_FILES = (
-    "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"
+    "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.json .jsonl) or a sequence of .obj or .ply"
 )
 
 
@@ -29,7 +30,8 @@ def load_motion(
     clip: str | None = None,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: UpAxis = "y",
+    up: Axis = "y",
+    front: Front = "auto",
 ) -> Clip:
     r"""Load the motion of a head from a file.
 
@@ -37,19 +39,21 @@ def load_motion(
     ----------
     path : str or path
         A glTF file, of the head or with nodes or targets of the same names, "file.glb#clip" for one of
-        several clips; a CSV file of Live Link Face; JSON lines with the blend shapes of MediaPipe; or files
+        several clips; a CSV file of Live Link Face; results of MediaPipe's face landmarker in JSON; or files
         of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head
         Head that moves.
     clip : str, optional
         Name of the clip in a glTF file.
     fps : float, optional
-        Frame rate of a sequence, by default 30; of a CSV file whose timecode does not tell it; of JSON lines
+        Frame rate of a sequence, by default 30; of a CSV file whose timecode does not tell it; of results
         without time.
     unit_mm : float, optional
-        Length of the unit of a sequence's files [mm]; see `load_head`.
-    up : {"y", "z"}
+        Length of the unit of a sequence's files [mm]; by default one that makes them as large as the head.
+    up : {"y", "z", "x", "-y", "-z", "-x"}
         Upward axis of a sequence's files.
+    front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
+        Axis of a sequence's files along which the face looks; see `load_head`.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def load_motion(
     0.2
     """
     clip_path = checked_path(path, _ACCEPTED_FILES)
-    check_options(unit_mm=unit_mm, up=up)
+    check_options(unit_mm=unit_mm, up=up, front=front)
     fps = None if fps is None else check_rate("fps", fps)
     source, clip_name = _split_clip_name(clip_path, clip)
     if is_gltf(source):
@@ -82,12 +86,12 @@ def load_motion(
     if clip_name is not None:
         refuse(source, "the name of a clip only with a glTF file", f"got {clip_name!r}", "Leave it out")
     if is_sequence(source):
-        return load_sequence(source, head, fps, unit_mm, up)
+        return load_sequence(source, head, fps, unit_mm, up, front)
     if not is_file(source):
         refuse(source, _ACCEPTED_FILES, "there is no such file", "Check the name")
-    if source.suffix.lower() not in (".csv", *_JSON_LINES):
+    if source.suffix.lower() not in (*_TABLES, *_JSON):
         refuse(source, _ACCEPTED_FILES, f"the suffix is {source.suffix!r}", "Convert it to one of these")
-    load = load_live_link if source.suffix.lower() == ".csv" else load_mediapipe
+    load = load_live_link if source.suffix.lower() in _TABLES else load_mediapipe
     return load(source, head, fps)
 
 

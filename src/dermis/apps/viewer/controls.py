@@ -8,12 +8,12 @@ from typing import Any
 
 from dermis.apps.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
 from dermis.apps.viewer.state import ATLAS_VIEW_NAME, AtlasView, UndoHistory, ViewerState
-from dermis.scene.camera import camera_preset
+from dermis.scene.camera import CAMERA_PRESETS, camera_preset
 
 Event = Mapping[str, Any]
 Point = tuple[float, float]
-CAMERA_PRESETS = ("portrait", "three-quarter", "profile", "ear", "cheek")
-"""Names of the camera presets that the keys 1 to 5 select."""
+PRESET_NAMES = tuple(CAMERA_PRESETS)
+"""Names of the camera presets that the keys from 1 on select."""
 LIGHT_DRAG_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
 _MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event, which sums all rotations of a frame
@@ -143,8 +143,8 @@ class Controls:
                 self.history.redo() if "Shift" in modifiers else self.history.undo()
             elif key.lower() == "y":
                 self.history.redo()
-        elif key.isdigit() and 0 < int(key) <= len(CAMERA_PRESETS):
-            self.set_camera_preset(CAMERA_PRESETS[int(key) - 1])
+        elif key.isdigit() and 0 < int(key) <= len(PRESET_NAMES):
+            self.set_camera_preset(PRESET_NAMES[int(key) - 1])
 
 
 class SplitView:

@@ -129,7 +129,7 @@ class ViewerState:
 
     def with_rig(self, name: str) -> ViewerState:
         """Return a copy with the lights of a preset."""
-        return self.with_lights(load_lights(name), name)
+        return self.with_lights(load_lights(name, self.scene.head), name)
 
     def with_light(self, index: int, **fields: object) -> ViewerState:
         """Return a copy with new values of some fields of one light."""

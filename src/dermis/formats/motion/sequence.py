@@ -14,14 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints
-from dermis.base.errors import refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
+from dermis.base.errors import notify, refuse
+from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing
+from dermis.formats.axes import Axes, Axis, Front, to_y_up
 from dermis.formats.mesh_checks import check_arrays
-from dermis.formats.obj import parse_obj
+from dermis.formats.obj import parse_obj, read_obj_text
 from dermis.formats.parts import default_unit_mm
-from dermis.formats.read import Up, join_parts, read_mesh_file, to_y_up
+from dermis.formats.read import join_parts, read_mesh_file
 from dermis.formats.rig_from_file import SPLIT_TOLERANCE_MM
-from dermis.formats.size_limits import MAX_FILE_BYTES
+from dermis.formats.units import UNITS_MM
 from dermis.mesh.clip import Clip
 from dermis.mesh.geometry import compact_vertices
 from dermis.mesh.head import Head
@@ -75,20 +76,28 @@ def frame_files(path: Path) -> list[Path]:
 
 
 def load_sequence(
-    path: Path, head: Head, fps: float | None = None, unit_mm: float | None = None, up: Up = "y"
+    path: Path,
+    head: Head,
+    fps: float | None = None,
+    unit_mm: float | None = None,
+    up: Axis = "y",
+    front: Front = "auto",
 ) -> Clip:
     """Load a sequence of mesh files, one per frame, as a clip for a head with the same topology.
 
     The vertices of the files must have the order of the head's file.
 
     fps : frame rate, by default 30
-    unit_mm, up : unit [mm] and up axis of the files, see `load_head`
+    unit_mm : unit of the files [mm]; None for one that makes the first about as large as the head
+    up, front : axes of the files, see `load_head`
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
-    frames = _FrameCache(tuple(files), head, FrameReader(unit_mm, up))
+    if unit_mm is None:
+        unit_mm = _unit_of_head(files[0], head, FrameReader(None, up, front))
+    frames = _FrameCache(tuple(files), head, FrameReader(unit_mm, up, front))
     for index in {0, len(files) // 2, len(files) - 1}:
         frames.positions(index)
 
@@ -158,6 +167,23 @@ class _FrameCache:
             refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
 
 
+def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
+    """Return the unit with which the mesh in a file is about as large as a head [mm].
+
+    It is that of the file's format if this fits; otherwise a note says which unit was found.
+    """
+    read_mm, head_mm = (
+        np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
+    )
+    default = default_unit_mm(file)
+    low, high = _RELATIVE_SIZE_RANGE
+    if low <= read_mm / head_mm <= high:
+        return default
+    unit = min(UNITS_MM, key=lambda one: abs(np.log(one / default * read_mm / head_mm)))
+    notify(f"{file}: its unit is not stated; 1 unit = {unit:g} mm makes it as large as the head")
+    return unit
+
+
 def _folder_files(folder: Path) -> list[Path]:
     return list(folder.iterdir()) if _is_folder(folder) else []
 
@@ -209,11 +235,12 @@ class FrameReader:
     fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
-    up : up axis of the files
+    up, front : axes of the files that point upwards and along which the face looks
     """
 
     unit_mm: float | None = None
-    up: Up = "y"
+    up: Axis = "y"
+    front: Front = "auto"
     _first: FrameVertices | None = field(default=None, init=False)
     _pattern: _ObjPattern | None = field(default=None, init=False)
 
@@ -224,7 +251,7 @@ class FrameReader:
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
         if self._pattern is not None and self._first is not None and is_file(path):
-            positions = _parse_positions(read_file(path, "an OBJ file", MAX_FILE_BYTES), self._pattern)
+            positions = _parse_positions(read_obj_text(path).encode(), self._pattern)
             if positions is not None:
                 positions_mm = self._to_head_axes(unit * positions)
                 check_arrays(positions_mm, self._first.uv, self._first.triangles, path)
@@ -232,7 +259,7 @@ class FrameReader:
         vertices = self._parse_vertices(path, unit)
         if self._first is None:
             self._first = vertices
-            self._pattern = _read_pattern(path) if path.suffix.lower() == ".obj" else None
+            self._pattern = self._read_pattern(path, unit) if path.suffix.lower() == ".obj" else None
         return vertices
 
     def _parse_vertices(self, path: Path, unit: float) -> FrameVertices:
@@ -244,9 +271,20 @@ class FrameReader:
         used, corners = compact_vertices(part.triangles)
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
+    def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
+        """Return the pattern of the first file; None if its positions are not the numbers of its lines."""
+        assert self._first is not None
+        data = read_obj_text(path).encode()
+        pattern = _find_pattern(path, data)
+        positions = _parse_positions(data, pattern)
+        same = positions is not None and np.array_equal(
+            self._to_head_axes(unit * positions), self._first.positions_mm
+        )
+        return pattern if same else None
+
     def _to_head_axes(self, positions: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # infinite positions are refused later
-            return to_y_up(positions, self.up).astype(np.float32)
+            return to_y_up(positions, Axes(self.up, self.front)).astype(np.float32)
 
 
 def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
@@ -255,16 +293,17 @@ def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], 
     return _VERTEX_LINE.findall(data), hashlib.sha256(others).digest()
 
 
-def _read_pattern(path: Path) -> _ObjPattern:
+def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
     """Return the pattern of an OBJ file.
+
+    data : its text in UTF-8
 
     The file is parsed with the index of each `v` line as x coordinate, which shows the line of each vertex.
     """
-    data = read_file(path, "an OBJ file", MAX_FILE_BYTES)
     positions, digest = _split_vertex_lines(data)
     count = iter(range(len(positions)))
     numbered = _VERTEX_LINE.sub(lambda match: b"v %d 0 0\n" % next(count), data)
-    model = parse_obj(path, numbered.decode("utf-8", errors="replace"))
+    model = parse_obj(path, numbered.decode())
     part = join_parts([part for part in model.parts if len(part.triangles)], path)
     used = np.unique(part.triangles)
     return _ObjPattern(digest, len(positions), part.positions[used, 0].astype(np.int64))

@@ -33,7 +33,7 @@ SHORTCUTS = (
     ("wheel, pinch", "zoom"),
     ("double click", "orbit around that point"),
     ("Shift and drag", "move the selected light or the environment"),
-    ("1 2 3 4 5", "portrait, three-quarter, profile, ear, cheek"),
+    ("1 2 3 4 5 6", "portrait, three-quarter, profile, ear, cheek, full_body"),
     ("space", "play or pause the motion"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo"),
     ("Ctrl and click", "type a slider's value"),

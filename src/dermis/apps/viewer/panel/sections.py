@@ -15,7 +15,7 @@ from imgui_bundle import imgui, implot
 from numpy.typing import NDArray
 
 from dermis.apps.viewer import posing
-from dermis.apps.viewer.controls import CAMERA_PRESETS
+from dermis.apps.viewer.controls import PRESET_NAMES
 from dermis.apps.viewer.panel.fields import (
     LIGHT_KIND_NAMES,
     LIGHT_STYLES,
@@ -323,7 +323,7 @@ def draw_view(session: Session) -> None:
 
         draw_combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
         imgui.text_disabled("wheel: zoom; double click: show all")
-    for index, name in enumerate(CAMERA_PRESETS):
+    for index, name in enumerate(PRESET_NAMES):
         if index % _BUTTONS_PER_ROW:
             imgui.same_line()
         if draw_button(session, f"{name}##camera"):

@@ -1,0 +1,46 @@
+"""Axes of files: which of them points up, and along which the face looks."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
+
+
+class Axes(NamedTuple):
+    """Axes of a file.
+
+    up : axis that points upwards
+    front : axis along which the face looks, across `up`; "auto" for -Y with Z up, as in Blender, else Z
+    """
+
+    up: Axis = "y"
+    front: Front = "auto"
+
+    @property
+    def face(self) -> Axis:
+        """Return the axis along which the face looks."""
+        if self.front != "auto":
+            return self.front
+        return "-y" if self.up in ("z", "-z") else "z"
+
+
+def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
+    """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""
+    if (axes.up, axes.face) == ("y", "z"):
+        return vectors
+    (up, up_sign), (front, front_sign) = _split(axes.up), _split(axes.face)
+    side = 3 - up - front
+    side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
+    columns = (side, side_sign), (up, up_sign), (front, front_sign)
+    return np.column_stack([vectors[:, k] if sign > 0 else -vectors[:, k] for k, sign in columns])
+
+
+def _split(axis: Axis) -> tuple[int, int]:
+    """Return the index of an axis, 0 to 2, and its sign."""
+    return "xyz".index(axis[-1]), -1 if axis[0] == "-" else 1

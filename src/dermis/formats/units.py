@@ -1,0 +1,105 @@
+"""Length unit of mesh files: stated by the user or the format, else guessed from the size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import log
+from pathlib import Path
+
+import numpy as np
+
+from dermis.base.arrays import Floats, Ints
+from dermis.base.errors import refuse
+from dermis.formats.load import RiggedMesh
+from dermis.formats.parts import default_unit_mm
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.skull import MAX_ELONGATION, is_standing_figure, principal_sizes
+
+WITHOUT_UNIT = (".obj", ".ply")
+"""Suffixes of formats that do not state a unit."""
+UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
+_SIZE_MM = (1.0, 3000.0)  # smallest and largest that is accepted
+_SIZE_IN_MM = (100.0, 1000.0)  # of files whose unit is taken to be the millimetre
+_FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
+_FLATNESS = 0.25  # thickness relative to length below which a mesh is a piece of skin or a hand
+_INCH, _INCH_PENALTY = 25.4, 0.4  # of the logarithm of the size, as few files are in inches
+_EXPORTED_UNITS_MM = (1.0, 10.0)  # that programs write although a format states metres
+_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # sizes of figures and of others
+
+
+def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
+    """Return the mesh of a file in millimetres, with a note if its unit is a guess or its size unusual.
+
+    rigged : mesh and rig as read from the file with this unit; formats without a unit have no rigs
+    unit_mm : unit of the file that the user states [mm]; None for that of the format
+    culprit : source of the mesh, for errors
+
+    Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.
+    """
+    mesh, note = rigged.mesh, ""
+    guessed = unit_mm is None and path.suffix.lower() in WITHOUT_UNIT
+    read_unit = default_unit_mm(path) if unit_mm is None else unit_mm
+    unit = guess_unit_mm(mesh.positions, mesh.triangles) if guessed else read_unit
+    if unit != read_unit:
+        mesh = replace(mesh, positions=(mesh.positions * (unit / read_unit)).astype(np.float32))
+    size = float(mesh.size_mm.max())
+    if not _SIZE_MM[0] <= size <= _SIZE_MM[1]:
+        _refuse_size(mesh, unit, culprit)
+    if guessed and not (unit == 1.0 and _is_in_mm(mesh.positions)):
+        made = f"1 unit = {unit:g} mm makes it {_described(mesh.size_mm)}"
+        note = f"its unit is not stated; {made}; --unit-mm sets another"
+    elif size > _SIZE_IN_MM[1] and mesh.skull_mm is None and not (rigged.rig and rigged.rig.skeleton):
+        note = f"it is {_described(mesh.size_mm)} at {unit:g} mm per unit; --unit-mm sets another"
+    return rigged._replace(mesh=mesh, notes=(note, *rigged.notes) if note else rigged.notes)
+
+
+def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
+    """Return the likely unit of a mesh whose file states none [mm].
+
+    It is a millimetre if that makes the mesh 100 to 1000 mm large, unless it is a standing figure. Otherwise
+    it is the unit of `UNITS_MM` that brings the size closest to that of an adult, of a head, or of a hand for
+    what is flat or slender.
+
+    positions : (v, 3) vertices in the unit of the file, Y up
+    triangles : (f, 3) vertex indices
+    """
+    size, typical = float(np.ptp(positions, axis=0).max()), _FIGURE_MM
+    if not is_standing_figure(positions, triangles):
+        thickness, width, length = principal_sizes(positions)
+        if size == 0 or _is_in_mm(positions):
+            return 1.0
+        is_piece = length > MAX_ELONGATION * width or thickness < _FLATNESS * length
+        typical = _PIECE_MM if is_piece else _HEAD_MM
+    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + _INCH_PENALTY * (unit == _INCH))
+
+
+def _is_in_mm(positions: Floats) -> bool:
+    """Return whether height or longest side of vertices (v, 3) suggest that they are in millimetres."""
+    sizes, (low, high) = np.ptp(positions, axis=0), _SIZE_IN_MM
+    return any(low <= size <= high for size in (sizes[1], sizes.max()))
+
+
+def _described(sizes: Floats) -> str:
+    """Return the height of a mesh, or its length if it lies, as text with a unit.
+
+    sizes : (3,) of the bounding box [mm]
+    """
+    longest = float(sizes.max())
+    length = f"{longest / 1000:.3g} m" if longest >= 1000 else f"{longest:.3g} mm"
+    return f"{length} {'high' if sizes[1] == longest else 'long'}"
+
+
+def _refuse_size(mesh: Mesh, unit: float, culprit: object) -> None:
+    """Refuse a mesh of impossible size; the advice names a unit only if it makes the size a usual one.
+
+    unit : millimetres per unit of the file with which the mesh was read [mm]
+    """
+    low, high = _ADVISED_MM[is_standing_figure(mesh.positions, mesh.triangles)]
+    advice = "Set the millimetres per unit of the file with --unit-mm"
+    for other in _EXPORTED_UNITS_MM:
+        sizes = mesh.size_mm * (other / unit)
+        if low <= sizes.max() <= high:
+            program = "millimetres" if other == 1.0 else "centimetres"
+            advice += f": {other:g}, for a program that writes {program}, makes it {_described(sizes)}"
+    actual = f"it is {_described(mesh.size_mm)} at {unit:g} mm per unit (a forgotten unit?)"
+    refuse(culprit, f"skin {_SIZE_MM[0]:g} to {_SIZE_MM[1]:g} mm large", actual, advice)
