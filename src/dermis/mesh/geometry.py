@@ -46,6 +46,16 @@ def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     return unique_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
 
 
+def edge_keys(corners: NDArray[np.integer]) -> Index:
+    """Return for each side of triangles a number that is equal for the sides of one edge, (f, 3).
+
+    corners : (f, 3) point indices; side k runs from corner k to the next
+    """
+    start = corners.astype(np.int64)
+    end = start[:, [1, 2, 0]]
+    return np.minimum(start, end) * (int(start.max(initial=0)) + 1) + np.maximum(start, end)
+
+
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Return the unique edges (e, 2), the edge of each side (n,) and the number of sides per edge (e,).
 

@@ -1,0 +1,462 @@
+"""Mending of meshes from files: faults that other programs tolerate are corrected, each with a note."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
+from dermis.formats.mesh_checks import UV_TOLERANCE, flat_triangles
+from dermis.formats.parts import MeshPart
+from dermis.formats.read import select_vertices
+from dermis.mesh.geometry import (
+    compact_vertices,
+    cross_columns,
+    dot_columns,
+    edge_keys,
+    fibonacci_sphere,
+    triangle_areas,
+    weld,
+)
+from dermis.mesh.mesh import Material, Mesh, build_mesh
+
+_MAX_FLAT = 0.5
+"""Fraction of triangles without area above which a mesh is refused instead of mended [-]."""
+_MAX_PAIRED_SIDES = 8
+"""Edges of more triangles are cut open, instead of a search for the sheets that continue across them."""
+_MIN_CONVEXITY = -0.05
+"""Mean cosine between normals and directions from the centroid below which a piece may be inside out [-]."""
+_OPPOSED = -0.5
+"""Mean cosine between the normals of the file and those of triangles below which they are opposed [-]."""
+_SEEN_BALANCE = 0.25
+"""Excess of one side among the visible samples above which a piece shows that side to the outside [-]."""
+_MIN_SEEN, _MIN_SLOPE = 8, 0.05  # samples, cosine
+_VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 24, 96, 200_000
+_MAX_UV_EXCESS = 0.02
+"""Distance from the tile up to which uv are clamped to it [-]."""
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Triangles of a file in the head's space, before they become a `Mesh`.
+
+    positions : (v, 3) [mm]
+    normals : (v, 3) as in the file, NaN where it has none
+    uv : (v, 2) v down
+    point : (v,) index of the point of each vertex
+    triangles : (f, 3) vertex indices
+    material : (f,) index of the material of each triangle
+    quads : (q, 2) pairs of triangles that are the halves of a quad
+    vertices : the same vertices in the file's space, with their morph targets and bones
+    """
+
+    positions: Floats
+    normals: Doubles
+    uv: Floats
+    point: Ints
+    triangles: Index
+    material: Ints
+    quads: Index
+    vertices: MeshPart
+
+    def build(self, materials: tuple[Material, ...]) -> Mesh:
+        """Return the mesh with points and normals of its own."""
+        arrays = self.positions, self.uv, self.triangles, self.material
+        return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
+
+    @cached_property
+    def corners(self) -> Index:
+        """Return the points of the corners of each triangle, (f, 3)."""
+        return self.point[self.triangles].astype(np.int64)
+
+    @cached_property
+    def sides(self) -> _Sides:
+        """Return the sides of the triangles, grouped by edge."""
+        return _group_sides(self.corners)
+
+    def with_triangles(self, kept: Mask) -> RawMesh:
+        """Return the mesh with some of its triangles (f,)."""
+        quads = (np.cumsum(kept) - 1)[self.quads[kept[self.quads].all(axis=1)]]
+        return replace(self, triangles=self.triangles[kept], material=self.material[kept], quads=quads)
+
+    def with_corners(self, corners: Index) -> RawMesh:
+        """Return the mesh with other points at its corners (f, 3); vertices of several are repeated."""
+        triangles, stride = self.triangles.copy(), int(corners.max()) + 1
+        moved = corners != self.point[triangles]
+        copies, number = np.unique(triangles[moved] * stride + corners[moved], return_inverse=True)
+        triangles[moved] = len(self.point) + number.reshape(-1)
+        source = np.concatenate((np.arange(len(self.point)), copies // stride))
+        point = np.concatenate((self.point, copies % stride)).astype(np.int32)
+        return replace(self._select(source), point=point, triangles=triangles)
+
+    def compact(self) -> RawMesh:
+        """Return the mesh without vertices and points that no triangle uses, and without broken quads."""
+        used, triangles = compact_vertices(self.triangles)
+        point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
+        first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
+        whole = (first[:, [0, 2]] == second[:, [2, 0]]).all(axis=1)
+        return replace(self._select(used), point=point, triangles=triangles, quads=self.quads[whole])
+
+    def _select(self, source: Index) -> RawMesh:
+        """Return the mesh with other vertices (n,); its points and triangles are not changed."""
+        return replace(
+            self,
+            positions=self.positions[source],
+            normals=self.normals[source],
+            uv=self.uv[source],
+            vertices=select_vertices(self.vertices, source),
+        )
+
+
+def mend(mesh: RawMesh) -> tuple[RawMesh, tuple[str, ...]]:
+    """Return a mesh without the faults that can be mended, and a note on each fault.
+
+    Triangles without area and repeated ones are dropped; sheets that meet at an edge of more than two
+    triangles become separate; pieces that are wound inside out are reversed; normals that point inwards are
+    turned; uv that are slightly outside the tile are clamped, and charts in other tiles are moved by whole
+    tiles. A mesh without faults is returned as it is.
+    """
+    notes: list[str] = []
+    flat = flat_triangles(mesh.positions, mesh.triangles)
+    if flat.mean() > _MAX_FLAT:
+        return mesh, ()
+    mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, notes), notes), notes)
+    return _move_uv(mended if mended is mesh else mended.compact(), notes), tuple(notes)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
+    """Return the mesh without flat triangles (f,) and without repetitions within a material.
+
+    Of triangles of the same three points the first is kept.
+    """
+    if flat.any():
+        notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
+        mesh = mesh.with_triangles(~flat)
+    a, b, c = mesh.corners.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    stride = int(high.max()) + 1  # its cube fits in 64 bits, as there are at most 1.25 million points
+    key = (low * stride + a + b + c - low - high) * stride + high
+    ordered = np.sort(key)
+    if (ordered[1:] == ordered[:-1]).any():
+        order = np.lexsort((np.arange(len(key)), mesh.material, key))
+        again = (key[order][1:] == key[order][:-1]) & (np.diff(mesh.material[order]) == 0)
+        kept = np.ones(len(key), bool)
+        kept[order[1:][again]] = False
+        if again.any():
+            notes.append(f"left out {_counted(int(again.sum()), 'triangle')} that repeat others")
+            mesh = mesh.with_triangles(kept)
+    return mesh
+
+
+class _Sides(NamedTuple):
+    """Sides of triangles, grouped by the edge that they share.
+
+    Side 3 t + k runs from corner k of triangle t to its next corner.
+
+    side : (3f,) sides, ordered by edge
+    first, count : (e,) index in `side` of the first side of each edge, and number of its sides
+    start, end : (3f,) points at the ends of each side
+    """
+
+    side: Index
+    first: Index
+    count: Index
+    start: Index
+    end: Index
+
+    @property
+    def pairs(self) -> Index:
+        """Return the two sides of each edge of two triangles, (n, 2)."""
+        first = self.first[self.count == 2]
+        return np.column_stack((self.side[first], self.side[first + 1]))
+
+
+def _group_sides(corners: Index) -> _Sides:
+    start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
+    key = edge_keys(corners).ravel()
+    side = np.argsort(key)
+    ordered = key[side]
+    first = np.flatnonzero(np.concatenate(([True], ordered[1:] != ordered[:-1])))
+    return _Sides(side, first, np.diff(first, append=len(key)), start, end)
+
+
+def _label(count: int, links: Index) -> Index:
+    """Return the connected component of each node of a graph, (count,).
+
+    links : (n, 2) nodes at the ends of each link
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(links), bool), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
+    """Return the mesh with separate points for the sheets that meet at edges of more than two triangles."""
+    count = int((mesh.sides.count > 2).sum())
+    if not count:
+        return mesh
+    notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
+    links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
+    mesh = mesh.with_corners(_split_points(mesh, links))
+    sides = mesh.sides
+    if (sides.count > 2).any():  # sheets that are joined elsewhere around both ends of an edge
+        kept = np.zeros(len(sides.side), bool)
+        kept[sides.side[sides.first[sides.count == 1]]] = True
+        kept[np.concatenate((sides.pairs, _continue_sheets(mesh, rounds=1)))] = True
+        apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
+        corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
+        mesh = mesh.with_corners(corners)
+    return mesh
+
+
+def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Index:
+    """Return pairs of sides (n, 2) across which sheets continue at edges of more than two triangles.
+
+    At each edge the pair of the same material, with opposite directions and the least angle is chosen first;
+    further ones must have opposite directions.
+
+    rounds : most pairs of an edge
+    """
+    sides, material = mesh.sides, mesh.material
+    crowded = np.flatnonzero((sides.count > 2) & (sides.count <= _MAX_PAIRED_SIDES))
+    count = sides.count[crowded, None]
+    column = np.arange(int(count.max(initial=0)))
+    table = np.where(
+        column < count, sides.side[sides.first[crowded, None] + np.minimum(column, count - 1)], -1
+    )
+    table = -np.sort(-table, axis=1)
+    inwards = _directions_from_sides(mesh, table)
+    forward, piece = sides.start < sides.end, _label(len(mesh.triangles), sides.pairs // 3)
+    found = [np.empty((0, 2), np.int64)]
+    for turn in range(rounds):
+        best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
+        for a, b in combinations(range(len(column)), 2):
+            row = np.flatnonzero((table[:, a] >= 0) & (table[:, b] >= 0))
+            one, two = table[row, a], table[row, b]
+            cost = (inwards[row, a] * inwards[row, b]).sum(axis=1)
+            cost += 0.5 * (piece[one // 3] != piece[two // 3]) + 8 * (
+                material[one // 3] != material[two // 3]
+            )
+            cost += np.where(forward[one] == forward[two], np.inf if turn else 4, 0)
+            better = cost < best[row]
+            best[row[better]], chosen[row[better]] = cost[better], (a, b)
+        row = np.flatnonzero(best < np.inf)
+        found.append(np.column_stack((table[row, chosen[row, 0]], table[row, chosen[row, 1]])))
+        table[row[:, None], chosen[row]] = -1
+    return np.vstack(found)
+
+
+def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
+    """Return for sides (...) the unit vectors (..., 3) in their triangles that are perpendicular to them."""
+    p, q, r = (mesh.positions[np.roll(mesh.triangles, -k, axis=1).ravel()[sides]] for k in range(3))
+    along, inwards = q - p, r - p
+    scale = (inwards * along).sum(axis=-1) / (along * along).sum(axis=-1)
+    inwards -= along * scale[..., None]
+    return np.asarray(inwards / np.linalg.norm(inwards, axis=-1, keepdims=True))
+
+
+def _split_points(mesh: RawMesh, links: Index) -> Index:
+    """Return the points of corners (f, 3) after splitting those at edges of more than two triangles.
+
+    Corners at a point remain together if their triangles are connected around it by `links`; the largest
+    group keeps the point, the others get new ones.
+
+    links : (n, 2) pairs of sides across which sheets continue
+    """
+    sides, flat = mesh.sides, mesh.corners.ravel()
+    crowded = sides.side[sides.first[sides.count > 2]]
+    busy = np.zeros(int(flat.max()) + 1, bool)
+    busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
+    first, second = links.T  # a side has the index of the corner at its start
+    following = [3 * (one // 3) + (one + 1) % 3 for one in (first, second)]
+    crossed = flat[first] != flat[second]
+    ends = np.concatenate((first, following[0]))
+    others = np.concatenate(
+        (np.where(crossed, following[1], second), np.where(crossed, second, following[1]))
+    )
+    affected = np.flatnonzero(busy[flat])
+    number = np.cumsum(busy[flat]) - 1
+    used = busy[flat[ends]]
+    fan = _label(len(affected), number[np.column_stack((ends[used], others[used]))])
+    point = np.zeros(int(fan.max()) + 1, np.int64)
+    point[fan] = flat[affected]
+    order = np.lexsort((-np.bincount(fan), point))
+    smaller = order[1:][point[order][1:] == point[order][:-1]]
+    point[smaller] = len(busy) + np.arange(len(smaller))
+    result = flat.copy()
+    result[affected] = point[fan]
+    return result.reshape(-1, 3)
+
+
+def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
+    """Return the mesh with triangles that are wound consistently and with normals that point outwards."""
+    piece, reverse = _find_pieces(mesh)
+    x = np.ascontiguousarray(mesh.positions.T, np.float64)
+    a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
+    area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
+    surface = _Surface(piece, area, np.stack((a, b, c)))
+    agreement = surface.mean_cosine(_corner_normals(mesh))
+    doubtful = (surface.mean_cosine(surface.from_centroid()) < _MIN_CONVEXITY) | (agreement < _OPPOSED)
+    if doubtful.any():
+        turned = _inside_out(surface, doubtful, agreement)
+        reverse ^= turned[piece]
+        agreement[turned] *= -1
+    if reverse.any():
+        count = _counted(int(reverse.sum()), "triangle")
+        notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
+        triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
+        mesh = replace(mesh, triangles=triangles)
+    inwards = np.unique(mesh.triangles[(agreement < _OPPOSED)[piece]])
+    if len(inwards):
+        notes.append(f"turned {_counted(len(inwards), 'normal')} outwards")
+        normals = mesh.normals.copy()
+        normals[inwards] *= -1
+        mesh = replace(mesh, normals=normals)
+    return mesh
+
+
+def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
+    """Return the connected piece of each triangle (f,), and which to reverse for a consistent winding (f,).
+
+    Of the two windings of a piece, that of the larger area is kept. A piece that has no consistent winding,
+    such as a Moebius strip, is not changed.
+    """
+    count, pairs = len(mesh.triangles), mesh.sides.pairs
+    forward = mesh.sides.start < mesh.sides.end
+    links = pairs // 3
+    conflict = forward[pairs[:, 0]] == forward[pairs[:, 1]]
+    if not conflict.any():
+        return _label(count, links), np.zeros(count, bool)
+    # each triangle is two nodes, one for each winding; links join the windings that agree
+    one, two = links.T
+    first, second = np.concatenate((one, one + count)), np.concatenate((two, two + count))
+    second = np.where(np.tile(conflict, 2), (second + count) % (2 * count), second)
+    kept, reversed_ = _label(2 * count, np.column_stack((first, second))).reshape(2, -1)
+    piece = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
+    reverse = kept > reversed_
+    size = triangle_areas(mesh.positions[mesh.triangles])
+    balance = np.bincount(piece, np.where(reverse, size, -size))
+    return piece, reverse ^ ((balance > 0)[piece] & (kept != reversed_))
+
+
+def _corner_normals(mesh: RawMesh) -> Doubles:
+    """Return the sum of the normals of the file at the corners of each triangle, as columns (3, f)."""
+    normals = np.where(np.isfinite(mesh.normals), mesh.normals, 0).T
+    return np.asarray(sum(normals.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T)))
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """Triangles with the connected pieces that they belong to.
+
+    piece : (f,) index of the piece of each triangle
+    area : (3, f) normals, as long as twice the area [mm²]
+    corners : (3, 3, f) positions of the three corners, as columns [mm]
+    """
+
+    piece: Index
+    area: Doubles
+    corners: Doubles
+
+    @cached_property
+    def size(self) -> Doubles:
+        """Return twice the area of each triangle (f,) [mm²]."""
+        return np.sqrt(dot_columns(self.area, self.area))
+
+    def from_centroid(self) -> Doubles:
+        """Return the direction from the centroid of its piece to that of each triangle, as columns (3, f)."""
+        centre = self.corners.mean(axis=0)
+        total = np.maximum(np.bincount(self.piece, self.size), np.finfo(np.float64).tiny)
+        return np.stack(
+            [one - (np.bincount(self.piece, one * self.size) / total)[self.piece] for one in centre]
+        )
+
+    def mean_cosine(self, direction: Doubles) -> Doubles:
+        """Return for each piece the mean cosine between its normals and a direction (3, f), 0 without one."""
+        length = np.bincount(self.piece, self.size * np.sqrt(dot_columns(direction, direction)))
+        total = np.bincount(self.piece, dot_columns(self.area, direction))
+        return total / np.where(length > 0, length, 1)
+
+    def visible_samples(self, pieces: Mask) -> tuple[Index, Index]:
+        """Return how many samples of each piece are seen from outside on its front and on its back.
+
+        pieces : those that get additional samples, so that small ones have enough
+        """
+        count, random = len(pieces), np.random.default_rng(0)
+        own = np.bincount(self.piece, self.size, count)
+        weight = self.size * (1 / own.sum() + (pieces / own / pieces.sum())[self.piece])
+        total = np.cumsum(weight)
+        triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
+        shares = np.sort(random.random((2, _VIEW_SAMPLES)), axis=0)
+        shares = np.diff(shares, axis=0, prepend=0, append=1)
+        sample = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
+        sample -= self.corners.mean(axis=(0, 2))[:, None]
+        normal = self.area[:, triangle] / self.size[triangle]
+        radius, seen = np.sqrt(dot_columns(sample, sample).max()), np.zeros((2, count), np.int64)
+        for view in fibonacci_sphere(_VIEWS):
+            across = np.linalg.svd(view[None])[2][1:]
+            cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
+            nearest = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1)
+            order = np.argsort(view @ sample)
+            nearest[tuple(cell[:, order])] = (
+                order  # the last of several, which is nearest to the eye, remains
+            )
+            visible = nearest[nearest >= 0]
+            cosine, index = view @ normal[:, visible], self.piece[triangle[visible]]
+            for side, facing in enumerate((cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE)):
+                seen[side] += np.bincount(index[facing], minlength=count)
+        return seen[0], seen[1]
+
+
+def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
+    """Return which pieces are wound inside out, (pieces,).
+
+    Pieces are judged by the side that is seen from outside; those that show both sides alike, by the normals
+    of the file; and those that are not seen as most of the mesh is.
+
+    doubtful : pieces that may be inside out
+    agreement : mean cosine between the normals of the file and those of the triangles of each piece
+    """
+    front, back = surface.visible_samples(doubtful)
+    seen = front + back >= _MIN_SEEN
+    balance = np.where(seen, (front - back) / np.maximum(front + back, 1), 0)
+    outwards, inwards = balance > _SEEN_BALANCE, balance < -_SEEN_BALANCE
+    opposed = (agreement < _OPPOSED) & ~outwards
+    return np.asarray(inwards | opposed | (~seen & bool(back.sum() > front.sum())))
+
+
+def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
+    """Return the mesh with its uv charts moved by whole tiles and clamped, where they then fit in."""
+    if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
+        return mesh
+    place = weld(np.column_stack((mesh.point, mesh.uv)))
+    corners = place[mesh.triangles]
+    links = np.column_stack((corners.ravel(), np.roll(corners, -1, axis=1).ravel()))
+    chart = _label(int(place.max()) + 1, links)[place]
+    low, high = (np.full((int(chart.max()) + 1, 2), sign * np.inf) for sign in (1, -1))
+    np.minimum.at(low, chart, mesh.uv)
+    np.maximum.at(high, chart, mesh.uv)
+    outside = (np.minimum(low, 1 - high) < -UV_TOLERANCE).any(axis=1, keepdims=True)
+    shift = np.where(outside, np.floor((low + high) / 2), 0)
+    fits = (np.minimum(low - shift, 1 + shift - high) >= -_MAX_UV_EXCESS).all(axis=1, keepdims=True)
+    shift = np.where(fits, shift, 0)
+    moved = mesh.uv - shift[chart]
+    clamped = np.where(fits[chart], np.clip(moved, 0, 1), moved)
+    count, excess = int(shift.any(axis=1).sum()), float(np.abs(clamped - moved).max())
+    if count:
+        notes.append(
+            f"moved {count:,} of {_counted(len(shift), 'uv chart')} by whole tiles into the first one"
+        )
+    if excess > UV_TOLERANCE:
+        notes.append(f"clamped uv that are up to {excess:.2g} outside the tile")
+    return replace(mesh, uv=clamped.astype(np.float32))
