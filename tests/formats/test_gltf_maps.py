@@ -14,7 +14,7 @@ from encoded_glb import encode_glb
 from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
-from dermis.formats.gltf.embedded import embedded_maps
+from dermis.formats.gltf.embedded import embedded_materials
 from dermis.images.codecs import encode_png
 from dermis.images.io import EmbeddedPicture, read_image
 from dermis.mesh.primitives import uv_sphere
@@ -109,23 +109,21 @@ def test_other_programs_files_give_colour_and_normals(tmp_path: Path) -> None:
     material["normalTexture"] = {"index": 0}
     path = tmp_path / "other.glb"
     path.write_bytes(with_tree(data, tree))
-    assert set(embedded_maps(path)) == {"colour", "normal"}
+    assert set(embedded_materials(path)[0].skin_pictures()) == {"colour", "normal"}
 
 
 def test_pictures_by_uri(tmp_path: Path) -> None:
     png = encode_png(ramp(255, 3))
     (tmp_path / "a b.png").write_bytes(png)
-    uris = ["a%20b.png", f"data:image/png;base64,{base64.b64encode(png).decode()}", "c.ktx2"]
-    found = []
-    for uri in uris:
+    for uri in ("a%20b.png", f"data:image/png;base64,{base64.b64encode(png).decode()}"):
         tree = {
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
             "textures": [{"source": 0}],
             "images": [{"uri": uri}],
         }
         (tmp_path / "a.gltf").write_text(json.dumps(tree))
-        found.append(embedded_maps(tmp_path / "a.gltf").get("colour"))
-    assert [None if one is None else read_image(one).shape for one in found] == [(32, 32, 3)] * 2 + [None]
+        (material,) = embedded_materials(tmp_path / "a.gltf")
+        assert read_image(material.textures["colour"].picture).shape == (32, 32, 3)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +140,7 @@ def test_damage_is_refused(glb: Path, damage: dict[str, Any]) -> None:
     data = glb.read_bytes()
     glb.write_bytes(with_tree(data, tree_of(data) | damage))
     with pytest.raises(DermisError, match="valid textures"):
-        embedded_maps(glb)
+        embedded_materials(glb)
 
 
 def test_a_picture_that_is_none_is_refused_by_its_name() -> None:
@@ -152,4 +150,4 @@ def test_a_picture_that_is_none_is_refused_by_its_name() -> None:
 
 def test_files_without_pictures(tmp_path: Path) -> None:
     (tmp_path / "a.gltf").write_text("{}")
-    assert embedded_maps(tmp_path / "a.gltf") == {}
+    assert embedded_materials(tmp_path / "a.gltf") == ()

@@ -17,7 +17,7 @@ from small_head import obj_text
 
 from dermis.base.errors import DermisError
 from dermis.formats.gltf.animations import read_clip
-from dermis.formats.gltf.embedded import embedded_maps
+from dermis.formats.gltf.embedded import embedded_materials
 from dermis.formats.load import load_rigged
 from dermis.formats.motion.sequence import FrameReader
 from dermis.formats.obj import obj_maps, read_materials
@@ -219,7 +219,7 @@ def test_numbers_of_things_that_there_are_not(tmp_path: Path, index: object) -> 
 def test_a_relief_that_is_no_length_is_refused(tmp_path: Path, relief: object) -> None:
     file, node = square()
     file.tree["materials"] = [{"extras": {"dermis": {"height_mm": relief}}}]
-    assert "valid textures" in refused(embedded_maps, file.write(tmp_path / "a.gltf", node))
+    assert "valid textures" in refused(embedded_materials, file.write(tmp_path / "a.gltf", node))
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_nothing_outside_of_its_folder_is_read_for_a_gltf_file(tmp_path: Path, u
     tree = {"asset": {}, "images": [{"uri": uri}], "textures": [{"source": 0}]}
     tree["materials"] = [{"normalTexture": {"index": 0}}]
     path.write_text(json.dumps(tree))
-    assert "files in its own folder or below" in refused(embedded_maps, path)
+    assert "files in its own folder or below" in refused(embedded_materials, path)
 
 
 def test_no_pipe_and_no_endless_name_is_waited_for(tmp_path: Path) -> None:
@@ -276,11 +276,11 @@ def test_pictures_of_a_file_are_limited_together(tmp_path: Path) -> None:
     tree = {"asset": {}, "images": [{"uri": "a.png"}], "textures": [{"source": 0}]}
     tree["materials"] = [{"extras": {"dermis": own}}]
     (tmp_path / "a.gltf").write_text(json.dumps(tree))
-    assert "134 million texels together" in refused(embedded_maps, tmp_path / "a.gltf")
+    assert "134 million texels together" in refused(embedded_materials, tmp_path / "a.gltf")
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"asset": ' + "1" * 5000 + "}", '{"nodes": 5}', "null"])
 def test_trees_that_are_none_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.gltf").write_text(text)
-    for read in (load_mesh, embedded_maps, lambda path: read_clip(path, None)):
+    for read in (load_mesh, embedded_materials, lambda path: read_clip(path, None)):
         assert "a glTF file" in refused(read, tmp_path / "a.gltf") or read is load_mesh

@@ -119,9 +119,9 @@ def _move_charts(
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, chart, uv)
     np.maximum.at(high, chart, uv)
-    period = np.array([{"repeat": 1.0, "mirror": 2.0, "clamp": np.inf}[wrap] for wrap in texture.wrap])
-    moved = np.where(np.isfinite(period), period * np.floor((low + high) / 2.0 / period), 0.0)
-    return np.asarray(uv - np.nan_to_num(moved)[chart])
+    period = np.array([{"repeat": 1.0, "mirror": 2.0, "clamp": 0.0}[wrap] for wrap in texture.wrap])
+    middle = (low + high)[chart] / 2.0
+    return np.asarray(uv - period * np.floor(middle / np.where(period > 0, period, 1.0)))
 
 
 def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:

@@ -56,7 +56,6 @@ class FileMaterial:
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
     metalness, emission, normal_scale : as in glTF
-    is_unlit : whether the base colour is the radiance, and light is ignored
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
     unused : properties that have no effect here, for the note
@@ -72,7 +71,6 @@ class FileMaterial:
     metalness: float = 0.0
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal_scale: float = 1.0
-    is_unlit: bool = False
     scatters: bool = False
     maps: Mapping[str, object] | None = None
     unused: tuple[str, ...] = ()

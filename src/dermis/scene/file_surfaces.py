@@ -174,9 +174,7 @@ def _replaced_by_skin(material: FileMaterial) -> list[str]:
     if material.metalness not in (0.0, 1.0) or "metalness" in material.textures:
         replaced.append("metalness")
     if max(material.emission) > 0.0 or "emission" in material.textures:
-        replaced.append("emission")
+        replaced.append(f"emission {max(material.emission):g}")
     if material.alpha_mode != "opaque":
         replaced.append(f"opacity ({material.alpha_mode})")
-    if material.is_unlit:
-        replaced.append("unlit colours, taken for the reflectance")
     return replaced

@@ -83,6 +83,8 @@ class _Reader:
         if "emission" in textures and "colour" not in textures and (factor is None or max(factor[:3]) == 0):
             textures["colour"], factor, is_unlit = textures.pop("emission"), [*emission, 1.0], True
             emission = (0.0, 0.0, 0.0)
+        if is_unlit:
+            self.unused.append("unlit colours, which are taken for the reflectance")
         if "occlusionTexture" in self.material:
             self.unused.append("picture of occlusion, which is computed from the shape")
         self.unused += [text for name, text in _NOT_DRAWN.items() if name in self.extensions]
@@ -98,7 +100,6 @@ class _Reader:
             metalness=float(pbr.get("metallicFactor", 1.0)),
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
-            is_unlit=is_unlit,
             scatters=any(name in self.extensions for name in _SCATTERING),
             maps=self._own_maps(own) if isinstance(own, dict) else None,
             unused=tuple(self.unused),
