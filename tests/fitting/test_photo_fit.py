@@ -15,7 +15,7 @@ from dermis.apps.inverse.fitting import light_basis
 from dermis.apps.inverse.fitting.fit import fit
 from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
 from dermis.apps.inverse.fitting.light_basis import solve_strengths
-from dermis.apps.inverse.fitting.placement import align_to_landmarks, read_landmarks
+from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
@@ -142,13 +142,6 @@ def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
     back = (there @ fitted.R.T + fitted.t) @ fitted.K.T
     off = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels, axis=1)
     assert np.median(off) < 1.5
-
-
-def test_landmarks_of_mediapipe(tmp_path: Path) -> None:
-    face = [{"x": 0.5, "y": k / 478, "z": 0.0} for k in range(478)]
-    (tmp_path / "face.json").write_text(json.dumps({"face_landmarks": [face]}))
-    name, fitted = read_landmarks(tmp_path / "face.json", (200, 100))
-    assert name == "mediapipe" and fitted["239"] == pytest.approx([99.5, 49.5])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ Comments above the header of a table state the quantity, unit, source and licenc
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from importlib import resources
 
 import numpy as np
@@ -35,6 +37,12 @@ def column_separator(line: str) -> str:
     Beside tabs and semicolons commas are decimal signs.
     """
     return next((mark for mark in "\t;" if mark in line), ",")
+
+
+@lru_cache(4096)
+def plain_key(key: str) -> str:
+    """Return a key or column name without case and punctuation: timestamp_ms and timestampMs are one."""
+    return re.sub(r"[\W_]", "", key).casefold()
 
 
 def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:

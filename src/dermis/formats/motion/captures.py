@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -120,12 +119,6 @@ def frame_rate(times: Doubles) -> float | None:
         return None
     nearest = min(_COMMON_RATES, key=lambda common: abs(common - rate))
     return nearest if abs(nearest / rate - 1) < _RATE_TOLERANCE else rate
-
-
-@lru_cache(4096)
-def plain_key(key: str) -> str:
-    """Return a key or column name without case and punctuation: timestamp_ms and timestampMs are one."""
-    return re.sub(r"[\W_]", "", key).casefold()
 
 
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:

@@ -16,7 +16,7 @@ from dermis.base.arrays import Doubles, Mask
 from dermis.base.errors import notify, refuse
 from dermis.base.quantities import checked_number
 from dermis.base.reading import parsing, read_text
-from dermis.base.tables import column_separator
+from dermis.base.tables import column_separator, plain_key
 from dermis.formats.motion.captures import (
     FRAME_KEYS,
     MAX_CLIP_BYTES,
@@ -33,7 +33,6 @@ from dermis.formats.motion.captures import (
     find_rotation_bones,
     head_bone_angles,
     note_lost_frames,
-    plain_key,
     to_fractions,
     to_seconds,
     unwrap_degrees,

@@ -14,6 +14,7 @@ from dermis.base.arrays import Doubles, Intp
 from dermis.base.errors import DermisError, format_value, notify, refuse
 from dermis.base.quantities import checked_array, checked_number
 from dermis.base.reading import parse_json, read_text
+from dermis.base.tables import plain_key
 from dermis.formats.motion.captures import (
     FRAME_KEYS,
     MAX_CLIP_BYTES,
@@ -30,7 +31,6 @@ from dermis.formats.motion.captures import (
     find_rotation_bones,
     head_bone_angles,
     note_lost_frames,
-    plain_key,
     rotation_quaternions,
     to_fractions,
     to_seconds,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import FitSubject, fit_subject
-from dermis.base.errors import refuse
-from dermis.base.reading import parse_json, parsing, read_text
-from dermis.base.tables import parse_rows
+from dermis.apps.inverse.fitting.landmark_files import read_landmarks
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
-from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -215,48 +211,3 @@ def _fitted_camera(x: Floats, size: tuple[int, int]) -> Camera:
     focal, (cx, cy) = float(np.exp(x[6])), (np.array(size) - 1.0) / 2.0
     K = [[focal, 0.0, cx], [0.0, focal, cy], [0.0, 0.0, 1.0]]
     return Camera.from_opencv(K, Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], size)
-
-
-_LANDMARK_FORMATS = "landmarks: CSV rows of name,x,y in pixels, or JSON by MediaPipe or dermis render"
-_SET_BY_COUNT = {68: "ibug-68", 70: "face-synthetics-70", 468: "mediapipe", 478: "mediapipe"}
-_MEDIAPIPE_KEYS = "face_landmarks", "faceLandmarks", "multi_face_landmarks", "landmarks", "landmark"
-_MIN_LANDMARKS = 6
-
-
-def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Read landmarks in a photograph; return the name of the landmark set, and each landmark's pixel (2,).
-
-    Pixel coordinates are 0 at the centre of the first pixel.
-
-    size : width and height of the photograph, by which MediaPipe's relative coordinates are multiplied
-        [pixel]
-
-    Raises DermisError for files without landmarks, and for unknown landmark sets.
-    """
-    text = read_text(path, _LANDMARK_FORMATS)
-    if Path(path).suffix.lower() == ".json":
-        name, pixels = _parse_landmarks(path, parse_json(text, path, _LANDMARK_FORMATS), size)
-    else:
-        with parsing(path, _LANDMARK_FORMATS, KeyError, TypeError, csv.Error):
-            rows = [(row["name"], float(row["x"]), float(row["y"])) for row in parse_rows(text)]
-        pixels = {str(one): np.array([x, y]) for one, x, y in rows}
-        name = _SET_BY_COUNT.get(len(pixels), "")
-    if len(pixels) < _MIN_LANDMARKS or not all(np.isfinite(one).all() for one in pixels.values()):
-        refuse(path, f"at least {_MIN_LANDMARKS} landmarks", f"got {len(pixels)}", "Correct the file")
-    if name not in LANDMARK_SETS:
-        expected = f"as many landmarks as {', '.join(map(str, _SET_BY_COUNT))}, or JSON that names their set"
-        refuse(path, expected, f"got {len(pixels)}", "Give all landmarks of a set")
-    return name, pixels
-
-
-def _parse_landmarks(path: str | Path, data: Any, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Return set name and pixels from JSON written by `dermis render --landmarks` or by MediaPipe."""
-    with parsing(path, _LANDMARK_FORMATS, KeyError, TypeError, IndexError):
-        if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping):
-            name, rows = next(iter(data["landmarks"].items()))
-            return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
-        while not (isinstance(data, list) and data and isinstance(data[0], Mapping) and "x" in data[0]):
-            nested = isinstance(data, Mapping)  # else a list of faces, of which the first one is used
-            data = data[next(key for key in _MEDIAPIPE_KEYS if key in data) if nested else 0]
-        pixels = np.array([[one["x"], one["y"]] for one in data], np.float64) * size - 0.5
-    return _SET_BY_COUNT.get(len(pixels), ""), {str(k): pixel for k, pixel in enumerate(pixels)}

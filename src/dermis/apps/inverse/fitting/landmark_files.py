@@ -1,0 +1,234 @@
+"""Landmarks in a photograph: tables, iBUG's .pts files, JSON of MediaPipe and of dermis render."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dermis.base.errors import notify, refuse
+from dermis.base.reading import parse_json, parsing, read_text
+from dermis.base.tables import column_separator, plain_key
+from dermis.human.landmarks.sets import LANDMARK_SETS
+from dermis.optics.media import Floats
+
+_EXPECTED = "landmarks as a table of name,x,y or x,y, iBUG's .pts, or JSON of MediaPipe or dermis render"
+_SETS: Mapping[int, tuple[str, range]] = {
+    51: ("ibug-68", range(17, 68)),
+    68: ("ibug-68", range(68)),
+    70: ("face-synthetics-70", range(70)),
+    468: ("mediapipe", range(468)),
+    478: ("mediapipe", range(478)),
+}
+"""Landmark set by the number of landmarks in a file, and their names there in the order of the file."""
+_FIVE = ("face-synthetics-70", (68, 69, 30, 48, 54))
+"""Eyes, tip of the nose and corners of the mouth, each from the left of the picture: face detectors."""
+_FIVE_OF_DLIB = ("ibug-68", (45, 42, 36, 39, 33))
+"""Outer and inner corner of the eye on the right of the picture, of the other, base of the nose: dlib."""
+_MAX_EYE_LINE = 0.2  # distance of dlib's eye corners from a line, relative to their spread
+_COUNTS = ", ".join(map(str, (5, *_SETS)))
+_LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
+_NAME_COLUMNS = ("name", "landmark", "index", "id", "point", "number", "")
+_PTS_LINE = re.compile(r"(version|n_points)\s*:\s*(\S+)", re.IGNORECASE)
+_MAX_RELATIVE = 2.0  # largest coordinate of a face that is relative to the size of the photograph
+
+
+class _Points(NamedTuple):
+    """Landmarks of a file.
+
+    pixels : (n, 2) coordinates, NaN for missing landmarks [pixel]
+    names : names of the landmarks; None for those of a set in its order
+    set_name : name of the set, if the file states it
+    """
+
+    pixels: Floats
+    names: Sequence[str] | None = None
+    set_name: str | None = None
+
+
+def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+    """Read landmarks in a photograph; return the name of the landmark set, and each landmark's pixel (2,).
+
+    Pixel coordinates are 0 at the centre of the first pixel; in .pts files they are 1 there.
+
+    size : width and height of the photograph, by which relative coordinates are multiplied [pixel]
+
+    Raises DermisError for files without landmarks, for unknown sets, and for landmarks of another picture.
+    """
+    text = read_text(path, _EXPECTED)
+    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    with parsing(path, _EXPECTED, KeyError, TypeError, IndexError, AttributeError, csv.Error):
+        if re.match(r'\s*(\[|\{\s*["}])', text):
+            points = _from_json(path, parse_json(text, path, _EXPECTED), size)
+        elif any(_PTS_LINE.fullmatch(line) for line in lines[:3]) or "{" in lines[:3]:
+            points = _from_pts(path, lines)
+        else:
+            points = _from_table(path, lines, size)
+    name, names = _identify(path, points)
+    found = np.isfinite(points.pixels).all(axis=1)
+    if not found.all():
+        notify(f"{path}: {len(found) - found.sum()} of {len(found)} landmarks have no position")
+    pixels = {one: pixel for one, pixel, has in zip(names, points.pixels, found, strict=True) if has}
+    if len(pixels) < 5:
+        refuse(path, "at least 5 landmarks with positions", f"got {len(pixels)}", "Correct the file")
+    middle = np.median(list(pixels.values()), axis=0)
+    if not ((middle >= 0) & (middle < size)).all():
+        actual = f"their middle is at {middle[0]:.0f}, {middle[1]:.0f}"
+        expected = f"landmarks in the photograph, of {size[0]} x {size[1]} pixels"
+        refuse(path, expected, actual, "Use the landmarks of this photograph at this size")
+    return name, pixels
+
+
+def _identify(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
+    """Return the name of the landmark set of a file, and the names of its landmarks in the set."""
+    count, names = len(points.pixels), points.names
+    if points.set_name is not None:
+        if points.set_name not in LANDMARK_SETS:
+            expected = f"landmarks of a known set ({', '.join(LANDMARK_SETS)})"
+            refuse(path, expected, f"got {points.set_name!r}", "Give one of these")
+        return points.set_name, names or ()
+    if count != 5 and count not in _SETS:
+        expected = f"as many landmarks as a known set ({_COUNTS}), or JSON that names the set"
+        refuse(path, expected, f"got {count}", "Give all landmarks of one of these sets")
+    if count == 5:
+        notify(f"{path}: five landmarks place the camera, but say little about the shape of the face")
+    set_name, numbers = _SETS[count] if count in _SETS else _identify_five(points.pixels)
+    known = [str(number) for number in numbers]
+    if names is None or (count > 5 and set(names) == set(known)):
+        return set_name, names or known
+    start = next((k for k in (0, 1) if {str(k + number) for number in range(count)} == set(names)), None)
+    if start is None:
+        expected = f"numbers from 0 to {count - 1} as names of the landmarks"
+        first = next((name for name in names if names.count(name) > 1 or name not in known), names[0])
+        refuse(path, expected, f"got {first!r}", "Correct the names, or leave them out")
+    if start == 1:
+        notify(f"{path}: its landmarks are numbered from 1; they are taken as those from 0")
+    return set_name, [known[int(name) - start] for name in names]
+
+
+def _identify_five(pixels: Floats) -> tuple[str, Sequence[int]]:
+    """Return the set of five landmarks and their numbers in it, which follow from their arrangement.
+
+    Four corners of eyes are on a line. Left and right are exchanged if the file starts with the other side.
+    """
+    spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
+    is_dlib = bool(spread[1] < _MAX_EYE_LINE * spread[0])
+    right, down = pixels[0] - pixels[2] if is_dlib else pixels[1] - pixels[0], pixels[4] - pixels[0]
+    is_mirrored = bool(right[0] * down[1] < right[1] * down[0])
+    name, numbers = _FIVE_OF_DLIB if is_dlib else _FIVE
+    order = ((2, 3, 0, 1, 4) if is_dlib else (1, 0, 2, 4, 3)) if is_mirrored else range(5)
+    return name, [numbers[k] for k in order]
+
+
+def _from_pts(path: str | Path, lines: Sequence[str]) -> _Points:
+    headers = dict(match.groups() for line in lines if (match := _PTS_LINE.fullmatch(line)))
+    rows = [line.split() for line in lines if not _PTS_LINE.fullmatch(line) and line not in "{}"]
+    count = headers.get("n_points", str(len(rows)))
+    if int(count) != len(rows):
+        refuse(path, f"{count} points as it states", f"got {len(rows)}", "Correct the file")
+    pixels = np.array([[float(x), float(y)] for x, y in rows])
+    return _Points(pixels - 1.0)
+
+
+def _from_table(path: str | Path, lines: list[str], size: tuple[int, int]) -> _Points:
+    """Return the landmarks of a table with commas, semicolons, tabs or spaces; a header is optional."""
+    if not lines:
+        refuse(path, _EXPECTED, "it is empty", "Find the landmarks again")
+    has_separator = re.search("[,;\t]", lines[0]) is not None
+    cells = (
+        csv.reader(lines, delimiter=column_separator(lines[0])) if has_separator else map(str.split, lines)
+    )
+    rows = [[cell.strip() for cell in row] for row in cells]
+    if not any(map(_is_number, rows[0][1:])):
+        return _from_named_columns(path, rows[0], rows[1:], size)
+    if len(rows) == 1:  # all coordinates in one line
+        rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
+    first = [row[0] for row in rows]
+    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _is_count(first))
+    start = 1 if has_names else 0
+    if len(rows[0]) > start + 2:
+        notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
+    pixels = np.array([[_number(cell) for cell in row[start : start + 2]] for row in rows])
+    return _Points(_to_pixels(path, pixels, size), first if has_names else None)
+
+
+def _from_named_columns(
+    path: str | Path, header: Sequence[str], rows: list[list[str]], size: tuple[int, int]
+) -> _Points:
+    """Return the landmarks of a table with columns name, x, y or, as by OpenFace, x_0, y_0 and so on."""
+    if "x_0" in header:
+        if len(rows) > 1:
+            notify(f"{path}: the first of its {len(rows)} rows is used")
+        count = sum(re.fullmatch(r"x_\d+", name) is not None for name in header)
+        columns = [[header.index(f"{axis}_{k}") for axis in "xy"] for k in range(count)]
+        pixels = np.array([[_number(rows[0][column]) for column in pair] for pair in columns])
+        return _Points(_to_pixels(path, pixels, size))
+    keys = [plain_key(name) for name in header]
+    if not {"x", "y"} <= set(keys):
+        refuse(path, _EXPECTED, f"its columns are {', '.join(header)}", "Name two columns x and y")
+    x, y = keys.index("x"), keys.index("y")
+    name = next((keys.index(key) for key in _NAME_COLUMNS if key in keys), None)
+    unused = [header[k] for k in range(len(header)) if k not in (x, y, name)]
+    if unused:
+        notify(f"{path}: its columns {', '.join(unused)} are not used")
+    pixels = np.array([[_number(row[x]), _number(row[y])] for row in rows])
+    return _Points(_to_pixels(path, pixels, size), None if name is None else [row[name] for row in rows])
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return np.isfinite(_number(cell))
+    except ValueError:
+        return False
+
+
+def _is_count(cells: Sequence[str]) -> bool:
+    """Return whether cells count from 0 or from 1."""
+    return any(list(cells) == [str(k + start) for k in range(len(cells))] for start in (0, 1))
+
+
+def _number(cell: str) -> float:
+    return float(cell.replace(",", ".") or "nan")
+
+
+def _to_pixels(path: str | Path, points: Floats, size: tuple[int, int]) -> Floats:
+    """Return coordinates (n, 2) in pixels; those relative to the photograph are converted, with a note."""
+    if points.ndim != 2 or not np.nanmax(np.abs(points), initial=0.0) <= _MAX_RELATIVE:
+        return points
+    notify(f"{path}: its coordinates are taken as relative to the size of the photograph")
+    return np.asarray(points * size - 0.5)
+
+
+def _from_json(path: str | Path, data: Any, size: tuple[int, int]) -> _Points:
+    """Return the landmarks of JSON written by `dermis render --landmarks` or by an API of MediaPipe."""
+    if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping) and data["landmarks"]:
+        name, rows = next(iter(data["landmarks"].items()))
+        pixels = np.array([row["pixel"] for row in rows], np.float64)
+        return _Points(pixels, [str(row["name"]) for row in rows], name)
+    while not (isinstance(data, list) and data and _is_point(data[0])):
+        fields = {plain_key(key): value for key, value in data.items()} if isinstance(data, Mapping) else {}
+        key = next((key for key in _LIST_KEYS if key in fields), None)
+        if key is not None:
+            data = fields[key]
+        elif isinstance(data, list) and data:
+            if len(data) > 1:
+                notify(f"{path}: the first of its {len(data)} faces is used")
+            data = data[0]
+        else:
+            refuse(path, _EXPECTED, "no face was found in it", "Find the landmarks again")
+    if isinstance(data[0], list):
+        return _Points(_to_pixels(path, np.array([point[:2] for point in data], np.float64), size))
+    points = np.array([[point["x"], point["y"]] for point in data], np.float64)
+    is_relative = np.abs(points).max() <= _MAX_RELATIVE
+    return _Points(points * size - 0.5 if is_relative else points)
+
+
+def _is_point(value: object) -> bool:
+    """Return whether a value is a point: an object with x and y, or a list of numbers."""
+    if isinstance(value, list):
+        return len(value) in (2, 3) and all(type(number) in (int, float) for number in value)
+    return isinstance(value, Mapping) and "x" in value and "y" in value
