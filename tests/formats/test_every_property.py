@@ -262,3 +262,17 @@ def load_quietly(path: Path) -> Head:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return load_head(path, subdivide=0, unit_mm=1000)
+
+
+def test_skin_without_uv_gets_a_layout_that_takes_its_vertex_colours(tmp_path: Path) -> None:
+    egg = Egg()
+    vertex_colours(0)(egg)
+    del egg.primitive()["attributes"]["TEXCOORD_0"]
+    del egg.skin["pbrMetallicRoughness"]["baseColorTexture"]
+    egg.skin["pbrMetallicRoughness"]["baseColorFactor"] = [1.0, 1.0, 1.0, 1.0]
+    path = egg.write(tmp_path / "a.glb")
+    assert "has no uv" in loaded(path).notes
+    head = load_quietly(path)
+    used = np.unique(head.mesh.triangles[[head.mesh.materials[k].kind == "skin" for k in head.mesh.material]])
+    assert head.maps.colour is not None and np.ptp(head.mesh.uv[used], axis=0).min() > 0.5
+    assert head.maps.colour.std() > 0.1

@@ -22,7 +22,13 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
-from dermis.scene.file_surfaces import direct_material, unused_properties, with_factors, with_file_textures
+from dermis.scene.file_surfaces import (
+    direct_material,
+    unused_properties,
+    with_factors,
+    with_file_textures,
+    with_missing_uv,
+)
 from dermis.scene.head_table import NormalY, check_relief
 from dermis.scene.skin_tone import with_skin_tone
 
@@ -51,7 +57,9 @@ class MapOptions:
 
         files : pictures of the mesh by role, and "height_mm" of its height map
         """
-        chosen: dict[str, Any] = {role: files.get(role) if file is None else file for role, file in self.files.items()}
+        chosen: dict[str, Any] = {
+            role: files.get(role) if file is None else file for role, file in self.files.items()
+        }
         chosen["region"] = files.get("region")
         used: dict[str, Any] = {role: file for role, file in chosen.items() if file is not None}
         return load_maps(**used, height_mm=self.relief_mm(files), normal_y=self.normal_y)
@@ -89,7 +97,8 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
 
 
 def _load_mesh(path: Path, name: str, mesh_options: dict[str, Any]) -> RiggedMesh:
-    return with_settled_unit(load_rigged(path, **mesh_options), path, mesh_options["unit_mm"], name)
+    rigged = with_missing_uv(load_rigged(path, **mesh_options))
+    return with_settled_unit(rigged, path, mesh_options["unit_mm"], name)
 
 
 def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptions) -> Head:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dermis.atlas.texture_baking import PackedTextures, pack_textures, read_role
 from dermis.atlas.texture_tiles import UV_TOLERANCE
+from dermis.atlas.unwrap.missing_uv import with_layout
 from dermis.base.arrays import Floats, Mask
 from dermis.formats.load import FileSurface, RiggedMesh
 from dermis.formats.materials import IDENTITY, FileMaterial, Role
@@ -17,6 +18,25 @@ from dermis.mesh.maps import Maps, PartMaps
 from dermis.mesh.mesh import Material, Mesh
 
 _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
+
+
+def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
+    """Return a mesh whose skin has uv everywhere: a new layout where the file has none, with a note."""
+    mesh, surface = rigged.mesh, rigged.surface
+    bare = np.array(
+        [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
+    )
+    if not bare.any():
+        return rigged
+    laid_out, vertex = with_layout(mesh, bare[mesh.material])
+    changed = surface._replace(
+        colours=None if surface.colours is None else surface.colours[vertex],
+        other_uv={index: uv[vertex] for index, uv in surface.other_uv.items()},
+    )
+    rig = rigged.rig and replace(rigged.rig, vertex_point=mesh.point)
+    names = ", ".join(repr(own.name) for own, without in zip(mesh.materials, bare, strict=True) if without)
+    note = f"{names} has no uv; the package lays it out"
+    return RiggedMesh(laid_out, rig, (*rigged.notes, note), changed)
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
@@ -27,7 +47,7 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
     mesh, surface = rigged.mesh, rigged.surface
     skin = _members(mesh, "skin")
     used = {index for index, own in zip(surface.in_file, skin, strict=True) if own}
-    if len(used) != 1 or not all(has for has, own in zip(surface.has_uv, skin, strict=True) if own):
+    if len(used) != 1:
         return None
     index = used.pop()
     material = materials[index] if index >= 0 else FileMaterial()
@@ -47,7 +67,9 @@ def with_factors(maps: Maps, material: FileMaterial, given: Collection[str]) -> 
     changed: dict[str, Any] = {}
     if material.maps is None and "colour" not in given and material.colour not in (None, (1.0, 1.0, 1.0)):
         white = np.ones((1, 1, 3), np.float32)
-        changed["colour"] = (white if maps.colour is None else maps.colour) * np.array(material.colour, np.float32)
+        changed["colour"] = (white if maps.colour is None else maps.colour) * np.array(
+            material.colour, np.float32
+        )
     if maps.normal is not None and "normal" not in given and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
     if material.maps is None and "roughness" not in given and "roughness" in material.textures:
@@ -86,9 +108,27 @@ def with_file_textures(
         packed = pack_textures(mesh, rigged.surface, materials, pictured, ("colour", *_SURFACE_ROLES))
         mesh, maps = _with_uv(mesh, packed), replace(maps, parts=_part_maps(packed))
         notes += [f"parts that are not skin: {note}" for note in packed.notes]
-    surfaces = zip(mesh.materials, rigged.surface.in_file, pictured, strict=True)
-    changed = tuple(_with_surface(own, materials[k] if k >= 0 else None, has) for own, k, has in surfaces)
-    return _keep_outline(mesh, replace(mesh, materials=changed)), maps, tuple(notes)
+    changed = [
+        _with_surface(material, materials[index] if index >= 0 else None, has_maps)
+        for material, index, has_maps in zip(mesh.materials, rigged.surface.in_file, pictured, strict=True)
+    ]
+    if maps.parts is not None:
+        changed = _with_mean_colours(mesh, changed, maps.parts)
+    return _keep_outline(mesh, replace(mesh, materials=tuple(changed))), maps, tuple(notes)
+
+
+def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
+    """Return materials whose colour is the mean of their maps, for programs that do not read the maps."""
+    size = np.array(maps.colour.shape[1::-1])
+    coloured = []
+    for index, material in enumerate(materials):
+        if material.has_maps:
+            middle = mesh.uv[mesh.triangles[mesh.material == index]].mean(axis=1)
+            x, y = np.clip(middle * size, 0, size - 1).astype(int).T
+            red, green, blue = (float(one) for one in maps.colour[y, x, :3].mean(axis=0))
+            material = replace(material, colour=(red, green, blue))
+        coloured.append(material)
+    return coloured
 
 
 def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:

@@ -23,12 +23,10 @@ def embedded_materials(path: Path) -> tuple[FileMaterial, ...]:
     document = read_document(path)
     with parsing(path, "valid textures", *MALFORMED_DATA_ERRORS):
         materials = read_materials(document)
-    pictures: dict[object, object] = {}
+    pictures: dict[tuple[str, str], object] = {}
     for material in materials:
-        own = (material.maps or {}).values()
-        pictures |= {
-            str(one): one for one in (*own, *(texture.picture for texture in material.textures.values()))
-        }
+        used = dict(material.maps or {}) | {role: one.picture for role, one in material.textures.items()}
+        pictures |= {(role, str(picture)): picture for role, picture in used.items()}
     texels = 0
     for picture in pictures.values():
         if isinstance(picture, EmbeddedPicture) or (isinstance(picture, Path) and is_file(str(picture))):

@@ -1,0 +1,73 @@
+"""A uv layout for the triangles of a mesh whose file has none."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+
+from dermis.atlas.unwrap.unwrap import unwrap_mesh
+from dermis.base.arrays import Index, Mask
+from dermis.base.disk import Arrays, load_or_make
+from dermis.base.progress import logged_step
+from dermis.mesh.geometry import compact_vertices
+from dermis.mesh.mesh import Mesh
+
+_CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
+
+
+def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
+    """Return a mesh with a new uv layout for some triangles, and the source of each of its vertices.
+
+    The triangles and their order are unchanged; vertices on the new seams are duplicated. The disk cache keeps
+    the layout.
+
+    unwrapped : (f,) triangles to lay out
+    """
+    used, corners = compact_vertices(mesh.triangles[unwrapped])
+    point = np.unique(mesh.point[used], return_inverse=True)[1]
+    part = Mesh(
+        mesh.positions[used],
+        mesh.normals[used],
+        np.zeros((len(used), 2), np.float32),
+        point.reshape(-1).astype(np.int32),
+        corners.astype(np.int32),
+        mesh.material[unwrapped],
+        mesh.materials,
+    )
+    arrays = _cached_layout(part)
+    # Corners keep their order, so that each new vertex comes from the vertex at the same corner.
+    source = np.empty(len(arrays["uv"]), np.int64)
+    source[arrays["triangles"].ravel()] = mesh.triangles[unwrapped].ravel()
+    remaining = mesh.triangles[~unwrapped]
+    kept, others = compact_vertices(remaining) if len(remaining) else (used[:0], corners[:0])
+    triangles = np.empty_like(mesh.triangles)
+    triangles[~unwrapped] = others
+    triangles[unwrapped] = arrays["triangles"] + len(kept)
+    vertex = np.concatenate([kept, source])
+    laid_out = replace(
+        mesh,
+        positions=mesh.positions[vertex],
+        normals=mesh.normals[vertex],
+        uv=np.concatenate([mesh.uv[kept], arrays["uv"]]),
+        point=mesh.point[vertex],
+        triangles=triangles,
+    )
+    vars(laid_out)["outline"] = mesh.outline
+    return laid_out, vertex
+
+
+def _cached_layout(part: Mesh) -> Arrays:
+    """Return uv (v, 2) and triangles (f, 3) of an unwrapped mesh, from the disk cache if they are in it."""
+    digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
+    for array in (part.positions, part.point, part.triangles):
+        digest.update(np.ascontiguousarray(array).tobytes())
+
+    @logged_step("unwrapping the mesh")
+    def make() -> Arrays:
+        laid_out = unwrap_mesh(part)
+        used, triangles = compact_vertices(laid_out.triangles)
+        return {"uv": laid_out.uv[used], "triangles": triangles.astype(np.int32)}
+
+    return load_or_make("layouts", digest.hexdigest()[:40], ["uv", "triangles"], make)
