@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles, Floats, Index, Mask
 from dermis.base.disk import load_or_make
 from dermis.base.progress import logged_step
-from dermis.mesh.geometry import expand_runs
+from dermis.mesh.geometry import expand_runs, merge_near_points
 from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
@@ -23,7 +23,9 @@ SAMPLES_PER_PATCH = 8
 # Number of directions of parallel lines; fewest and most lines along a bundle's side.
 LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
 _TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # to find out whether any skin faces other skin
-_CACHE_VERSION = 4  # increment when `compute_form_factors` gives other results
+_CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
+_MAX_TRACED_TRIANGLES = 300_000  # of finer meshes, points closer than some lines are merged
+_MERGED_LINES = 1.5
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
@@ -109,6 +111,10 @@ def _trace_lines(
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
+    if len(corner) > _MAX_TRACED_TRIANGLES:
+        vertices, corner = merge_near_points(vertices, corner, _MERGED_LINES / per_mm)
+        solid = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
+        corner, corner_uv, mapped = corner[solid], corner_uv[solid], mapped[solid]
     rng, left, facing = (
         np.random.default_rng(_SEED),
         np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE),

@@ -36,6 +36,24 @@ def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
     return np.flatnonzero(used).astype(np.int64), (np.cumsum(used) - 1)[triangles]
 
 
+def merge_near_points(
+    positions: Doubles, triangles: NDArray[np.integer], spacing: float
+) -> tuple[Doubles, Index]:
+    """Merge the points of each cell of a grid into their mean; return the points and the triangles (f, 3).
+
+    positions : (v, 3)
+    triangles : (f, 3) vertex indices; some of the returned triangles have coincident corners
+    spacing : side of the cells
+    """
+    cell = np.floor(positions / spacing).astype(np.int64)
+    cell -= cell.min(axis=0)
+    x, y, _ = cell.max(axis=0) + 1
+    number = cell[:, 0] + x * (cell[:, 1] + y * cell[:, 2])
+    _, merged, count = np.unique(number, return_inverse=True, return_counts=True)
+    sums = [np.bincount(merged.reshape(-1), column) for column in positions.T]
+    return np.stack(sums, axis=1) / count[:, None], merged.reshape(-1)[triangles]
+
+
 def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Return the unique edges (e, 2) of triangles, the edge of each side (3f,) and the sides per edge (e,).
 

@@ -220,7 +220,7 @@ def _load_human(
     levels : subdivision levels, or a function of the head that returns them
     """
     texts = {"v_origin": "auto", "up": "y", "front": "auto", "eyes": "fitted"}
-    defaults = {"unit_mm": None, "opaque": (), "eye_groups": (), **texts}
+    defaults = {"unit_mm": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")

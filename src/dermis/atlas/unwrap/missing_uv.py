@@ -20,7 +20,7 @@ _CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
     """Return a mesh with a new uv layout for some triangles, and the source of each of its vertices.
 
-    The triangles and their order are unchanged; vertices on the new seams are duplicated. The disk cache keeps
+    The triangles keep their order; vertices on the new seams are duplicated. The disk cache keeps
     the layout.
 
     unwrapped : (f,) triangles to lay out
