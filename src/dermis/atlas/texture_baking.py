@@ -110,12 +110,18 @@ class _Baker:
             values = self._sampled(tile, texture, role)
         values *= factor
         if role == "colour":
-            values[..., 3] = (
-                1.0 if material.alpha_mode == "opaque" else values[..., 3] + 0.5 - material.cutoff
-            )
-        if role == "colour" and self.surface.colours is not None:
-            values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
+            self._finish_colours(tile, values)
         return values
+
+    def _finish_colours(self, tile: Tile, values: Floats) -> None:
+        """Multiply colours and opacity (h, w, 4) by vertex colours and a picture of the opacity."""
+        material = self._material(tile)
+        if "opacity" in material.textures:
+            values[..., 3:] *= self._sampled(tile, material.textures["opacity"], "opacity")
+        is_opaque = material.alpha_mode == "opaque"
+        values[..., 3] = 1.0 if is_opaque else values[..., 3] + 0.5 - material.cutoff
+        if self.surface.colours is not None:
+            values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
 
     def _sampled(self, tile: Tile, texture: Texture, role: Role) -> Floats:
         """Return the values (h, w, k) of a picture over a tile."""
@@ -189,7 +195,8 @@ def read_role(texture: Texture, role: Role) -> Floats:
         opacity = _unit_range(image[..., 3:]) if image.shape[2] == 4 else opaque
         return np.concatenate([colours, opacity], axis=2)
     image = read_image(texture.picture)
-    channel = min(texture.channel or 0, image.shape[2] - 1)
+    last = image.shape[2] - 1
+    channel = last if role == "opacity" and last == 3 else min(texture.channel or 0, last)
     return _unit_range(image[..., channel : channel + 1])
 
 

@@ -12,7 +12,7 @@ from dermis.base.arrays import Doubles
 from dermis.formats.maps import PathLike
 
 Wrap = Literal["repeat", "mirror", "clamp"]
-Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "emission"]
+Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "emission", "opacity"]
 AlphaMode = Literal["opaque", "mask", "blend"]
 UvTransform = tuple[float, float, float, float, float, float]
 

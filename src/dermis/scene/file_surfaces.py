@@ -36,7 +36,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
     rig = rigged.rig and replace(rigged.rig, vertex_point=mesh.point)
     names = ", ".join(repr(own.name) for own, without in zip(mesh.materials, bare, strict=True) if without)
     note = f"{names} has no uv; the package lays it out"
-    return RiggedMesh(laid_out, rig, (*rigged.notes, note), changed)
+    return rigged._replace(mesh=laid_out, rig=rig, notes=(*rigged.notes, note), surface=changed)
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:

@@ -14,7 +14,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
 from dermis.apps.export.target import Parameters, ParameterValue, Target
 from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, temporary_folder
-from dermis.base.errors import refuse
+from dermis.base.errors import notify, refuse
 from dermis.optics.media import Floats
 
 _NOTABLE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
@@ -211,6 +211,8 @@ def export_skin(
         subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
+    if to != "web" and subject.head is not None and subject.head.maps.parts is not None:
+        notify(f"{subject.name}: parts that are not skin are exported with their mean colours, not pictures")
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
