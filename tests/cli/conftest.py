@@ -147,7 +147,7 @@ def refused(
         after = {path: path.stat().st_mtime_ns for path in (*inputs.iterdir(), *tmp_path.iterdir())}
         assert (ended.code, ended.stdout, after) == (2, "", before)
         assert "Traceback" not in ended.stderr
-        message = FORM.fullmatch(ended.stderr)
+        message = FORM.fullmatch(re.sub(r"(?m)^note: .*\n", "", ended.stderr))
         assert message, ended.stderr
         return message
 

@@ -37,9 +37,10 @@ def test_compare_takes_the_unit(run: Run, in_cm: str, monkeypatch: pytest.Monkey
         raise DermisError("seen")
 
     monkeypatch.setattr("dermis.apps.validation.comparisons.compare.compare", compared)
-    assert "a forgotten unit?" in run("compare", in_cm).stderr
+    assert "1 unit = 10 mm makes it 240 mm high" in run("compare", in_cm).stderr
     assert "seen" in run("compare", in_cm, "--unit-mm", "10").stderr
-    (head,) = heads
+    head, stated = heads
+    np.testing.assert_allclose(head.mesh.positions, stated.mesh.positions, rtol=1e-5)
     assert head.mesh.size_mm[1] == pytest.approx(240.0, rel=1e-3)
     assert head.levels == 0
 

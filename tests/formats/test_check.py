@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.formats.mesh_checks import check_head_height, check_mesh
+from dermis.formats.mesh_checks import check_mesh
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
 
@@ -109,25 +109,3 @@ def test_skin_must_exist_and_have_triangles() -> None:
     none = _edited(sphere, materials=(Material("eyes", "opaque"),))
     assert "none of its groups is skin (eyes)" in _refused(none)
     assert "material indices" in _refused(_edited(sphere, materials=()))
-
-
-@pytest.mark.parametrize(
-    ("diameter", "unit_mm", "suggested"),
-    [(0.25, 1, "1000"), (2.5, 1, "100"), (25, 1, "10"), (250_000, 1000, "1 "), (12, 1, "25.4")],
-)
-def test_forgotten_unit_is_found_and_the_right_one_named(diameter, unit_mm, suggested) -> None:
-    mesh = uv_sphere(diameter / 2, 12, 6)
-    with pytest.raises(DermisError, match=r"forgotten unit\?") as caught:
-        check_head_height(mesh, "head.obj", unit_mm)
-    message = str(caught.value)
-    assert message.startswith("head.obj") and f"{diameter:g}"[:3] in message
-    assert f"--unit-mm: {suggested}" in message
-    assert f"at {unit_mm:g} mm per unit" in message
-
-
-def test_height_without_a_likely_unit_or_without_a_unit() -> None:
-    with pytest.raises(DermisError, match=r"--unit-mm\.$"):
-        check_head_height(uv_sphere(40, 12, 6), "head.obj", 1)
-    with pytest.raises(DermisError, match=r"at 1000 mm per unit.*--unit-mm: 1 would"):
-        check_head_height(uv_sphere(125_000, 12, 6), "head.glb", None)
-    check_head_height(uv_sphere(125, 12, 6), "head.obj", None)

@@ -29,6 +29,18 @@ class Axes(NamedTuple):
             return self.front
         return "-y" if self.up in ("z", "-z") else "z"
 
+    def or_stated(self, stated: Axes) -> Axes:
+        """Return these axes, which a user chooses, with those that a file states in place of the defaults.
+
+        The front of the file applies only with its own up axis.
+        """
+        if self.up != "y":
+            return self
+        return Axes(stated.up, stated.front if self.front == "auto" else self.front)
+
+
+DEFAULT_AXES = Axes()
+
 
 def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
     """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""

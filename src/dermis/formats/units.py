@@ -22,7 +22,7 @@ _SIZE_MM = (1.0, 3000.0)  # smallest and largest that is accepted
 _SIZE_IN_MM = (100.0, 1000.0)  # of files whose unit is taken to be the millimetre
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
 _FLATNESS = 0.25  # thickness relative to length below which a mesh is a piece of skin or a hand
-_INCH, _INCH_PENALTY = 25.4, 0.4  # of the logarithm of the size, as few files are in inches
+_INCH, _INCH_PENALTY = 25.4, {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # of the size's logarithm
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # that programs write although a format states metres
 _ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # sizes of figures and of others
 
@@ -38,7 +38,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
     """
     mesh, note = rigged.mesh, ""
     guessed = unit_mm is None and path.suffix.lower() in WITHOUT_UNIT
-    read_unit = default_unit_mm(path) if unit_mm is None else unit_mm
+    read_unit = unit_mm or rigged.unit_mm or default_unit_mm(path)
     unit = guess_unit_mm(mesh.positions, mesh.triangles) if guessed else read_unit
     if unit != read_unit:
         mesh = replace(mesh, positions=(mesh.positions * (unit / read_unit)).astype(np.float32))
@@ -70,7 +70,8 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
             return 1.0
         is_piece = length > MAX_ELONGATION * width or thickness < _FLATNESS * length
         typical = _PIECE_MM if is_piece else _HEAD_MM
-    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + _INCH_PENALTY * (unit == _INCH))
+    penalty = _INCH_PENALTY[typical]
+    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH))
 
 
 def _is_in_mm(positions: Floats) -> bool:

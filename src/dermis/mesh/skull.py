@@ -57,7 +57,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
     shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
     return (
-        all(one.parts == 1 for one in (head, neck, shoulders))
+        head.parts == neck.parts == 1
         and 0 < head.width < _MAX_HEAD_WIDTH * height
         and 0 < neck.width < _MAX_NECK_WIDTH * height
         and shoulders.width > _MIN_SHOULDERS_TO_NECK * neck.width

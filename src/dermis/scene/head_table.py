@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from dermis.base.errors import format_value, refuse
 from dermis.formats.axes import Axis, Front
@@ -106,11 +106,13 @@ class HeadTable(FrozenModel):
     and the head has no roughness map, "none" one value everywhere; "default" is the package's table (an
     artist's), a TOML file is your own, and both then set rho_s too."""
 
-    @model_validator(mode="after")
-    def _check_axes(self) -> HeadTable:
-        if self.front[-1] == self.up[-1]:
-            raise ValueError("a front across up, such as up z and front -y")
-        return self
+    @field_validator("front")
+    @classmethod
+    def _check_axes(cls, front: Front, info: ValidationInfo) -> Front:
+        up = info.data.get("up", "")
+        if front[-1] == up[-1:]:
+            raise ValueError(f"an axis across up, which is {up}")
+        return front
 
 
 def has_region_table(table: Mapping[str, Any]) -> bool:

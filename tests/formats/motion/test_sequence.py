@@ -9,7 +9,7 @@ import pytest
 from small_head import obj_text
 
 import dermis
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.formats.motion.sequence import FrameReader, frame_files
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -80,10 +80,13 @@ def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
     head = dermis.load_head(small / "face_8.obj", unit_mm=100, up="z", subdivide=0)
     positions = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
     np.testing.assert_allclose(positions, 1.1 * head.positions_mm, rtol=1e-4, atol=1e-2)
+    with pytest.warns(DermisWarning, match=r"face_8\.obj: .*1 unit = 100 mm makes it as large as the head"):
+        found = dermis.load_motion(small, head, up="z").pose_at(1.0).positions_mm
+    np.testing.assert_allclose(found, positions)
     with pytest.raises(
         DermisError, match=r"face_8\.obj: .*of about the size of the head, but it is 0\.01 times"
     ):
-        dermis.load_motion(small, head, up="z")
+        dermis.load_motion(small, head, unit_mm=1.0, up="z")
 
 
 def test_ply_frames(tmp_path: Path) -> None:
