@@ -101,10 +101,10 @@ def test_opaque_must_name_a_group(obj: Path) -> None:
         load_mesh(obj, opaque=("teeth",))
 
 
-def test_relative_indices_are_refused_not_misread(obj: Path) -> None:
+def test_relative_indices_count_from_the_last_vertex(obj: Path) -> None:
+    absolute = load_mesh(obj)
     obj.write_text(obj.read_text().replace("f 5/1 6/2 7/3", "f -3/1 -2/2 -1/3"))
-    with pytest.raises(DermisError, match="negative"):
-        load_mesh(obj)
+    np.testing.assert_array_equal(load_mesh(obj).positions, absolute.positions)
 
 
 def test_v_origin_of_obj(obj: Path) -> None:
@@ -168,7 +168,6 @@ def test_uv_missing_by_rounding_only_is_put_back(obj: Path) -> None:
     ("name", "content", "words"),
     [
         ("a.obj", b"", "none|cannot be understood"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "uv"),
         ("a.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n", "NaN"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 9/1\n", "cannot be understood|indices"),
         ("a.glb", b"glTF\x02\x00\x00\x00", "cannot be understood|a glTF file"),

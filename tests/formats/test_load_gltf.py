@@ -110,12 +110,6 @@ def test_integer_uv_of_gltf(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.uv, [[0, 0.2], [1, 0.2], [0, 1]], atol=1e-6)
 
 
-def test_compressed_gltf_is_refused(tmp_path: Path) -> None:
-    path = _gltf(tmp_path / "face.gltf", extensionsRequired=["KHR_draco_mesh_compression"])
-    with pytest.raises(DermisError, match="KHR_draco_mesh_compression"):
-        load_mesh(path)
-
-
 def test_gltf_without_its_buffer_is_refused(tmp_path: Path) -> None:
     path = _gltf(tmp_path / "face.gltf")
     path.with_suffix(".bin").unlink()

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.formats import maps as map_pixels
 from dermis.formats.maps import load_maps
+from dermis.images.colour_spaces import SRGB, ColourSpace
 from dermis.images.filters import mip_chain, smooth_quantisation
 from dermis.images.io import read_image, write_exr, write_png
 from dermis.mesh.maps import Maps
@@ -49,6 +50,14 @@ def test_float_colour_is_linear_already(tmp_path: Path) -> None:
     np.testing.assert_array_equal(colour, np.full((*SHAPE, 3), 0.25, np.float32))
 
 
+def test_grey_colour_is_repeated_in_all_channels_with_a_note(tmp_path: Path) -> None:
+    path = _png(tmp_path / "g.png", np.full(SHAPE, 188, np.uint8))
+    with pytest.warns(DermisWarning, match=r"g\.png: it is grey"):
+        colour = load_maps(colour=path).colour
+    assert colour is not None and colour.shape == (*SHAPE, 3)
+    np.testing.assert_allclose(colour, 0.502887, atol=1e-6)
+
+
 def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
     levels = np.random.default_rng(0).integers(0, 256, SHAPE).astype(np.uint8)
     write_exr(tmp_path / "h.exr", np.repeat(levels[..., None] / 255, 3, axis=2))
@@ -68,7 +77,11 @@ def test_a_large_file_is_decoded_once(tmp_path: Path, monkeypatch: pytest.Monkey
         decoded.append(path.name)
         return read_image(path)
 
+    def counted_colours(path: Path, upright: bool) -> tuple[np.ndarray, ColourSpace]:
+        return counted(path), SRGB
+
     monkeypatch.setattr(map_pixels, "read_image", counted)
+    monkeypatch.setattr(map_pixels, "read_colours", counted_colours)
     rng = np.random.default_rng(5)
     noise = rng.integers(0, 256, (256, 256, 3)).astype(np.uint8)
     up = _png(tmp_path / "n.png", _encoded(np.dstack([0.1 * rng.random((256, 256, 2)), np.ones((256, 256))])))
@@ -155,7 +168,6 @@ def _refused(folder: Path) -> dict[str, tuple[str, np.ndarray, str]]:
     return {
         "coloured_height.png": ("height", colour, "grey"),
         "coloured_specular.png": ("specular", skin, "grey"),
-        "grey_colour.png": ("colour", colour[..., :1], "RGB"),
         "grey_normal.png": ("normal", colour[..., :1], "grey"),
         "skin_normal.png": ("normal", skin, "normal map"),
         "white_normal.png": ("normal", np.full((*SHAPE, 3), 255, np.uint8), "normal map"),

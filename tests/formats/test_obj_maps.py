@@ -26,7 +26,8 @@ LEANING = -(2 * 160 / 255 - 1) / (2 * 250 / 255 - 1)  # the slope of NORMALS alo
 def head(folder: Path, mtl: str, **pictures: np.ndarray) -> Path:
     for name, levels in pictures.items():
         write_png(folder / f"{name.replace('_', ' ')}.png", levels)
-    (folder / "head.mtl").write_text(f"newmtl skin\nKd 0.8 0.8 0.8\n{mtl}\n")
+    kd = "1 1 1" if "map_Kd" in mtl else "0.7 0.5 0.4"
+    (folder / "head.mtl").write_text(f"newmtl skin\nKd {kd}\n{mtl}\n")
     path = folder / "head.obj"
     path.write_text(f"mtllib head.mtl\n{obj_text()}")
     return path
@@ -88,13 +89,14 @@ def test_maps_that_are_given_replace_those_of_the_material(tmp_path: Path) -> No
     assert maps.height is not None and maps.normal is None and maps.specular is not None
 
 
-def test_one_notice_names_all_that_is_missing(tmp_path: Path) -> None:
+def test_notes_name_all_that_is_missing(tmp_path: Path) -> None:
     path = head(tmp_path, "map_Kd gone.png\nmap_Ks C:\\Users\\me\\away.png\nmap_Pr r.tga")
     (tmp_path / "r.tga").write_bytes(b"\0\0\2" + bytes(30))
     with pytest.warns(DermisWarning) as caught:
-        assert dermis.load_head(path).maps == dermis.load_head(head(tmp_path, "")).maps
-    text = str(caught[0].message)
-    assert len(caught) == 1 and text.startswith(str(path))
+        maps = dermis.load_head(path).maps
+    assert maps.specular is None and maps.roughness is None
+    text = "\n".join(str(one.message) for one in caught)
+    assert all(str(one.message).startswith(str(path)) for one in caught)
     assert "map_Kd: gone.png is not in its folder" in text
     assert "away.png is not in its folder" in text and "r.tga: expected a picture" in text
     (tmp_path / "head.mtl").unlink()
@@ -110,7 +112,8 @@ def test_nothing_outside_the_folder_is_read(tmp_path: Path) -> None:
         (tmp_path / "inside" / "link.png").unlink(missing_ok=True)
         (tmp_path / "inside" / "link.png").symlink_to(tmp_path / "secret.png")
         with pytest.warns(DermisWarning, match="is not in its folder"):
-            assert dermis.load_head(path).maps.colour is None
+            colour = dermis.load_head(path).maps.colour
+        assert colour is None or colour[..., 1].min() > 0.1
     # of a path of another machine the picture beside the file is taken
     path = head(tmp_path / "inside", "map_Kd D:\\art\\face.png", face=plain(0, 0, 255))
     np.testing.assert_allclose(loaded_quietly(path).maps.colour, [[[0, 0, 1]]])

@@ -19,9 +19,10 @@ from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
 from dermis.formats.axes import Axes, Axis, Front, to_y_up
+from dermis.formats.materials import FileMaterial
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
 from dermis.formats.mesh_repair import RawMesh, mend
-from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_gltf
+from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_binary_gltf, is_gltf
 from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
@@ -31,7 +32,7 @@ from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_CACHE_VERSION = 7  # increment when `load_rigged` returns other results for the same file
+_CACHE_VERSION = 8  # increment when `load_rigged` returns other results for the same file
 _MESH_FIELDS = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGET_FIELDS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON_FIELDS = [field.name for field in fields(Skeleton) if field.name != "names"]
@@ -68,15 +69,16 @@ def load_rigged(
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
-    """Load mesh and rig of a .glb, .gltf, .obj or .ply file, in millimetres, with Y up and v down.
+    """Load mesh and rig of a file of one of `MESH_READERS`, in millimetres, with Y up and v down.
 
-    Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; all others are opaque.
+    Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; others are opaque.
     The mesh is checked by `check_mesh`; its size is not checked.
 
-    unit_mm : length of the file's unit [mm]; None for that of the format (`default_unit_mm`)
+    unit_mm : length of the file's unit [mm]; None for that of the file or its format (`default_unit_mm`)
     v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
         format
-    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`
+    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`; those that
+        the file states replace the defaults
     skin_groups : names of the groups that are skin; empty to find them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
@@ -84,11 +86,11 @@ def load_rigged(
     Raises `DermisError` when the file is missing, damaged or not a mesh, or fails `check_mesh`.
     """
     source = Path(path)
-    unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
+    unit = None if unit_mm is None else float(unit_mm)
     groups = GroupNames(skin_groups, opaque, eye_groups)
     axes = Axes(up, front)
     load = partial(_load_uncached, source, unit, v_origin, axes, groups)
-    is_glb = source.suffix.lower() == ".glb" and is_file(source)
+    is_glb = is_binary_gltf(source) and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
     if not data or b'"uri"' in data:  # parts of it are in other files
         return load()
@@ -98,17 +100,17 @@ def load_rigged(
 
 def _load_uncached(
     source: Path,
-    unit: float,
+    unit_mm: float | None,
     v_origin: Origin,
     axes: Axes,
     groups: GroupNames,
 ) -> RiggedMesh:
-    """Load mesh and rig without the disk cache; for the parameters see `load_rigged`.
-
-    unit : length of the file's unit [mm]
-    """
+    """Load mesh and rig without the disk cache; for the parameters see `load_rigged`."""
     with np.errstate(all="ignore"), parsing(source, "a mesh", *MALFORMED_DATA_ERRORS):
         mesh_file = read_mesh_file(source)
+        stated_mm = mesh_file.unit_mm or default_unit_mm(source)
+        unit = stated_mm if unit_mm is None else unit_mm
+        axes = _settled_axes(axes, mesh_file.axes, source)
         part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
@@ -134,7 +136,20 @@ def _load_uncached(
     notes = (*((note,) if note else ()), *mesh_file.notes, *mended)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
-    return RiggedMesh(mesh, rig, notes, FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv))
+    surface = FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv)
+    return RiggedMesh(mesh, rig, notes, surface, mesh_file.materials, stated_mm)
+
+
+def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
+    """Return the axes that a user chooses, or those that the file states.
+
+    Raises DermisError for a chosen front along the up axis of the file.
+    """
+    axes = chosen.or_stated(stated)
+    if axes.face[-1] == axes.up[-1]:
+        actual = f"front is {axes.front}, and up is {axes.up} in the file"
+        refuse(source, "a front across the up axis of the file", actual, "Choose another front")
+    return axes
 
 
 def _weld_groups(parts: list[MeshPart]) -> Floats:
@@ -173,7 +188,11 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     scatters = [group.material >= 0 and mesh_file.materials[group.material].scatters for group in groups]
     is_skin = _match_groups(groups, names.skin, "skin_groups", source)
     if not names.skin:
-        is_skin = choose_skin(parts, groups, scatters)
+        candidates = [k for k, opaque in enumerate(is_opaque) if not opaque]
+        chosen = choose_skin(*([own[k] for k in candidates] for own in (parts, groups, scatters)))
+        is_skin = [False] * len(parts)
+        for k, skin in zip(candidates, chosen, strict=True):
+            is_skin[k] = skin
     is_skin = [skin and not opaque for skin, opaque in zip(is_skin, is_opaque, strict=True)]
     stated = (
         names.skin
@@ -236,12 +255,16 @@ class RiggedMesh(NamedTuple):
     """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
 
     notes : sentences on what of the file is mended, replaced or left out, for users
+    materials : of the file, to which `surface` refers; empty if the mesh is from the disk cache
+    unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
     """
 
     mesh: Mesh
     rig: Rig | None
     notes: tuple[str, ...] = ()
     surface: FileSurface = FileSurface()
+    materials: tuple[FileMaterial, ...] = ()
+    unit_mm: float | None = None
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
@@ -260,7 +283,7 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
-    mesh, rig, notes, surface = rigged
+    mesh, rig, notes, surface = rigged[:4]
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
     metadata |= {"notes": notes, "in_file": surface.in_file, "has_uv": surface.has_uv}
     metadata["uv_sets"] = list(surface.other_uv)

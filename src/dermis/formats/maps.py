@@ -14,9 +14,15 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Floats, Numbers
 from dermis.base.errors import refuse
 from dermis.images.codecs import Pixels, strips
-from dermis.images.colour import decode_srgb_levels
 from dermis.images.filters import smooth_quantisation
-from dermis.images.io import EmbeddedPicture, read_bytes, read_image, read_size
+from dermis.images.io import (
+    EmbeddedPicture,
+    note_properties,
+    read_bytes,
+    read_colours,
+    read_image,
+    read_size,
+)
 from dermis.images.sizes import MAX_PIXELS
 from dermis.mesh.maps import Maps
 
@@ -30,7 +36,7 @@ _MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 MapLoader = Callable[[PathLike], Numbers]
 _MAX_PARALLEL_TEXELS = MAX_PIXELS  # of all maps together, so that they can be decoded in parallel
 _MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is faster than decoding
-_CACHE_VERSION = 1  # increment when the same files result in other maps
+_CACHE_VERSION = 2  # increment when the same files result in other maps
 
 
 def check_finite(path: PathLike, values: A) -> A:
@@ -52,15 +58,16 @@ def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[
     return converted
 
 
-def colour_map(path: PathLike) -> Floats:
-    """Read a colour map (H, W, 3), linear Rec. 709."""
-    image = _read_picture(path, "a colour map")
-    if image.shape[2] < 3:
-        refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
-    image = image[..., :3]
+def colour_map(path: PathLike, upright: bool = False) -> Floats:
+    """Read a colour map (H, W, 3), linear Rec. 709; grey is repeated in all channels.
+
+    upright : turn the picture as its EXIF says, as for photographs
+    """
+    _check_side(path, "a colour map")
+    image, space = read_colours(path, upright)
     if image.dtype == np.float32:
-        return _check_unit_range(path, "a colour map", np.ascontiguousarray(image))
-    return _convert_in_strips(image, (3,), decode_srgb_levels)
+        return _check_unit_range(path, "a colour map", space.linear(check_finite(path, image)))
+    return _convert_in_strips(image, (3,), space.linear)
 
 
 def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
@@ -153,11 +160,15 @@ def _check_normals(path: PathLike, texels: float, outward: float, z: float, outw
         refuse(path, "a tangent-space normal map, which looks light blue", actual, "Check which map this is")
 
 
-def _read_picture(path: PathLike, role: str) -> Pixels:
+def _check_side(path: PathLike, role: str) -> None:
     width, height = read_size(path)
     if max(width, height) > MAX_SIDE:
         expected = f"{role} of at most {MAX_SIDE} texels a side"
         refuse(path, expected, f"it has {width} x {height}", "Resize it")
+
+
+def _read_picture(path: PathLike, role: str) -> Pixels:
+    _check_side(path, role)
     image = read_image(path)
     return check_finite(path, image) if image.dtype == np.float32 else image
 
@@ -203,7 +214,8 @@ def load_maps(
 ) -> Maps:
     """Load maps from picture files.
 
-    colour : RGB in sRGB, or linear if the file holds floats; alpha is ignored
+    colour : RGB in the colour space of the file, sRGB by default, or linear if the file holds floats; alpha
+        is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
     height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any bit depth [mm]
@@ -222,7 +234,7 @@ def load_maps(
         refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Use the other if bumps look like dents")
     roles: dict[str, tuple[PathLike | None, str, MapLoader]] = {  # largest first
         "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
-        "colour": (colour, "colour", colour_map),
+        "colour": (colour, "glTF" if isinstance(colour, EmbeddedPicture) else "colour", colour_map),
         "normal": (normal, f"normal {normal_y}", partial(slope_map, normal_y=normal_y)),
         "specular": (specular, "grey", partial(scalar_map, role="a specular map")),
         "roughness": (roughness, "grey", partial(scalar_map, role="a roughness map")),
@@ -259,5 +271,6 @@ def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
         return check_finite(path, load(path))
     from dermis.base.disk import cached_array
 
+    note_properties(path, colours=load is colour_map)
     source = np.frombuffer(data, np.uint8)
     return cached_array(source, f"map {_CACHE_VERSION} {parameters}", lambda: check_finite(path, load(path)))

@@ -58,6 +58,7 @@ class FileMaterial:
     metalness, emission, normal_scale : as in glTF
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
+    missing : sentences on pictures that are not found, by role
     unused : properties that have no effect here, for the note
     """
 
@@ -73,6 +74,7 @@ class FileMaterial:
     normal_scale: float = 1.0
     scatters: bool = False
     maps: Mapping[str, object] | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
 
     @property

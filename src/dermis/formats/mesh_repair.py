@@ -34,8 +34,9 @@ _OPPOSED = -0.5
 """Mean cosine between the normals of the file and those of triangles below which they are opposed [-]."""
 _SEEN_BALANCE = 0.25
 """Excess of one side among the visible samples above which a piece shows that side to the outside [-]."""
-_MIN_SEEN, _MIN_SLOPE = 8, 0.05  # samples, cosine
-_VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 24, 96, 200_000
+_MIN_SEEN, _MIN_VISIBLE, _MIN_SLOPE = 8, 0.02, 0.05  # samples, fraction of a piece alone, cosine
+_VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 20, 64, 120_000
+_DOUBTFUL_SAMPLES = 0.25  # fraction
 _MAX_UV_EXCESS = 0.02
 """Distance from the tile up to which uv are clamped to it [-]."""
 
@@ -387,14 +388,17 @@ class _Surface:
         total = np.bincount(self.piece, dot_columns(self.area, direction))
         return total / np.where(length > 0, length, 1)
 
-    def visible_samples(self, pieces: Mask) -> tuple[Index, Index]:
-        """Return how many samples of each piece are seen from outside on its front and on its back.
+    def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
+        """Return the balance of front and back of each piece as seen from outside, and whether backs prevail.
 
-        pieces : those that get additional samples, so that small ones have enough
+        Backs prevail if most of what is seen of the mesh is the back of its triangles. The balance is 1 if only the front is seen, -1 if only the back is, and 0 if hardly anything is.
+
+        doubtful : pieces that get additional samples, so that small ones have enough
         """
-        count, random = len(pieces), np.random.default_rng(0)
+        count, random = len(doubtful), np.random.default_rng(0)
         own = np.bincount(self.piece, self.size, count)
-        weight = self.size * (1 / own.sum() + (pieces / own / pieces.sum())[self.piece])
+        more = _DOUBTFUL_SAMPLES * doubtful / (own * doubtful.sum())
+        weight = self.size * ((1 - _DOUBTFUL_SAMPLES) / own.sum() + more[self.piece])
         total = np.cumsum(weight)
         triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
         shares = np.sort(random.random((2, _VIEW_SAMPLES)), axis=0)
@@ -415,7 +419,12 @@ class _Surface:
             cosine, index = view @ normal[:, visible], self.piece[triangle[visible]]
             for side, facing in enumerate((cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE)):
                 seen[side] += np.bincount(index[facing], minlength=count)
-        return seen[0], seen[1]
+        front, back = seen
+        cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # covered by a convex piece alone, on average
+        alone = _VIEWS * np.minimum(cells, np.bincount(self.piece[triangle], minlength=count) / 2)
+        visible = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)
+        balance = np.where(visible, (front - back) / np.maximum(front + back, 1), 0)
+        return balance, bool(back.sum() > 2 * front.sum())
 
 
 def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
@@ -427,12 +436,9 @@ def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
     doubtful : pieces that may be inside out
     agreement : mean cosine between the normals of the file and those of the triangles of each piece
     """
-    front, back = surface.visible_samples(doubtful)
-    seen = front + back >= _MIN_SEEN
-    balance = np.where(seen, (front - back) / np.maximum(front + back, 1), 0)
-    outwards, inwards = balance > _SEEN_BALANCE, balance < -_SEEN_BALANCE
-    opposed = (agreement < _OPPOSED) & ~outwards
-    return np.asarray(inwards | opposed | (~seen & bool(back.sum() > front.sum())))
+    balance, backs_prevail = surface.visible_balance(doubtful)
+    opposed = (agreement < _OPPOSED) & (balance <= _SEEN_BALANCE)
+    return np.asarray((balance < -_SEEN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
 def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
@@ -454,9 +460,7 @@ def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
     clamped = np.where(fits[chart], np.clip(moved, 0, 1), moved)
     count, excess = int(shift.any(axis=1).sum()), float(np.abs(clamped - moved).max())
     if count:
-        notes.append(
-            f"moved {count:,} of {_counted(len(shift), 'uv chart')} by whole tiles into the first one"
-        )
+        notes.append(f"moved {count:,} of {_counted(len(shift), 'uv chart')} by whole tiles into [0, 1]")
     if excess > UV_TOLERANCE:
         notes.append(f"clamped uv that are up to {excess:.2g} outside the tile")
     return replace(mesh, uv=clamped.astype(np.float32))

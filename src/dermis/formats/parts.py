@@ -1,24 +1,19 @@
-"""Parts of mesh files: one group of triangles each, with the units and the uv of the file.
-
-trimesh parses OBJ and PLY. As it would rename groups, their names are replaced by numbers in the text first.
-"""
+"""Parts of mesh files: one group of triangles each, with the units and the uv of the file."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Index, Ints, Numbers
+from dermis.formats.axes import DEFAULT_AXES, Axes
 
 if TYPE_CHECKING:
-    from trimesh import Trimesh
-
     from dermis.formats.materials import FileMaterial
 
 Colour = tuple[float, float, float]
@@ -27,12 +22,20 @@ GREY: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Return whether the suffix of a file is that of glTF, .glb or .gltf."""
-    return Path(path).suffix.lower() in (".glb", ".gltf")
+    """Return whether the suffix of a file is that of glTF: .glb, .gltf or .vrm."""
+    return is_binary_gltf(path) or Path(path).suffix.lower() == ".gltf"
+
+
+def is_binary_gltf(path: str | Path) -> bool:
+    """Return whether the suffix of a file is that of binary glTF: .glb, or .vrm for avatars."""
+    return Path(path).suffix.lower() in (".glb", ".vrm")
 
 
 def default_unit_mm(path: str | Path) -> float:
-    """Return the default length unit of a file format [mm]: 1000 for glTF, which is in metres, else 1."""
+    """Return the default length unit of a file format [mm]: 1000 for glTF, which is in metres, else 1.
+
+    USD files state their own unit, see `MeshFile`.
+    """
     return 1000.0 if is_gltf(path) else 1.0
 
 
@@ -105,6 +108,8 @@ class MeshFile:
     weights : default weights of morph targets by name, without those of weight 0
     materials : materials of the file, to which the groups refer
     notes : sentences on what of the file is mended, replaced or left out, for users
+    unit_mm : length unit that the file states [mm], or None
+    axes : axes that the file states, or the defaults
     """
 
     parts: list[MeshPart]
@@ -112,54 +117,13 @@ class MeshFile:
     weights: Mapping[str, float] = field(default_factory=dict)
     materials: tuple[FileMaterial, ...] = ()
     notes: tuple[str, ...] = ()
+    unit_mm: float | None = None
+    axes: Axes = DEFAULT_AXES
 
     @property
     def is_deformable(self) -> bool:
         """Return whether the file has bones or morph targets."""
         return self.bones is not None or any(part.targets for part in self.parts)
-
-
-def trimesh_parts(
-    data: bytes, kind: str, groups: list[MaterialGroup], **options: object
-) -> Iterator[MeshPart]:
-    """Parse a file with trimesh and yield its meshes as parts.
-
-    kind : format of the data, "obj" or "ply"
-    groups : of the parts; the material names in the data are indices of this list
-    options : for trimesh
-    """
-    from io import BytesIO
-
-    import trimesh
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        # truncated text must not be read as a smaller mesh
-        warnings.filterwarnings("error", message="string or file could not be read")
-        scene = trimesh.load_scene(BytesIO(data), file_type=kind, process=False, **options)
-    names = [scene.graph[node][1] for node in scene.graph.nodes_geometry]
-    for mesh in (scene.geometry[name] for name in names or scene.geometry):
-        if isinstance(mesh, trimesh.Trimesh):
-            tag = getattr(getattr(mesh.visual, "material", None), "name", None)
-            yield _to_mesh_part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
-
-
-def _to_mesh_part(mesh: Trimesh, group: MaterialGroup) -> MeshPart:
-    """Convert a trimesh mesh to a `MeshPart`."""
-    uv = getattr(mesh.visual, "uv", None)
-    normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
-    triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
-    positions = np.asarray(mesh.vertices, dtype=np.float64) + 0.0  # converts -0 to 0
-    if positions.ndim != 2 or positions.shape[1] != 3:
-        raise ValueError(f"its vertices have {positions.shape[-1]} coordinates, not 3")
-    return MeshPart(
-        group,
-        positions,
-        None if uv is None else to_floats(np.asarray(uv)),
-        None if normals is None else to_floats(np.asarray(normals)) + 0.0,
-        triangles,
-        quads=find_quads(ply_corner_counts(mesh.metadata), triangles),
-    )
 
 
 def to_floats(values: Numbers) -> Doubles:
@@ -192,17 +156,3 @@ def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
         if (a[:, [0, 2]] == b[:, [2, 0]]).all():
             return pairs
     return none
-
-
-def ply_corner_counts(metadata: Mapping[str, Any]) -> Index:
-    """Return the number of corners of each polygon of a .ply file; empty for other formats.
-
-    metadata : of the mesh that trimesh read
-    """
-    data = metadata.get("_ply_raw", {}).get("face", {}).get("data")
-    properties = data.dtype.names if isinstance(data, np.ndarray) else data
-    for name in ("vertex_index", "vertex_indices"):
-        if name in (properties or ()):
-            rows = data[name]["f1"] if isinstance(data, np.ndarray) else data[name]
-            return np.fromiter(map(len, rows), np.int64) if rows.dtype == object else np.full(*rows.shape)
-    return np.empty(0, np.int64)

@@ -30,6 +30,7 @@ Origin = Literal["auto", "top", "bottom"]
 MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
+    ".vrm": read_gltf,
     ".obj": read_obj,
     ".ply": read_ply,
 }

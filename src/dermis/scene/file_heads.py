@@ -52,6 +52,12 @@ class MapOptions:
         """Return the files that users name."""
         return {role: file for role, file in self.files.items() if file is not None}
 
+    @property
+    def replaced(self) -> set[str]:
+        """Return the roles of pictures of the file that the given files replace."""
+        relief = {"normal", "height", "bump"}
+        return {*self.given, *(relief if relief & self.given.keys() else ())}
+
     def load(self, files: Mapping[str, Any]) -> Maps:
         """Return the maps of the given files and, for other roles, of those that belong to the mesh.
 
@@ -79,16 +85,13 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     sample = SAMPLES.get(name)
     if sample is not None:
         return _load_sample(sample, mesh_options, options), EyeLook()
-    path, look = Path(name), EyeLook()
+    path, look, materials = Path(name), EyeLook(), None
     if is_gltf(path):
         materials, look = embedded_materials(path), embedded_eye_look(path)
-        rigged = _load_mesh(path, name, mesh_options)
-        mesh, maps, notes = _with_materials(rigged, materials, path, options)
-    else:
-        with ThreadPoolExecutor(1) as pool:
-            pending_maps = pool.submit(_load_obj_maps, path, mesh_options["opaque"], options)
-            rigged = _load_mesh(path, name, mesh_options)
-            mesh, (maps, notes) = rigged.mesh, pending_maps.result()
+    rigged = _load_mesh(path, name, mesh_options)
+    mesh, maps, notes = _with_materials(
+        rigged, rigged.materials if materials is None else materials, path, options
+    )
     check_relief(options.height_mm, maps.height, f"{name}: height_mm")
     maps, tone_note = (maps, "") if "colour" in options.given else with_skin_tone(mesh, maps)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
@@ -125,25 +128,24 @@ def _with_materials(
     direct = direct_material(rigged, materials)
     pack_skin = direct is None and not options.given
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
-    loaded = options.load({} if direct is None else direct.skin_pictures())
-    if direct is not None:
-        loaded = with_factors(loaded, direct, options.given)
+    loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
     roles = [one.name for one in fields(Maps)]
     maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
-    return mesh, maps, [*notes, unused_properties(mesh, materials, rigged.surface.in_file)]
+    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced)
+    return mesh, maps, [*notes, *faults, unused]
 
 
-def _load_obj_maps(path: Path, opaque: tuple[str, ...], options: MapOptions) -> tuple[Maps, list[str]]:
-    """Return the maps of given files and, for other roles, of the materials of an OBJ file; and notes."""
-    loaded = options.load({})
-    if path.suffix.lower() != ".obj":
-        return loaded, []
-    own, note = obj_maps(
+def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tuple[Maps, list[str]]:
+    """Return the maps of a material whose pictures are those of the skin, and notes on maps left out."""
+    if path.suffix.lower() != ".obj" or not material.name:
+        return with_factors(options.load(material.skin_pictures()), material, options.given), []
+    own, faults = obj_maps(
         path,
-        opaque=opaque,
+        material.name,
         overridden=options.given,
         height_mm=options.height_mm,
         normal_y=options.normal_y,
     )
+    loaded = options.load({})
     given: dict[str, Any] = {role: getattr(loaded, role) for role in options.given}
-    return replace(own, **given), [note.removeprefix(f"{path}: ")]
+    return with_factors(replace(own, **given), material, {*options.given, "roughness"}), faults

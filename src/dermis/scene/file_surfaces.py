@@ -190,16 +190,20 @@ def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bo
     )
 
 
-def unused_properties(mesh: Mesh, materials: Sequence[FileMaterial], in_file: Sequence[int]) -> str:
-    """Return the note on properties of a file's materials that are not drawn; empty for none.
+def unused_properties(
+    mesh: Mesh, materials: Sequence[FileMaterial], in_file: Sequence[int], given: Collection[str]
+) -> str:
+    """Return the note on what of a file's materials is not drawn; empty for nothing.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    given : roles of maps of the skin that users replace
     """
     lines = dict[str, None]()
     for material, index in zip(mesh.materials, in_file, strict=True):
-        own = materials[index] if index >= 0 else FileMaterial()
+        own, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
         unused = list(own.unused)
-        if material.kind == "skin" and own.maps is None:
+        unused += [text for role, text in own.missing.items() if not (is_skin and role in given)]
+        if is_skin and own.maps is None:
             unused += _replaced_by_skin(own)
         if unused:
             lines[f"{own.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None

@@ -279,10 +279,11 @@ def _build_settings(kind: type[P], culprit: object, part: str, table: Any) -> P:
     if not isinstance(table, dict):
         actual = "there is none" if table is None else f"got {table!r}"
         refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
-    try:
-        return kind(**table)
-    except InvalidFieldsError as error:
-        raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
+    with error_context(f"{culprit}: {part}"):
+        try:
+            return kind(**table)
+        except InvalidFieldsError as error:
+            raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
 
 
 def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dermis.base.errors import format_value, refuse
 from dermis.optics.pigments.parameters import Structure
+from dermis.optics.reduced_scattering import check_reduced
 from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import FrozenModel, slider
 from dermis.scene.talk import Energy, SpecularColour
@@ -75,6 +77,13 @@ class TissueLayer(FrozenModel):
     """Absorption coefficient [1/mm]."""
     scattering_per_mm: Annotated[tuple[_Scattering, _Scattering, _Scattering], _COEFFICIENT_SLIDER]
     """Reduced scattering coefficient [1/mm]."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_reduced(cls, fields: object) -> object:
+        if isinstance(fields, Mapping):
+            check_reduced("layers", fields)
+        return fields
 
 
 class Skin(FrozenModel):

@@ -1,4 +1,4 @@
-"""Access to the JSON tree and the buffers of .glb and .gltf files.
+"""Access to the JSON tree and the buffers of .glb, .vrm and .gltf files.
 
 Strided and sparse accessors, and normalised integers, are decoded.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Numbers
 from dermis.base.errors import refuse
 from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, parsing, read_file
-from dermis.formats.parts import to_floats
+from dermis.formats.parts import is_binary_gltf, to_floats
 from dermis.formats.referenced_files import resolve_uri
 from dermis.formats.size_limits import MAX_ACCESSOR_COMPONENTS, MAX_FILE_BYTES, MAX_JSON_VALUES, check_limit
 
@@ -51,7 +51,7 @@ class Document:
     """JSON tree and binary data of a glTF file, with access to its accessors.
 
     tree : JSON of the file
-    binary : binary chunk of a .glb file, empty for a .gltf file
+    binary : binary chunk of a .glb or .vrm file, empty for a .gltf file
     """
 
     path: Path
@@ -75,7 +75,10 @@ class Document:
     def read_buffer(self, index: int) -> bytes:
         """Return the bytes of a buffer from the .glb file, a data URI or another file."""
         if index not in self._buffers:
-            self._buffers[index] = self._read_uri(self.item("buffers", index).get("uri"))
+            uri = self.item("buffers", index).get("uri")
+            if uri is None and index > 0:
+                raise ValueError(f"buffer {index} has no data in the file")
+            self._buffers[index] = self._read_uri(uri)
         return self._buffers[index]
 
     def read_view(self, index: int) -> memoryview:
@@ -87,15 +90,27 @@ class Document:
             raise ValueError(f"buffer view {index} ends outside of its buffer")
         return data
 
+    def accessor_shape(self, index: int) -> tuple[int, int]:
+        """Return the number of elements of an accessor, and that of their components."""
+        accessor = self.item("accessors", index)
+        return _checked_size(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
+
+    def replace_values(self, index: int, values: Numbers) -> None:
+        """Store other values of the shape of an accessor; they are converted to its type."""
+        accessor = self.item("accessors", index)
+        data = values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
+        buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))
+        self._buffers[len(buffers)] = data
+        views.append({"buffer": len(buffers), "byteLength": len(data)})
+        buffers.append({"byteLength": len(data)})
+        accessor.pop("sparse", None)
+        accessor |= {"bufferView": len(views) - 1, "byteOffset": 0}
+
     def read_values(self, index: int) -> Numbers:
         """Return n elements of k components of an accessor in their stored type, (n, k)."""
-        accessor = self.item("accessors", index)
-        kind, width = (
-            np.dtype(_COMPONENT_TYPES[accessor["componentType"]]),
-            _COMPONENT_COUNTS[accessor["type"]],
-        )
-        shape = _checked_size(accessor["count"]), width
-        self._accessor_components += max(shape[0] * width, _MIN_READ_COST)
+        accessor, shape = self.item("accessors", index), self.accessor_shape(index)
+        kind = np.dtype(_COMPONENT_TYPES[accessor["componentType"]])
+        self._accessor_components += max(shape[0] * shape[1], _MIN_READ_COST)
         if self._accessor_components > MAX_ACCESSOR_COMPONENTS:
             actual = f"accessor {index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
@@ -177,13 +192,13 @@ def _checked_size(value: object) -> int:
 
 
 def read_document(path: Path) -> Document:
-    """Read a .glb or .gltf file.
+    """Read a .glb, .vrm or .gltf file.
 
     Raises DermisError when it is not glTF, truncated, or too large.
     """
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
     with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
-        if path.suffix.lower() != ".glb":
+        if not is_binary_gltf(path):
             return Document(path, _parse_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)
         if magic != _GLB_MAGIC or version != 2:

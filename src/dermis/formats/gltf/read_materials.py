@@ -44,6 +44,7 @@ _NOT_DRAWN = {
     "KHR_materials_transmission": "transmission",
     "KHR_materials_variants": "variants",
     "KHR_materials_volume": "absorbing volume",
+    "VRMC_materials_mtoon": "cartoon shading (shade colour, outline, rim light)",
 }
 KNOWN_EXTENSIONS = (
     *_SOURCE_EXTENSIONS,

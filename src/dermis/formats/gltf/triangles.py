@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.formats import size_limits as limits
+from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.read_materials import KNOWN_EXTENSIONS, read_materials
@@ -25,8 +26,10 @@ from dermis.formats.gltf.rigs import (
     read_targets,
     target_names,
 )
+from dermis.formats.gltf.unread import LIGHTS, note_unread
 from dermis.formats.materials import FileMaterial
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
+from dermis.formats.text_files import listed
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_COUNTS = {
@@ -35,7 +38,12 @@ _MAX_COUNTS = {
     "vertices": limits.MAX_VERTICES,
     "displacements by targets": limits.MAX_DISPLACEMENTS,
 }
-_SUPPORTED_EXTENSIONS = (*KNOWN_EXTENSIONS, "KHR_mesh_quantization", "KHR_lights_punctual")
+_READ_EXTENSIONS = (*KNOWN_EXTENSIONS, *vrm.EXTENSIONS, draco.EXTENSION, "KHR_mesh_quantization", LIGHTS)
+_COMPRESSION_ADVICE = (
+    "Export without this compression: gltfpack without -c and -cc, or gltf-transform copy IN.glb OUT.glb"
+)
+_ADVICE = dict.fromkeys(("EXT_meshopt_compression", "KHR_meshopt_compression"), _COMPRESSION_ADVICE)
+_OTHER_ADVICE = "Export without it"
 
 
 def read_gltf(path: Path) -> MeshFile:
@@ -46,20 +54,23 @@ def read_gltf(path: Path) -> MeshFile:
     """
     document = read_document(path)
     _refuse_extensions(document)
-    nodes = read_nodes(document)
+    draco.decompress(document)
+    nodes, avatar = read_nodes(document), vrm.read_avatar(document)
     armature, weights = read_armature(document, nodes), default_weights(document, nodes)
     materials = read_materials(document)
-    parts = list(_SceneReader(document, nodes, armature, weights, materials).parts())
-    return MeshFile(parts, armature.bones if armature else None, weights, materials)
+    reader = _SceneReader(document, nodes, armature, weights, materials, avatar)
+    parts, bones = list(reader.parts()), armature.bones if armature else None
+    notes = (*note_unread(document, nodes, _READ_EXTENSIONS), *avatar.notes, *reader.notes)
+    return MeshFile(parts, bones, weights, materials, notes, axes=avatar.axes)
 
 
 def _refuse_extensions(document: Document) -> None:
     """Refuse a file that requires unsupported extensions, such as compressed geometry."""
     required = map(str, document.items("extensionsRequired"))
-    unsupported = [name for name in required if name not in _SUPPORTED_EXTENSIONS]
+    unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
-        actual = f"the file requires {', '.join(map(str, unsupported))}"
-        refuse(document.path, "plain glTF geometry", actual, "Export without compression")
+        advice = next((_ADVICE[name] for name in unsupported if name in _ADVICE), _OTHER_ADVICE)
+        refuse(document.path, "plain glTF", f"the file requires {listed(unsupported)}", advice)
 
 
 @dataclass
@@ -67,6 +78,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
+    notes : on what is left out of the parts that are read
     """
 
     document: Document
@@ -74,6 +86,8 @@ class _SceneReader:
     armature: Armature | None
     weights: dict[str, float]
     materials: tuple[FileMaterial, ...]
+    avatar: vrm.Avatar
+    notes: dict[str, None] = field(default_factory=dict)
 
     def parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
@@ -141,9 +155,12 @@ class _SceneReader:
             for name in ("TEXCOORD_0", "NORMAL", "COLOR_0")
         )
         targets = read_targets(self.document, mesh, names, primitive, len(positions))
+        targets = self.avatar.with_expressions(mesh, names, targets)
         displaced = apply_targets(positions, targets, self.weights)
         if displaced is not positions:
             normals = None  # they are those of the undisplaced shape
+        if colours is not None and colours.shape[1] > 3 and colours[:, 3].min() < 1.0:
+            self.notes["the transparency of vertices (alpha of COLOR_0) is left out"] = None
         triangles = self._triangles(primitive, len(positions))
         extras = _own_extras(primitive)
         corner_counts = np.full(len(triangles) // 2 if extras.get("quads") is True else 0, 4)

@@ -1,0 +1,86 @@
+"""Decompression of the geometry of glTF files that is compressed by Draco."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Numbers
+from dermis.base.disk import Arrays
+from dermis.base.errors import refuse
+from dermis.base.extras import import_extra
+from dermis.formats import size_limits as limits
+from dermis.formats.gltf.document import Document, Tree
+from dermis.formats.native_decoding import run_decoder
+
+EXTENSION = "KHR_draco_mesh_compression"
+_TRIANGLES = 4
+_DECODER = "dermis.formats.gltf.draco_decoder"
+_ADVICE = "Decimate it, or export without compression"
+
+
+class _Primitive(NamedTuple):
+    """Compressed primitive: its own tree, and that of its extension."""
+
+    tree: Tree
+    extension: Tree
+
+
+def decompress(document: Document) -> None:
+    """Store the compressed attributes and indices of a document's primitives as plain accessors.
+
+    Primitives that are also stored without compression are left as they are.
+
+    Raises DermisError without the package DracoPy, for damaged data, and for data that does not have the
+    size that its accessors state.
+    """
+    found = [_compressed(document, one) for mesh in document.items("meshes") for one in mesh["primitives"]]
+    primitives = [one for one in found if one is not None]
+    if not primitives:
+        return
+    import_extra("DracoPy", f"{document.path}: geometry compressed by Draco")
+    _check_sizes(document, [one.tree for one in primitives])
+    views = [document.read_view(one.extension["bufferView"]) for one in primitives]
+    request = {str(number): np.frombuffer(view, np.uint8) for number, view in enumerate(views)}
+    size = sum(map(len, views))
+    answer = run_decoder(_DECODER, request, size, document.path, "valid geometry compressed by Draco")
+    for number, primitive in enumerate(primitives):
+        _store(document, primitive, answer, str(number))
+
+
+def _compressed(document: Document, primitive: Tree) -> _Primitive | None:
+    """Return a primitive if it is stored only in compressed form, else None."""
+    extension = (primitive.get("extensions") or {}).get(EXTENSION)
+    positions = document.item("accessors", primitive["attributes"]["POSITION"])
+    if extension is None or "bufferView" in positions:
+        return None
+    return _Primitive(primitive, extension)
+
+
+def _check_sizes(document: Document, primitives: list[Tree]) -> None:
+    """Refuse more vertices or triangles than allowed, by the sizes that accessors state."""
+    vertices = [document.item("accessors", one["attributes"]["POSITION"])["count"] for one in primitives]
+    corners = [document.item("accessors", one["indices"])["count"] for one in primitives if "indices" in one]
+    limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _ADVICE)
+    limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _ADVICE)
+
+
+def _store(document: Document, primitive: _Primitive, answer: Arrays, name: str) -> None:
+    tree, compressed = primitive
+    for attribute, identifier in compressed["attributes"].items():
+        _replace(document, tree["attributes"][attribute], answer[f"{name}/{identifier}"], attribute)
+    if "indices" in tree:
+        triangles = answer[f"{name}/triangles"]
+        _replace(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
+        tree["mode"] = _TRIANGLES
+
+
+def _replace(document: Document, accessor: int, values: Numbers, items: str) -> None:
+    shape = document.accessor_shape(accessor)
+    if values.shape != shape:
+        actual = f"its compressed {items} are {' x '.join(map(str, values.shape))} numbers"
+        refuse(
+            document.path, f"{shape[0]} x {shape[1]} as its accessor states", actual, limits.DAMAGED_ADVICE
+        )
+    document.replace_values(accessor, values)

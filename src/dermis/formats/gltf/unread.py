@@ -1,0 +1,36 @@
+"""Notes on the content of glTF files that is not read."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from dermis.formats.gltf.document import Document
+from dermis.formats.gltf.nodes import Nodes
+from dermis.formats.text_files import listed
+
+LIGHTS = "KHR_lights_punctual"
+_POINTS_AND_LINES = range(4)  # modes of primitives
+
+
+def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[str]) -> Iterator[str]:
+    """Yield notes on lights, cameras, points, lines, further scenes and extensions that are left out.
+
+    read_extensions : names of the extensions that are read, or noted elsewhere
+    """
+    listed_nodes = document.items("nodes")
+    in_scene = [listed_nodes[k] for k in nodes.scene_nodes or ()]
+    lights = sum(LIGHTS in (node.get("extensions") or {}) for node in in_scene)
+    if lights:
+        yield f"its lights ({lights}) are left out; --lights or the scene sets lights"
+    cameras = sum("camera" in node for node in in_scene)
+    if cameras:
+        yield f"its cameras ({cameras}) are left out; --camera sets one"
+    modes = [one.get("mode", 4) for mesh in document.items("meshes") for one in mesh["primitives"]]
+    thin = sum(mode in _POINTS_AND_LINES for mode in modes)
+    if thin:
+        yield f"points and lines ({thin} primitives) are left out"
+    if len(document.items("scenes")) > 1:
+        yield f"one of its {len(document.items('scenes'))} scenes is read"
+    unread = [str(one) for one in document.items("extensionsUsed") if one not in read_extensions]
+    if unread:
+        yield f"these extensions are left out: {listed(unread)}"

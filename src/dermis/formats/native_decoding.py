@@ -1,0 +1,137 @@
+"""Decoding of untrusted data by native libraries, in a separate process with limits.
+
+A decoder is a module of this package that calls `answer_request` when it is run as a program. Request and
+answer are arrays by name: a line of JSON with their types and shapes, followed by their bytes. A crash, a
+hang, or the use of too much memory ends the process and becomes a `DermisError`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from tempfile import TemporaryDirectory, TemporaryFile
+
+import numpy as np
+
+from dermis.base.arrays import Bytes
+from dermis.base.disk import Arrays
+from dermis.base.errors import DermisError, refuse, shorten
+from dermis.formats.size_limits import DAMAGED_ADVICE
+
+_CPU_S, _SMALL_BYTES = 8.0, 64 << 20
+"""CPU time for files up to a size; that of larger ones is proportional [s, bytes]."""
+_MAX_WAIT = 3.0  # elapsed time relative to the CPU time, on a busy machine
+_MEMORY_BYTES = 2 << 30  # of the address space, of which libraries of USD take a third
+_ANSWER_BYTES = 1 << 30  # of the answer, and of each temporary file
+_REFUSED, _FAILED = "refused", "failed"
+_MAX_MESSAGE = 2000  # characters
+_VARIABLES = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
+_REMOVED_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTHONSTARTUP")
+
+
+def run_decoder(module: str, request: Arrays, size: int, culprit: object, expected: str) -> Arrays:
+    """Return the answer of a decoder.
+
+    module : its name; it runs with an empty temporary folder as its working directory
+    request : arrays by name, of numbers
+    size : of the data to decode, which determines the time that it may take [bytes]
+    culprit, expected : the file, and what it should be, for errors
+
+    Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
+    """
+    cpu_s = _CPU_S * max(1.0, size / _SMALL_BYTES)
+    command = [sys.executable, "-P", "-m", module, str(math.ceil(cpu_s))]
+    kept = {name: value for name, value in os.environ.items() if name not in _REMOVED_VARIABLES}
+    with TemporaryDirectory() as folder, TemporaryFile() as output:
+        try:
+            status = subprocess.run(
+                command,
+                input=_pack(request),
+                stdout=output,
+                stderr=subprocess.DEVNULL,
+                cwd=folder,
+                env=kept | _VARIABLES,
+                timeout=_MAX_WAIT * cpu_s,
+                check=False,
+            ).returncode
+        except subprocess.TimeoutExpired:
+            refuse(culprit, expected, f"its decoder takes more than {cpu_s:.0f} s", DAMAGED_ADVICE)
+        if status != 0 or output.seek(0, os.SEEK_END) > _ANSWER_BYTES:
+            actual = f"its decoder stopped ({_stop_reason(status)})"
+            refuse(culprit, expected, actual, DAMAGED_ADVICE)
+        output.seek(0)
+        answer = _unpack(output.read())
+    if _REFUSED in answer:
+        raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE))
+    if _FAILED in answer:
+        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", DAMAGED_ADVICE)
+    return answer
+
+
+def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
+    """Answer the request on standard input on standard output; the main function of a decoder.
+
+    decode : raises DermisError to refuse the data; other exceptions mean that the data are damaged
+    """
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # libraries print messages
+    _limit_process(int(sys.argv[1]))
+    try:
+        answer = _pack(decode(_unpack(sys.stdin.buffer.read())))
+    except DermisError as error:
+        answer = _pack({_REFUSED: from_text(str(error))})
+    except Exception as error:
+        text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE].split())
+        answer = _pack({_FAILED: from_text(shorten(text, 200))})
+    with output:
+        output.write(answer)
+
+
+def as_text(array: Bytes) -> str:
+    """Return the text of an array of a request or an answer."""
+    return array.tobytes().decode("utf-8", "replace")
+
+
+def from_text(text: str) -> Bytes:
+    """Return a text as an array for a request or an answer."""
+    return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
+
+
+def _pack(arrays: Mapping[str, Bytes]) -> bytes:
+    header = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
+    return b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
+
+
+def _unpack(data: bytes) -> Arrays:
+    line, _, body = data.partition(b"\n")
+    arrays, start = Arrays(), 0
+    for name, (dtype, shape) in json.loads(line).items():
+        flat = np.frombuffer(body, dtype, math.prod(shape), start)
+        arrays[name], start = flat.reshape(shape), start + flat.nbytes
+    return arrays
+
+
+def _limit_process(cpu_s: int) -> None:
+    """Limit memory, CPU time and files of this process, where the system can."""
+    try:
+        import resource
+    except ImportError:  # Windows, where only the elapsed time is limited
+        return
+    limits = {
+        resource.RLIMIT_AS: _MEMORY_BYTES,
+        resource.RLIMIT_CPU: cpu_s,
+        resource.RLIMIT_FSIZE: _ANSWER_BYTES,
+        resource.RLIMIT_CORE: 0,
+    }
+    for kind, value in limits.items():
+        hard = resource.getrlimit(kind)[1]
+        allowed = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(kind, (allowed, allowed))
+
+
+def _stop_reason(status: int) -> str:
+    return f"signal {-status}" if status < 0 else f"status {status}" if status else "its answer is too large"

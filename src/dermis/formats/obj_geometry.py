@@ -1,0 +1,305 @@
+"""Geometry of OBJ files: polygons with positions, uv, normals and colours, and the group of each polygon.
+
+Statements of numbers are parsed as arrays, all others one by one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from dermis.base.arrays import Bytes, Doubles, Index, Mask
+from dermis.base.errors import refuse
+from dermis.formats import size_limits as limits
+from dermis.formats.polygons import (
+    Polygons,
+    check_polygon_sizes,
+    missing_uv,
+    refuse_without_faces,
+    without_small,
+)
+from dermis.formats.text_files import listed, parse_numbers, run_starts
+from dermis.formats.vertex_colours import linear_colours
+
+_MAX_LINES = 12_000_000
+_MAX_LINE_LENGTH, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
+_CONTINUED_LINE = re.compile(r"^(?![ \t]*#)(?:[^\n]*\\\n)+[^\n]*", re.MULTILINE)
+_LEADING_BLANKS = re.compile(r"^[ \t]+", re.MULTILINE)
+_TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
+_LINE_FEED, _SPACE, _SLASH = b"\n /"
+_VERTEX_KINDS = ("v", "vt", "vn")
+_FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
+_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # position and colour; in a statement
+_POLYPAINT = "#MRGB"
+READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAINT)
+STATEMENTS_WITHOUT_MEANING = ("s", "mg", "")
+"""Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
+LEFT_OUT = {
+    **{"l": "lines", "p": "points", "vp": "curves"},
+    **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con"), "curves"),
+    **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
+}
+"""What some statements describe that are left out with a note, as all unknown ones are."""
+
+
+@dataclass(frozen=True)
+class ObjGeometry:
+    """Geometry of an OBJ file.
+
+    pairs, pair : names of `usemtl` and `g` that occur together, and the index of the pair of each polygon
+    statements : the other statements, as text
+    notes : sentences on what of the file is mended or left out
+    """
+
+    polygons: Polygons
+    pairs: list[tuple[str, str]]
+    pair: Index
+    statements: str
+    notes: list[str]
+
+
+_Statement = tuple[int, str, str]
+"""Line, first word and arguments of a statement."""
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Statements of one kind without their first word.
+
+    line : (n,) line of each, counted from 0
+    text : ASCII codes, with a line feed at the end of each statement
+    start : (n,) position of each in the text
+    """
+
+    line: Index
+    text: Bytes
+    start: Index
+
+
+def parse_geometry(path: Path, text: str) -> ObjGeometry:
+    """Return the geometry in the text of an OBJ file.
+
+    Raises DermisError with the number of the line for numbers and indices that are invalid.
+    """
+    limits.check_limit(path, text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
+    rows, others = _split_statements(path, _plain_text(text))
+    positions, colours, notes = _vertices(path, rows["v"])
+    uv, normals = _table(path, rows["vt"], "vt")[0], _table(path, rows["vn"], "vn")[0]
+    if np.nan_to_num(uv[:, 2]).any():
+        notes.append("the third coordinate of uv (vt) is left out")
+    paint = "".join(value for _, key, value in others if key == _POLYPAINT)
+    if paint and colours is not None:
+        notes.append(f"the polypaint ({_POLYPAINT}) is left out: vertices have colours of their own")
+    elif paint:
+        colours, faults = _polypaint(paint, len(positions))
+        notes += faults
+    counts, corners = _faces(path, rows)
+    pairs, pair = _groups(path, others, rows["f"].line)
+    counts, corners, kept, faults = without_small(counts, corners)
+    if not len(counts):
+        refuse_without_faces(path, len(positions))
+    uv = np.column_stack((uv[:, 0], np.where(np.isnan(uv[:, 1]), 0.0, uv[:, 1])))
+    polygons = Polygons(counts, corners, positions, uv, normals[:, :3], colours)
+    notes += [*faults, *missing_uv(polygons), *_unread(others, has_normals=len(normals) > 0)]
+    statements = "\n".join(f"{key} {value}" for _, key, value in others)
+    return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
+
+
+def _plain_text(text: str) -> str:
+    """Join continued lines; remove blanks at the start of lines and comments at their end.
+
+    Lines keep their numbers.
+    """
+    if "\\\n" in text:
+        text = _CONTINUED_LINE.sub(lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), text)
+    if text[:1] in (" ", "\t") or "\n " in text or "\n\t" in text:
+        text = _LEADING_BLANKS.sub("", text)
+    commented = text.count("#") != text.count("\n#") + text.startswith("#")
+    return _TRAILING_COMMENT.sub(r"\1", text) if commented else text
+
+
+def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement]]:
+    """Return the statements of numbers by kind, and all others."""
+    data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
+    end = np.flatnonzero(data == _LINE_FEED)
+    start = np.concatenate([[0], end[:-1] + 1])
+    length = end - start + 1
+    first, second, third = (data[np.minimum(start + k, end)] for k in range(3))
+    _check_lines(path, length, first == ord("v"))
+    masks = {key: (first == ord(key)) & (second <= _SPACE) for key in ("v", "f")}
+    for key in ("vt", "vn"):
+        masks[key] = (first == ord("v")) & (second == ord(key[1])) & (third <= _SPACE)
+    rows = {}
+    for key, mask in masks.items():
+        own = data[np.repeat(mask, length)]
+        own_start = np.cumsum(length[mask]) - length[mask]
+        own[own_start[:, None] + np.arange(len(key))] = _SPACE
+        rows[key] = _Rows(np.flatnonzero(mask), own, own_start)
+    is_comment = (first == ord("#")) & ~((second == ord("M")) & (third == ord("R")))
+    other = ~np.logical_or.reduce([is_comment, first == _LINE_FEED, *masks.values()])
+    count, items = int(other.sum()), "statements besides vertices and faces"
+    limits.check_limit(path, count, 3 * limits.MAX_TRIANGLES, items, limits.DECIMATE_ADVICE)
+    texts = data[np.repeat(other, length)].tobytes().decode().split("\n")[:-1]
+    words = (one.split(None, 1) or [""] for one in texts)
+    lines = np.flatnonzero(other).tolist()
+    return rows, [
+        (n, key, rest[0].strip() if rest else "") for n, (key, *rest) in zip(lines, words, strict=True)
+    ]
+
+
+def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
+    if length.max() > _MAX_LINE_LENGTH or length[is_vertex].max(initial=0) > _MAX_VERTEX_LINE:
+        expected = f"lines of at most {_MAX_LINE_LENGTH:,} characters, {_MAX_VERTEX_LINE} for vertices"
+        refuse(path, expected, f"one has {length.max():,}", limits.DAMAGED_ADVICE)
+    items = "lines of vertices, uv and normals"
+    limits.check_limit(path, int(is_vertex.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE)
+
+
+def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str = "") -> NoReturn:
+    """Refuse statement `index` of a kind.
+
+    actual : clause, by default the text of the statement
+    """
+    ends = np.append(rows.start[1:], len(rows.text))
+    words = " ".join(rows.text[rows.start[index] : ends[index]].tobytes().decode(errors="replace").split())
+    said = actual or (f"it has {words!r}" if words else "it has nothing")
+    refuse(path, expected, f"in line {rows.line[index] + 1} {said}", limits.DAMAGED_ADVICE)
+
+
+def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
+    """Return positions (n, 3), linear colours (n, 3) or None, and notes.
+
+    A fourth number alone is a weight, by which the others are divided; three further ones are a colour.
+    """
+    table, counts = _table(path, rows, "v")
+    positions, notes = table[:, :3], list[str]()
+    if (counts == 5).any() or (counts > _USED_NUMBERS).any():
+        notes.append("further numbers after the position or colour of vertices (v) are left out")
+    weight = np.where(counts == 4, table[:, 3], 1.0)
+    if (weight != 1).any():
+        notes.append("vertices have a fourth coordinate: their positions are divided by it")
+        positions = positions / weight[:, None]
+    coloured = counts >= _USED_NUMBERS
+    if not coloured.any():
+        return positions, None, notes
+    colours, faults = linear_colours(np.where(coloured[:, None], table[:, 3:], np.nan))
+    return positions, colours, notes + faults
+
+
+def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
+    """Return the linear colours (n, 3) of the polypaint of ZBrush, or None and a note.
+
+    digits : hexadecimal mask, red, green and blue of each vertex
+    count : number of vertices
+    """
+    try:
+        levels = np.frombuffer(bytes.fromhex(digits), np.uint8).reshape(count, 4)
+    except ValueError:
+        return None, [f"the polypaint ({_POLYPAINT}) does not fit the vertices and is left out"]
+    return linear_colours(levels[:, 1:])
+
+
+def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
+    """Return the first numbers of statements, (n, 6), NaN where there are fewer, and how many each has."""
+    words = run_starts(rows.text > _SPACE)
+    first = np.searchsorted(words, rows.start)
+    counts = np.diff(first, append=len(words))
+    fewest = _FEWEST_NUMBERS[kind]
+    expected = f"{fewest} to {_MOST_NUMBERS} numbers after {kind}"
+    if (faulty := (counts < fewest) | (counts > _MOST_NUMBERS)).any():
+        _refuse_line(path, rows, int(faulty.argmax()), expected)
+    try:
+        values = parse_numbers(rows.text, len(words), np.float64)
+    except ValueError:
+        _refuse_line(path, rows, _first_fault(rows, np.float64), expected)
+    column = np.arange(_USED_NUMBERS)
+    table = np.full((len(counts), _USED_NUMBERS), np.nan)
+    given = column < counts[:, None]
+    table[given] = values[(first[:, None] + column)[given]]
+    return table, counts
+
+
+def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
+    """Return the index of the first statement with a word that is not a number."""
+    for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
+        try:
+            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)
+        except ValueError:
+            return index
+    return 0
+
+
+def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
+    """Return the number of corners of each face, and the indices (c, 3) of each corner, -1 for none."""
+    faces = rows["f"]
+    slash = faces.text == _SLASH
+    spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
+    corner_start, index_start = run_starts(faces.text > _SPACE), run_starts(spaced.text > _SPACE)
+    counts = np.diff(np.searchsorted(corner_start, faces.start), append=len(corner_start))
+    check_polygon_sizes(path, counts)
+
+    def refuse_at(faulty: Mask, starts: Index, expected: str, actual: str = "") -> None:
+        if faulty.any():
+            face = np.searchsorted(faces.start, starts[faulty.argmax()], side="right") - 1
+            _refuse_line(path, faces, int(face), expected, actual)
+
+    try:
+        values = parse_numbers(spaced.text, len(index_start), np.int64)
+    except ValueError:
+        _refuse_line(path, faces, _first_fault(spaced, np.int64), "faces by whole numbers")
+    refuse_at(values == 0, index_start, "faces by indices from 1", "there is a 0")
+    corner = np.searchsorted(corner_start, index_start, side="right") - 1
+    slashes = np.cumsum(slash, dtype=np.int32)
+    column = slashes[index_start] - (slashes - slash)[corner_start[corner]]
+    refuse_at(column > 2, index_start, "corners of faces as position/uv/normal")
+    corners = np.zeros((len(corner_start), 3), np.int64)
+    corners[corner, column] = values
+    given, sizes = corners != 0, [len(rows[kind].line) for kind in _VERTEX_KINDS]
+    if (values < 0).any():
+        before = np.column_stack([np.searchsorted(rows[kind].line, faces.line) for kind in _VERTEX_KINDS])
+        corners = np.where(corners < 0, corners + np.repeat(before, counts, axis=0) + 1, corners)
+    faulty = (given & ((corners < 1) | (corners > sizes))).any(axis=1) | ~given[:, 0]
+    expected = "faces by indices of its {:,} vertices, {:,} uv and {:,} normals"
+    refuse_at(faulty, corner_start, expected.format(*sizes))
+    return counts, corners - 1
+
+
+def _groups(
+    path: Path, statements: Sequence[_Statement], face_line: Index
+) -> tuple[list[tuple[str, str]], Index]:
+    """Return the pairs of `usemtl` and `g` names, and the index of the pair of each face.
+
+    face_line : (n,) lines of the faces
+
+    Where no group and no material has a name, the objects (`o`) are the groups.
+    """
+    named = any(key in ("usemtl", "g") and value for _, key, value in statements)
+    material_key, group_key = "usemtl", "g" if named else "o"
+    current = {material_key: "", group_key: ""}
+    numbers, lines, states = {("", ""): 0}, [-1], [0]
+    for line, key, value in statements:
+        if key in current:
+            current[key] = value
+            lines.append(line)
+            states.append(numbers.setdefault((current[material_key], current[group_key]), len(numbers)))
+    advice = "Export it with fewer, or without groups"
+    limits.check_limit(path, len(numbers), limits.MAX_GROUPS, "groups", advice)
+    return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
+
+
+def _unread(statements: Sequence[_Statement], has_normals: bool) -> list[str]:
+    """Return notes on statements that have no effect."""
+    keys = dict.fromkeys(
+        key for _, key, _ in statements if key not in (*READ_STATEMENTS, *STATEMENTS_WITHOUT_MEANING)
+    )
+    names = [f"{key} ({LEFT_OUT[key]})" if key in LEFT_OUT else key for key in keys]
+    notes = [f"statements are left out: {listed(names)}"] if names else []
+    smoothing = {value for _, key, value in statements if key == "s"}
+    if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):
+        notes.append("smoothing groups (s) are left out: the surface is smooth everywhere")
+    return notes

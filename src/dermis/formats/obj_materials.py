@@ -1,0 +1,278 @@
+"""Materials of OBJ files, as their .mtl files state them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from dermis.base.reading import parsing, read_file
+from dermis.formats import size_limits as limits
+from dermis.formats.materials import IDENTITY, FileMaterial, Role, Texture, UvTransform, Wrap
+from dermis.formats.parts import GREY, Colour, MeshPart, parse_colour
+from dermis.formats.referenced_files import find_referenced_file
+from dermis.formats.text_files import decode_text
+
+TEXTURE_ROLES = {
+    "map_kd": "colour",
+    "map_ks": "specular",
+    "map_pr": "roughness",
+    "map_pm": "metalness",
+    "map_ke": "emission",
+    "map_d": "opacity",
+    "norm": "normal",
+    "map_bump": "bump",
+    "bump": "bump",
+}
+"""Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
+_NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
+_WITHOUT_MEANING = ("newmtl", "ka", "map_ka", "illum", "sharpness", "map_aat")
+_PART_ROLES: Mapping[str, Role] = {
+    "colour": "colour",
+    "roughness": "roughness",
+    "metalness": "metalness",
+    "emission": "emission",
+    "opacity": "opacity",
+    "normal": "normal",
+}
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_OPTION = re.compile(
+    rf"-(?:bm\s+(?P<factor>{_NUMBER})"
+    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
+    r"|clamp\s+(?P<clamp>\S+)"
+    r"|mm\s+\S+\s+\S+"
+    r"|(?:blendu|blendv|boost|cc|imfchan|texres|type)\s+\S+)\s+",
+    re.IGNORECASE,
+)
+_NUMBER_PATTERN = re.compile(_NUMBER)
+_UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
+_MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
+_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # that programs write beside a picture of the colour
+_MAX_LINE = 4096  # characters
+_LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
+_UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
+
+
+@dataclass(frozen=True)
+class MtlTexture:
+    """Picture that a material of an .mtl file references.
+
+    key : statement that references it, such as map_Kd
+    name : file name as written
+    factor : option -bm, by which the map is multiplied [-]
+    scale, offset : options -s and -o of u and v, with v up
+    wrap : continuation beyond the picture, by option -clamp
+    has_turbulence : whether the picture is distorted (-t)
+    """
+
+    key: str
+    name: str
+    factor: float = 1.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    wrap: Wrap = "repeat"
+    has_turbulence: bool = False
+
+    @property
+    def transform(self) -> UvTransform:
+        """Return the transform of uv with v down."""
+        (scale_u, scale_v), (u, v) = self.scale, self.offset
+        if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
+            return IDENTITY
+        return scale_u, 0.0, u, 0.0, scale_v, 1.0 - scale_v - v
+
+
+@dataclass
+class MtlMaterial:
+    """Material of an .mtl file.
+
+    numbers : values of the statements in `_NUMBERS`
+    textures : pictures by role, see `TEXTURE_ROLES`
+    unread : other statements
+    """
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    textures: dict[str, MtlTexture] = field(default_factory=dict)
+    unread: list[str] = field(default_factory=list)
+
+    @property
+    def colour(self) -> Colour | None:
+        """Return the diffuse colour Kd, taken as linear; None if it is not stated."""
+        return parse_colour(self.numbers["kd"]) if "kd" in self.numbers else None
+
+
+@dataclass
+class MaterialLibrary:
+    """Materials of an OBJ file by name, and the names of .mtl files that do not exist."""
+
+    materials: dict[str, MtlMaterial] = field(default_factory=dict)
+    missing: list[str] = field(default_factory=list)
+
+
+def read_library(path: Path, text: str) -> MaterialLibrary:
+    """Read the .mtl files that an OBJ file references.
+
+    path, text : of the OBJ file
+    """
+    library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
+    for listed in library_names(text)[: limits.MAX_LIBRARIES]:
+        found = find_referenced_file(path, listed)
+        names = [listed] if found else listed.split(".mtl ")[: limits.MAX_LIBRARIES]
+        for name in names:
+            file = find_referenced_file(path, name) or find_referenced_file(path, f"{name}.mtl")
+            if file is None:
+                library.missing.append(name)
+            else:
+                data = read_file(file, "material libraries", remaining)
+                remaining -= len(data)
+                with parsing(file, "material libraries"):
+                    library.materials |= _parse_mtl(decode_text(data))
+    return library
+
+
+def library_names(text: str) -> list[str]:
+    """Return the .mtl file names in the `mtllib` lines of an OBJ text, without duplicates."""
+    names = (line[1].strip() for line in _LIBRARY_LINE.finditer(text))
+    return [name for name in dict.fromkeys(names) if name]
+
+
+def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
+    materials: dict[str, MtlMaterial] = {}
+    current = MtlMaterial()
+    for line in text.splitlines():
+        statement = line.strip().replace("\t", " ")
+        if len(line) > _MAX_LINE or not statement or statement.startswith("#"):
+            continue
+        word, _, value = statement.partition(" ")
+        key = word.lower()
+        if key == "newmtl":
+            current = materials.setdefault(value.strip(), MtlMaterial())
+        elif key in TEXTURE_ROLES and value.strip():
+            current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
+        elif key in _NUMBERS and len(numbers := _numbers(value)) >= _NUMBERS[key]:
+            current.numbers[key] = numbers
+        elif key not in _WITHOUT_MEANING:
+            current.unread.append(word)
+    return materials
+
+
+def _numbers(value: str) -> list[float]:
+    words = value.split()
+    return [float(word) for word in words] if all(map(_NUMBER_PATTERN.fullmatch, words)) else []
+
+
+def _parse_texture(key: str, statement: str) -> MtlTexture:
+    """Parse a texture statement of an .mtl file; its file name extends to the end of the line.
+
+    key : statement, such as map_Kd
+    statement : text after the key, options first
+    """
+    texture, start = MtlTexture(key, ""), 0
+    while option := _OPTION.match(statement, start):
+        texture, start = _with_option(texture, option), option.end()
+    name, factor = statement[start:], texture.factor
+    match name.rsplit(maxsplit=2):
+        case [first, last, number] if last.lower() == "-bm" and _NUMBER_PATTERN.fullmatch(number):
+            factor, name = float(number), first  # some programs write the option after the name
+    return replace(texture, name=name, factor=factor)
+
+
+def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
+    if option["factor"]:
+        return replace(texture, factor=float(option["factor"]))
+    if option["clamp"]:
+        return replace(texture, wrap="clamp" if option["clamp"].lower() == "on" else "repeat")
+    if not option["transform"]:
+        return texture
+    which, numbers = option["transform"].lower(), [float(number) for number in option["numbers"].split()]
+    if which == "t":
+        return replace(texture, has_turbulence=any(numbers))
+    u, v = (*numbers, 1.0 if which == "s" else 0.0)[:2]
+    return replace(texture, scale=(u, v)) if which == "s" else replace(texture, offset=(u, v))
+
+
+def with_materials(
+    path: Path, parts: Sequence[MeshPart], library: MaterialLibrary
+) -> tuple[list[MeshPart], tuple[FileMaterial, ...], list[str]]:
+    """Return the parts of an OBJ file with their materials, and notes on pictures that are not found.
+
+    Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
+
+    path : of the OBJ file
+    parts : their first name is that of the material, if it has one
+    """
+    materials: list[FileMaterial] = []
+    notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
+    index: dict[tuple[str, int], int] = {}
+    assigned = []
+    for part in parts:
+        name = next((name for name in part.group.names if name in library.materials), None)
+        if name is None:
+            assigned.append(part)
+            continue
+        own = library.materials[name]
+        has_tiles = any(_UDIM.search(texture.name) for texture in own.textures.values())
+        for udim, piece in _tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
+            if (name, udim) not in index:
+                index[name, udim] = len(materials)
+                materials.append(_file_material(path, name, own, udim))
+            group = replace(piece.group, material=index[name, udim])
+            assigned.append(replace(piece, group=group))
+    return assigned, tuple(materials), notes
+
+
+def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
+    """Return the triangles of a part by the UDIM tile that they are in."""
+    if part.uv is None or not len(part.triangles):
+        return [(_FIRST_UDIM, part)]
+    column, row = np.floor(part.uv[part.triangles].mean(axis=1)).astype(int).T
+    number = np.clip(_FIRST_UDIM + column + _UDIM_COLUMNS * row, _FIRST_UDIM, _MAX_UDIM)
+    pieces = []
+    for udim in np.unique(number).tolist():
+        own = number == udim
+        position = np.cumsum(own) - 1
+        quads = position[part.quads[own[part.quads].all(axis=1)]] if len(part.quads) else part.quads
+        pieces.append((udim, replace(part, triangles=part.triangles[own], quads=quads)))
+    return pieces
+
+
+def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMaterial:
+    """Return a material of an .mtl file."""
+    textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(own.unread)
+    row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
+    for role, texture in own.textures.items():
+        written = _UDIM.sub(str(udim), texture.name)
+        file = find_referenced_file(path, written)
+        if file is None:
+            missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
+        elif role in _PART_ROLES:
+            a, b, c, d, e, f = texture.transform
+            if written != texture.name:
+                c, f = c - column, f + row
+            textures[_PART_ROLES[role]] = Texture(file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap))
+        if texture.has_turbulence:
+            unused.append(f"turbulence (-t) of {written}")
+    numbers = {key: values[0] for key, values in own.numbers.items()}
+    alpha = numbers.get("d", 1.0 - numbers.get("tr", 0.0))
+    roughness = numbers.get("pr")
+    if roughness is None and "ns" in numbers:
+        roughness = (2.0 / (max(numbers["ns"], 0.0) + 2.0)) ** 0.25
+    colour = None if own.colour == GREY else own.colour
+    if "colour" in textures and colour is not None:
+        unused += [] if len(set(colour)) == 1 and round(colour[0], 3) in _USUAL_KD else ["Kd beside map_Kd"]
+        colour = None
+    return FileMaterial(
+        name,
+        textures,
+        colour,
+        alpha=alpha,
+        alpha_mode="blend" if alpha < 1.0 or "opacity" in textures else "opaque",
+        roughness=roughness,
+        metalness=numbers.get("pm", 0.0),
+        emission=parse_colour(own.numbers["ke"]) if "ke" in own.numbers else (0.0, 0.0, 0.0),
+        missing=missing,
+        unused=tuple(dict.fromkeys(unused)),
+    )

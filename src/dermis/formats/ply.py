@@ -1,0 +1,457 @@
+"""PLY files: the columns of their elements as arrays, and the mesh that these describe."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Bytes, Doubles, Index, Numbers
+from dermis.base.errors import refuse
+from dermis.base.reading import read_file
+from dermis.formats import size_limits as limits
+from dermis.formats.materials import FileMaterial, Texture
+from dermis.formats.parts import MaterialGroup, MeshFile, to_floats
+from dermis.formats.polygons import (
+    Polygons,
+    check_polygon_sizes,
+    missing_uv,
+    refuse_without_faces,
+    without_small,
+)
+from dermis.formats.referenced_files import find_referenced_file
+from dermis.formats.text_files import decode_text, listed, parse_numbers, run_starts
+from dermis.formats.vertex_colours import linear_colours
+from dermis.mesh.geometry import expand_runs, weld
+
+_MAX_HEADER_BYTES = 1 << 16  # bytes
+_MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
+_MAX_PROPERTIES, _MAX_LISTS = 256, 8
+_FORMATS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+_SPACE = 32
+_TYPES = {
+    **{"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1"},
+    **{"short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2"},
+    **{"int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8"},
+    **{"float16": "f2", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
+}
+UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
+COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+_FACE_NAMES = ("vertex_indices", "vertex_index")
+PROPERTIES_WITHOUT_MEANING = {
+    *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
+    *("time", "timestamp", "id", "index", "original_index", "scan_index"),
+    *("label", "class", "classification", "segment"),
+}
+"""Properties that scanners and point tools write and that say nothing about the look of a surface."""
+_SCALAR_PREFIX = "scalar_"  # of such properties in CloudCompare
+_ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
+_HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
+_STRUCT_CODES = dict(
+    zip(("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"), "bBhHiIqQefd", strict=True)
+)
+
+
+class _Property(NamedTuple):
+    """Property of an element; a list if the type of its length is not ""."""
+
+    name: str
+    dtype: str
+    length_dtype: str = ""
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property]
+
+
+class _List(NamedTuple):
+    """Lists of all rows of an element: their lengths (n,), and the items of all of them."""
+
+    lengths: Index
+    items: Numbers
+
+
+class _Header(NamedTuple):
+    """Header of a PLY file.
+
+    order : byte order, "=" for text
+    size : of the header in bytes
+    pictures : file names of pictures, in comments
+    """
+
+    order: str
+    size: int
+    elements: list[_Element]
+    pictures: list[str]
+
+
+class _Columns(dict[str, "Numbers | _List"]):
+    """Columns of an element by name; notes which of them are used."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.used: set[str] = set()
+
+    def take(self, names: Sequence[str]) -> Numbers | None:
+        """Return properties that are no lists side by side, (n, k); None unless all of them exist."""
+        columns = [self.get(name) for name in names]
+        if not columns or any(not isinstance(column, np.ndarray) for column in columns):
+            return None
+        self.used.update(names)
+        return np.column_stack(columns)
+
+    def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
+        """Return the first of several sets of properties that exists, (n, k)."""
+        return next((one for names in choices if (one := self.take(names)) is not None), None)
+
+    def take_list(self, names: Sequence[str]) -> _List | None:
+        """Return the first list property of some names that exists."""
+        for name in names:
+            if isinstance(column := self.get(name), _List):
+                self.used.add(name)
+                return column
+        return None
+
+
+def read_ply(path: Path) -> MeshFile:
+    """Read a .ply file.
+
+    Uv are properties of vertices (`UV_NAMES`) or the list `texcoord` of faces; colours of vertices are sRGB.
+    """
+    data = read_file(path, "a PLY file", limits.MAX_FILE_BYTES)
+    header = _read_header(path, data)
+    tables = _read_elements(path, header, np.frombuffer(data, np.uint8, offset=header.size))
+    vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
+    positions = vertices.take("xyz")
+    if positions is None:
+        refuse(path, "vertices with x, y and z", f"they have {listed(vertices)}", limits.DAMAGED_ADVICE)
+    counts, index = _polygons(path, faces, strips, len(positions))
+    uv, uv_index = _uv(path, vertices, faces, counts, index)
+    normals = vertices.take(("nx", "ny", "nz"))
+    colours, notes = _colours(vertices)
+    corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
+    counts, corners, _, faults = without_small(counts, corners)
+    if not len(counts):
+        refuse_without_faces(path, len(positions))
+    directions = np.empty((0, 3)) if normals is None else to_floats(normals)
+    polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
+    picture, unused = _picture(header.pictures, faces.take(("texnumber",)))
+    notes += [*faults, *missing_uv(polygons), *unused, *_unread(tables)]
+    materials: tuple[FileMaterial, ...] = ()
+    if picture is not None and (file := find_referenced_file(path, picture)) is not None:
+        materials = (FileMaterial(textures={"colour": Texture(file)}),)
+    elif picture is not None:
+        notes.append(f"its picture {picture} is not in its folder. Put it there, or set it with --colour")
+    group = MaterialGroup((path.stem,), material=0 if materials else -1)
+    parts = polygons.parts([group], np.zeros_like(counts), "by kind")
+    return MeshFile(parts, materials=materials, notes=tuple(notes))
+
+
+def _read_header(path: Path, data: bytes) -> _Header:
+    """Return the header of a PLY file after checking its counts of elements and properties.
+
+    data : bytes of the whole file
+
+    Raises DermisError for an invalid header.
+    """
+    end = _HEADER_END.search(data, 0, _MAX_HEADER_BYTES)
+    if not data.startswith(b"ply") or end is None:
+        refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
+    size = end.end() - (end[1] == b"\r\n" and b"\n" not in data[: end.start()])
+    lines = decode_text(data[: end.start()]).split("\n")
+    words = [line.split() for line in lines]
+    properties = sum(line[:1] == ["property"] for line in words)
+    limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
+    header = _Header("", size, [], [])
+    for line, text in zip(words, lines, strict=True):
+        match line:
+            case ["format", name, *_] if name in _FORMATS:
+                header = header._replace(order=_FORMATS[name])
+            case ["element", *declared]:
+                header.elements.append(_declared_element(path, declared, len(data) - size))
+            case ["property", *declared] if header.elements:
+                header.elements[-1].properties.append(_declared_property(path, declared))
+            case ["comment", key, _, *_] if key.lower() == "texturefile":
+                header.pictures.append(text.split(None, 2)[2].strip())
+    if not header.order:
+        refuse(path, f"a PLY file of format {', '.join(_FORMATS)}", "it has another", limits.DAMAGED_ADVICE)
+    return header
+
+
+def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
+    """Return an element without its properties; an implausible count for a mesh or the file size is refused.
+
+    words : after "element"
+    """
+    name, count = words if len(words) == 2 else ("", "")
+    if not (count.isdecimal() and len(count) < 12):
+        actual = f"got {' '.join(words)[:80]!r}"
+        refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
+    limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
+    limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
+    return _Element(name, int(count), [])
+
+
+def _declared_property(path: Path, words: Sequence[str]) -> _Property:
+    """Return a property.
+
+    words : after "property"
+    """
+    is_list = words[:1] == ["list"]
+    kinds = words[is_list:-1]
+    if len(kinds) != 1 + is_list or not all(kind in _TYPES for kind in kinds):
+        actual = f"got {' '.join(words)[:80]!r}"
+        refuse(path, "properties with a name and known types", actual, limits.DAMAGED_ADVICE)
+    return _Property(words[-1], *(_TYPES[kind] for kind in reversed(kinds)))
+
+
+def _read_elements(path: Path, header: _Header, data: Bytes) -> dict[str, _Columns]:
+    """Return the columns of all elements by name.
+
+    data : bytes after the header
+    """
+    is_text = header.order == _FORMATS["ascii"]
+    if is_text:
+        data = parse_numbers(data, len(run_starts(data > _SPACE)), np.float64).view(np.uint8)
+    tables, position = dict[str, _Columns](), 0
+    for element in header.elements:
+        if element.count:
+            reader = _ElementReader(path, element, header.order, is_text, data)
+            tables[element.name], position = reader.read(position)
+    if position < len(data) and (is_text or (data[position:] > _SPACE).any()):
+        left, unit = (
+            (len(data) - position, "bytes") if not is_text else ((len(data) - position) // 8, "numbers")
+        )
+        actual = f"{left:,} {unit} follow its last element"
+        refuse(path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
+    return tables
+
+
+@dataclass(frozen=True)
+class _ElementReader:
+    """Reader of the rows of an element.
+
+    order : byte order
+    is_text : whether the data are numbers of a text as float64, one for each value
+    """
+
+    path: Path
+    element: _Element
+    order: str
+    is_text: bool
+    data: Bytes
+
+    def read(self, position: int) -> tuple[_Columns, int]:
+        """Return the columns of the element, and the position after its last row.
+
+        position : of the first row [bytes]
+        """
+        columns, properties = _Columns(), self.element.properties
+        lists = [one for one in properties if one.length_dtype]
+        limits.check_limit(self.path, len(lists), _MAX_LISTS, "lists of an element", limits.DAMAGED_ADVICE)
+        lengths = dict(zip(lists, self._lengths(position), strict=True))
+        size = np.full(self.element.count, self._fixed_size(properties), np.int64)
+        for one, length in lengths.items():
+            size += length * self._dtype(one.dtype).itemsize
+        start = position + np.cumsum(size) - size
+        end = int(start[-1] + size[-1])
+        self._check_end(end)
+        for one in properties:
+            count = lengths.get(one, np.ones_like(start))
+            start = start + (self._dtype(one.length_dtype).itemsize if one.length_dtype else 0)
+            values = self._gather(start, count, one.dtype)
+            columns[one.name] = _List(count, values) if one.length_dtype else values
+            start = start + count * self._dtype(one.dtype).itemsize
+        return columns, end
+
+    def _dtype(self, name: str) -> np.dtype[Any]:
+        return np.dtype(np.float64 if self.is_text else self.order + name)
+
+    def _fixed_size(self, properties: Sequence[_Property]) -> int:
+        """Return the size of properties without the items of lists [bytes]."""
+        return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
+
+    def _check_end(self, end: int) -> None:
+        if end > len(self.data):
+            actual = f"it ends within its elements named {self.element.name!r}"
+            refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
+
+    def _gather(self, start: Index, count: Index, dtype: str) -> Numbers:
+        """Return `count` values of one type from each of the positions `start`, concatenated."""
+        stored = self._dtype(dtype)
+        row, item = expand_runs(np.zeros_like(count), count)
+        first = start[row] + stored.itemsize * item
+        values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
+        return values.astype(dtype)
+
+    def _lengths(self, position: int) -> list[Index]:
+        """Return the lengths of each list property, (n,) each."""
+        steps, skipped = list[_ListStep](), list[_Property]()
+        for one in self.element.properties:
+            skipped.append(one)
+            if one.length_dtype:
+                size = self._fixed_size(skipped[:-1])
+                steps.append(_ListStep(size, self._dtype(one.length_dtype), self._dtype(one.dtype).itemsize))
+                skipped = []
+        if not steps:
+            return []
+        rest, count = self._fixed_size(skipped), self.element.count
+        lengths, end = self._walk(position, steps, rest, 1)
+        if not self._is_uniform(position, end - position, steps, lengths[0]):
+            lengths, _ = self._walk(position, steps, rest, count)
+        return list(np.broadcast_to(lengths, (count, len(steps))).T)
+
+    def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
+        """Return whether the lists of all rows have the lengths of the first row.
+
+        size : of the first row [bytes]
+        """
+        start = position + size * np.arange(self.element.count)
+        if start[-1] + size > len(self.data):
+            return False
+        for step, length in zip(steps, lengths.tolist(), strict=True):
+            start = start + step.skip
+            stored = self.data[start[:, None] + np.arange(step.length.itemsize)].view(step.length)
+            if (stored != length).any():
+                return False
+            start = start + step.length.itemsize + length * step.item_size
+        return True
+
+    def _walk(self, position: int, steps: Sequence[_ListStep], rest: int, rows: int) -> tuple[Index, int]:
+        """Return the lengths of the lists of some rows, (rows, lists), and the position after these rows.
+
+        rest : size of the properties after the last list [bytes]
+        """
+        lengths, data, end = [], memoryview(self.data), len(self.data)
+        readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in steps]
+        walked = [
+            (step.skip, reader.unpack_from, reader.size, step.item_size)
+            for step, reader in zip(steps, readers, strict=True)
+        ]
+        try:
+            for _ in range(rows):
+                for skip, unpack, length_size, item_size in walked:
+                    position += skip
+                    (length,) = unpack(data, position)
+                    lengths.append(length)
+                    position += length_size + int(length) * item_size
+                position += rest
+        except struct.error:
+            position = end + 1
+        self._check_end(end + 1 if lengths and min(lengths) < 0 else position)
+        return np.array(lengths, np.int64).reshape(rows, len(steps)), position
+
+
+class _ListStep(NamedTuple):
+    """What precedes a list since the one before, the type of its length, and the size of an item [bytes]."""
+
+    skip: int
+    length: np.dtype[Any]
+    item_size: int
+
+
+def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tuple[Index, Index]:
+    """Return the numbers of corners of faces and of the triangles of strips, and the vertex of each corner.
+
+    points : number of vertices
+    """
+    own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
+    if faces and own is None:
+        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {listed(faces)}", limits.DAMAGED_ADVICE)
+    if own is not None:
+        counts, index = own.lengths, own.items.astype(np.int64)
+    if (strip := strips.take_list(_FACE_NAMES)) is not None:
+        triangles = _strip_triangles(strip)
+        counts = np.concatenate([counts, np.full(len(triangles), 3)])
+        index = np.concatenate([index, triangles.ravel()])
+    check_polygon_sizes(path, counts)
+    if len(index) and (index.min() < 0 or index.max() >= points):
+        actual = f"they run from {index.min()} to {index.max()}"
+        refuse(path, f"triangle indices from 0 to {points - 1}", actual, limits.DAMAGED_ADVICE)
+    return counts, index
+
+
+def _strip_triangles(strips: _List) -> Index:
+    """Return the triangles (t, 3) of strips, in which -1 starts another strip; every second one is turned."""
+    index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
+    place = np.arange(len(index))
+    step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
+    triangles = np.column_stack((index[:-2], index[1:-1], index[2:]))
+    odd = step[:-2] % 2 == 1
+    triangles[odd] = triangles[odd][:, [1, 0, 2]]
+    a, b, c = triangles.T
+    return triangles[(triangles.min(axis=1) >= 0) & (a != b) & (b != c) & (c != a)]
+
+
+def _uv(
+    path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
+) -> tuple[Doubles, Index]:
+    """Return uv (t, 2), and those of each corner, -1 for none.
+
+    counts, index : numbers of corners of polygons, and the vertex of each corner
+    """
+    wedges = faces.take_list(("texcoord",))
+    if wedges is None:
+        uv = vertices.take_first(UV_NAMES)
+        none = np.empty((0, 2)), np.full_like(index, -1)
+        return none if uv is None else (to_floats(uv), index)
+    given, expected = wedges.lengths > 0, counts[: len(wedges.lengths)]
+    if (wedges.lengths[given] != 2 * expected[given]).any():
+        actual = "some have other numbers of them"
+        refuse(path, "texcoord with u and v for each corner of a face", actual, limits.DAMAGED_ADVICE)
+    uv, uv_index = to_floats(wedges.items.reshape(-1, 2)), np.full_like(index, -1)
+    same = weld(uv)
+    uv_index[: expected.sum()][np.repeat(given, expected)] = same
+    unique = np.empty((same.max(initial=-1) + 1, 2))
+    unique[same] = uv
+    return unique, uv_index
+
+
+def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
+    """Return the linear colours (n, 3) of vertices or None, and notes."""
+    values, alpha = vertices.take_first(COLOUR_NAMES), vertices.take_first(_ALPHA_NAMES)
+    notes = []
+    if alpha is not None and len(np.unique(alpha)) > 1:
+        notes.append("the transparency of vertices (alpha) is left out")
+    if values is None:
+        return None, notes
+    colours, faults = linear_colours(values)
+    return colours, notes + faults
+
+
+def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None, list[str]]:
+    """Return the picture that most faces have, and a note on the others.
+
+    names : of the pictures
+    numbers : (n, 1) index of the picture of each face, or None
+    """
+    if not names:
+        return None, []
+    used, counts = np.unique(
+        0 if numbers is None else np.clip(numbers, 0, len(names) - 1), return_counts=True
+    )
+    chosen = names[int(used[counts.argmax()])]
+    others = [name for name in dict.fromkeys(names) if name != chosen]
+    return chosen, [f"of several pictures {chosen} is used; left out: {listed(others)}"] if others else []
+
+
+def _unread(tables: Mapping[str, _Columns]) -> list[str]:
+    """Return a note on elements and properties that have no effect."""
+    ignored = [name for name, columns in tables.items() if not columns.used]
+    ignored += [
+        f"{element} {name}"
+        for element, columns in tables.items()
+        for name in columns
+        if columns.used
+        and name not in columns.used | PROPERTIES_WITHOUT_MEANING
+        and not name.startswith(_SCALAR_PREFIX)
+    ]
+    return [f"these are left out: {listed(ignored)}"] if ignored else []

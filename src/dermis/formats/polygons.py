@@ -1,0 +1,138 @@
+"""Mesh parts from polygons whose corners have separate indices of position, uv and normal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NoReturn
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Index, Mask
+from dermis.base.errors import refuse
+from dermis.formats import size_limits as limits
+from dermis.formats.parts import MaterialGroup, MeshPart
+from dermis.mesh.geometry import expand_runs
+
+TriangleOrder = Literal["by polygon", "by kind"]
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Polygons of a file.
+
+    counts : (n,) number of corners of each polygon, at least 3
+    corners : (c, 3) indices of position, uv and normal of each corner, -1 for none
+    positions : (p, 3)
+    uv : (t, 2)
+    normals : (m, 3)
+    colours : (p, 3) linear colours of the positions, or None
+    """
+
+    counts: Index
+    corners: Index
+    positions: Doubles
+    uv: Doubles
+    normals: Doubles
+    colours: Doubles | None = None
+
+    def has_uv(self) -> Mask:
+        """Return whether all corners of each polygon have uv, (n,)."""
+        return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
+
+    def parts(self, groups: Sequence[MaterialGroup], group: Index, order: TriangleOrder) -> list[MeshPart]:
+        """Return a mesh part for each group with polygons, in the order of its first polygon.
+
+        groups, group : groups, and (n,) index of that of each polygon
+        order : of the triangles, see `triangulate`
+
+        Polygons without uv become parts of their own, whose uv is None.
+        """
+        keys, first, key = np.unique(2 * group + ~self.has_uv(), return_index=True, return_inverse=True)
+        by_first = np.argsort(first)
+        rank = np.argsort(by_first)[key]
+        polygons = np.argsort(rank, kind="stable")
+        counts = self.counts[polygons]
+        corners = self.corners[expand_runs((np.cumsum(self.counts) - self.counts)[polygons], counts)[1]]
+        ends = np.cumsum(np.bincount(rank))[:-1]
+        pieces = np.split(counts, ends), np.split(corners, np.cumsum(counts)[ends - 1])
+        chosen = [groups[one] for one in keys[by_first] // 2]
+        return [self._part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
+
+    def _part(self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder) -> MeshPart:
+        """Return the part of some polygons: one vertex for each combination of position, normal and uv."""
+        vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
+        if not uv.all():
+            uv = np.zeros_like(uv)
+        sizes = len(self.normals) + 1, len(self.uv) + 1
+        keys, index = np.unique((vertex * sizes[0] + normal) * sizes[1] + uv, return_inverse=True)
+        keys, uv = np.divmod(keys, sizes[1])
+        vertex, normal = np.divmod(keys, sizes[0])
+        triangles, quads = triangulate(counts, order)
+        return MeshPart(
+            group,
+            self.positions[vertex] + 0.0,  # converts -0 to 0
+            self.uv[uv - 1] if uv.all() else None,
+            np.vstack((np.full(3, np.nan), self.normals))[normal] + 0.0 if normal.any() else None,
+            index[triangles],
+            quads=quads,
+            colours=None if self.colours is None else self.colours[vertex],
+        )
+
+
+def missing_uv(polygons: Polygons) -> list[str]:
+    """Return a note if some of the polygons have uv and others have none."""
+    has_uv = polygons.has_uv()
+    missing = np.count_nonzero(~has_uv)
+    return [f"{missing:,} of {len(has_uv):,} faces have no uv"] if 0 < missing < len(has_uv) else []
+
+
+def check_polygon_sizes(path: Path, counts: Index) -> None:
+    """Refuse polygons with too many corners (n,), or with too many triangles in total."""
+    corners, triangles = int(counts.max(initial=0)), int(np.maximum(counts - 2, 0).sum())
+    advice = "Divide it into smaller ones"
+    limits.check_limit(path, corners, limits.MAX_CORNERS, "corners of a face", advice)
+    limits.check_limit(path, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
+
+
+def without_small(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
+    """Leave out polygons of fewer than three corners.
+
+    Returns the numbers of corners, the corners, which polygons are left, and a note if some are left out.
+    """
+    kept = counts >= 3
+    lost = np.count_nonzero(~kept)
+    notes = [f"{lost:,} faces of fewer than three corners are left out"] if lost else []
+    return counts[kept], corners[np.repeat(kept, counts)], kept, notes
+
+
+def refuse_without_faces(path: Path, points: int) -> NoReturn:
+    """Refuse a file without faces.
+
+    points : number of its points
+    """
+    actual = "it is a cloud of points without faces" if points else "it has none"
+    advice = "Make a mesh of the points first (in MeshLab: Filters > Remeshing)"
+    refuse(path, "a mesh of triangles", actual, advice if points else "Export the head as a polygon mesh")
+
+
+def triangulate(counts: Index, order: TriangleOrder) -> tuple[Index, Index]:
+    """Divide polygons into fans; return the corners (f, 3) of triangles, and the pairs (q, 2) that are quads.
+
+    counts : (n,) number of corners of each polygon, which are numbered consecutively
+    order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, their second
+        halves, and all other polygons; files of quads alone are always ordered by kind
+    """
+    sizes = counts - 2
+    polygon, step = expand_runs(np.zeros_like(sizes), sizes)
+    corner = (np.cumsum(counts) - counts)[polygon]
+    triangles = np.column_stack((corner, corner + step + 1, corner + step + 2))
+    is_quad = counts[polygon] == 4
+    second = is_quad & (step == 1)
+    triangles[second] = np.roll(triangles[second], -1, axis=1)
+    if order == "by kind" or is_quad.all():
+        kind = np.where(is_quad, 1 + step, np.where(counts[polygon] == 3, 0, 3))
+        sequence = np.argsort(kind, kind="stable")
+        triangles, is_quad, second = triangles[sequence], is_quad[sequence], second[sequence]
+    return triangles, np.column_stack((np.flatnonzero(is_quad & ~second), np.flatnonzero(second)))

@@ -1,0 +1,76 @@
+"""Text of mesh files: its encoding, and the numbers in it as arrays."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Collection
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Bytes, Index, Mask
+from dermis.base.errors import format_value
+
+_MAX_LISTED, _MAX_NAME = 8, 40
+_PLAIN_NAME = re.compile(rf"[\w.()/ -]{{1,{_MAX_NAME}}}")
+_UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+T = TypeVar("T", np.float64, np.int64)
+
+
+def decode_text(data: bytes) -> str:
+    """Return a text with line feeds as its only line ends.
+
+    data : UTF-8, or UTF-16 after its byte order mark; lines that are not UTF-8 are Latin-1
+
+    Raises ValueError for damaged UTF-16.
+    """
+    if data.startswith(_UTF16_MARKS):
+        text = data.decode("utf-16")
+    else:
+        data = data.removeprefix(codecs.BOM_UTF8)
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = "\n".join(map(_decode_line, data.replace(b"\r", b"\n").split(b"\n")))
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def _decode_line(line: bytes) -> str:
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
+
+
+def listed(names: Collection[str]) -> str:
+    """Return names of a file for a message, without those beyond the first few."""
+    shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in names]
+    more = len(shown) - _MAX_LISTED
+    return ", ".join(shown[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def run_starts(inside: Mask) -> Index:
+    """Return the positions of the first elements of runs of True in an array (n,)."""
+    first = inside.copy()
+    first[1:] &= ~inside[:-1]
+    return np.flatnonzero(first)
+
+
+def parse_numbers(text: Bytes, count: int, dtype: type[T]) -> NDArray[T]:
+    """Return the numbers in a text, separated by blanks and line feeds.
+
+    text : ASCII codes
+    count : of the words in the text
+
+    Raises ValueError if a word is not a number.
+    """
+    # NumPy parses blanks alone as a number, and some versions only warn of a word that is none
+    try:
+        values = np.fromstring(text.tobytes(), dtype, sep=" ") if count else np.empty(0, dtype)
+    except (ValueError, DeprecationWarning):
+        values = np.empty(0, dtype)
+    if len(values) != count:
+        raise ValueError("a word is not a number")
+    return values
