@@ -36,11 +36,11 @@ class Loaded(NamedTuple):
     error: str
 
 
-def loaded(path: Path) -> Loaded:
+def loaded(path: Path, unit_mm: float | None = None) -> Loaded:
     with warnings.catch_warnings(record=True) as notes:
         warnings.simplefilter("always")
         try:
-            head = load_head(path, subdivide=0, unit_mm=1000)
+            head = load_head(path, subdivide=0, unit_mm=unit_mm)
         except DermisError as error:
             return Loaded("", "", str(error))
     return Loaded(digest_of(head), "\n".join(str(note.message) for note in notes), "")
@@ -258,10 +258,10 @@ def test_pictures_of_skin_and_cloth_are_not_exchanged(tmp_path: Path) -> None:
         assert np.mean(np.array(near) < 12) > 0.6
 
 
-def load_quietly(path: Path) -> Head:
+def load_quietly(path: Path, unit_mm: float = 1000.0) -> Head:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return load_head(path, subdivide=0, unit_mm=1000)
+        return load_head(path, subdivide=0, unit_mm=unit_mm)
 
 
 def test_skin_without_uv_gets_a_layout_that_takes_its_vertex_colours(tmp_path: Path) -> None:

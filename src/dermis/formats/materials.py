@@ -55,9 +55,11 @@ class FileMaterial:
     textures : pictures by role; factors multiply them
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
-    metalness, emission, normal_scale : as in glTF
+    stated_metalness : factor of the metalness [-]; None where the file leaves it to the default of glTF, 1
+    emission, normal_scale : as in glTF
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
+    skin_only : properties that only the maps of skin have
     missing : sentences on pictures that are not found, by role
     unused : properties that have no effect here, for the note
     """
@@ -69,13 +71,19 @@ class FileMaterial:
     alpha_mode: AlphaMode = "opaque"
     alpha_cutoff: float = 0.5
     roughness: float | None = None
-    metalness: float = 0.0
+    stated_metalness: float | None = 0.0
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal_scale: float = 1.0
     scatters: bool = False
     maps: Mapping[str, object] | None = None
+    skin_only: tuple[str, ...] = ()
     missing: Mapping[str, str] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
+
+    @property
+    def metalness(self) -> float:
+        """Return the factor of the metalness [-]."""
+        return 1.0 if self.stated_metalness is None else self.stated_metalness
 
     @property
     def cutoff(self) -> float:

@@ -378,9 +378,10 @@ class _Surface:
         """Return the direction from the centroid of its piece to that of each triangle, as columns (3, f)."""
         centre = self.corners.mean(axis=0)
         total = np.maximum(np.bincount(self.piece, self.size), np.finfo(np.float64).tiny)
-        return np.stack(
-            [one - (np.bincount(self.piece, one * self.size) / total)[self.piece] for one in centre]
-        )
+        for axis in centre:
+            axis -= (np.bincount(self.piece, axis * self.size) / total)[self.piece]
+        centre[np.abs(centre) < 1e-6 * np.sqrt(self.size)] = 0  # rounding errors of single triangles
+        return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
         """Return for each piece the mean cosine between its normals and a direction (3, f), 0 without one."""
@@ -391,40 +392,42 @@ class _Surface:
     def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
         """Return the balance of front and back of each piece as seen from outside, and whether backs prevail.
 
-        Backs prevail if most of what is seen of the mesh is the back of its triangles. The balance is 1 if only the front is seen, -1 if only the back is, and 0 if hardly anything is.
+        The balance is 1 if only the front is seen, -1 if only the back is, and 0 if hardly anything is. Backs
+        prevail if they are two thirds of what is seen of all pieces.
 
         doubtful : pieces that get additional samples, so that small ones have enough
         """
-        count, random = len(doubtful), np.random.default_rng(0)
-        own = np.bincount(self.piece, self.size, count)
+        own = np.bincount(self.piece, self.size)
         more = _DOUBTFUL_SAMPLES * doubtful / (own * doubtful.sum())
-        weight = self.size * ((1 - _DOUBTFUL_SAMPLES) / own.sum() + more[self.piece])
-        total = np.cumsum(weight)
-        triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
-        shares = np.sort(random.random((2, _VIEW_SAMPLES)), axis=0)
-        shares = np.diff(shares, axis=0, prepend=0, append=1)
-        sample = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
-        sample -= self.corners.mean(axis=(0, 2))[:, None]
-        normal = self.area[:, triangle] / self.size[triangle]
-        radius, seen = np.sqrt(dot_columns(sample, sample).max()), np.zeros((2, count), np.int64)
+        triangle, sample = self._draw_samples(
+            self.size * ((1 - _DOUBTFUL_SAMPLES) / own.sum() + more[self.piece])
+        )
+        normal, piece = self.area[:, triangle] / self.size[triangle], self.piece[triangle]
+        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(own)), np.int64)
         for view in fibonacci_sphere(_VIEWS):
             across = np.linalg.svd(view[None])[2][1:]
             cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
-            nearest = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1)
-            order = np.argsort(view @ sample)
-            nearest[tuple(cell[:, order])] = (
-                order  # the last of several, which is nearest to the eye, remains
-            )
+            nearest, order = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1), np.argsort(view @ sample)
+            nearest[tuple(cell[:, order])] = order  # of several in a cell, the last one remains
             visible = nearest[nearest >= 0]
-            cosine, index = view @ normal[:, visible], self.piece[triangle[visible]]
-            for side, facing in enumerate((cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE)):
-                seen[side] += np.bincount(index[facing], minlength=count)
-        front, back = seen
+            cosine = view @ normal[:, visible]
+            for side, facing in zip(seen, (cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE), strict=True):
+                side += np.bincount(piece[visible[facing]], minlength=len(own))
         cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # covered by a convex piece alone, on average
-        alone = _VIEWS * np.minimum(cells, np.bincount(self.piece[triangle], minlength=count) / 2)
-        visible = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)
-        balance = np.where(visible, (front - back) / np.maximum(front + back, 1), 0)
+        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(own)) / 2)
+        front, back = seen
+        is_seen = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)
+        balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
+
+    def _draw_samples(self, weight: Doubles) -> tuple[Index, Doubles]:
+        """Return triangles drawn by weight (f,), and a point on each, (3, n), from the centre of all [mm]."""
+        total = np.cumsum(weight)
+        triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
+        shares = np.sort(np.random.default_rng(0).random((2, _VIEW_SAMPLES)), axis=0)
+        shares = np.diff(shares, axis=0, prepend=0, append=1)
+        points = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
+        return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
 def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:

@@ -242,13 +242,16 @@ def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
 def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMaterial:
     """Return a material of an .mtl file."""
     textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(own.unread)
+    skin_only = list[str]()
     row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
     for role, texture in own.textures.items():
         written = _UDIM.sub(str(udim), texture.name)
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
-        elif role in _PART_ROLES:
+        elif role not in _PART_ROLES:
+            skin_only.append(f"picture of {texture.key}")
+        else:
             a, b, c, d, e, f = texture.transform
             if written != texture.name:
                 c, f = c - column, f + row
@@ -271,8 +274,9 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
         alpha=alpha,
         alpha_mode="blend" if alpha < 1.0 or "opacity" in textures else "opaque",
         roughness=roughness,
-        metalness=numbers.get("pm", 0.0),
-        emission=parse_colour(own.numbers["ke"]) if "ke" in own.numbers else (0.0, 0.0, 0.0),
+        stated_metalness=numbers.get("pm", 1.0 if "metalness" in textures else 0.0),
+        emission=parse_colour(own.numbers.get("ke", [float("emission" in textures)] * 3)),
+        skin_only=tuple(skin_only),
         missing=missing,
         unused=tuple(dict.fromkeys(unused)),
     )

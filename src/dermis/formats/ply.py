@@ -35,10 +35,10 @@ _MAX_PROPERTIES, _MAX_LISTS = 256, 8
 _FORMATS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _SPACE = 32
 _TYPES = {
-    **{"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1"},
-    **{"short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2"},
-    **{"int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8"},
-    **{"float16": "f2", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8",
+    "float16": "f2", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))

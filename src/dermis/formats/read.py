@@ -19,7 +19,7 @@ from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
 from dermis.formats.parts import MeshFile, MeshPart
 from dermis.formats.ply import read_ply
-from dermis.mesh.geometry import expand_runs
+from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
@@ -153,7 +153,7 @@ def read_mesh_file(source: Path) -> MeshFile:
     # readers may raise any exception for damaged files
     with parsing(source, f"a valid {source.suffix} mesh", Exception):
         mesh_file = reader(source)
-    parts = [part for part in mesh_file.parts if len(part.triangles)]
+        parts = [_without_unused_vertices(part) for part in mesh_file.parts if len(part.triangles)]
     if not parts:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
     skins = [part for part in mesh_file.parts if part.group.name_contains("skin")]
@@ -161,4 +161,20 @@ def read_mesh_file(source: Path) -> MeshFile:
         actual = f"skin group {skins[0].group.names[0]!r} has no triangles"
         refuse(source, "a group of triangles that is skin", actual, "Assign its faces to it, or rename it")
     check_counts(parts, source)
-    return replace(mesh_file, parts=parts)
+    lengths = [np.linalg.norm(part.normals, axis=1) for part in parts if part.normals is not None]
+    lost = sum(int(np.count_nonzero(~((length > 0) & np.isfinite(length)))) for length in lengths)
+    notes = (f"computed {lost:,} normals that are NaN or have no length",) if lost else ()
+    return replace(mesh_file, parts=parts, notes=(*mesh_file.notes, *notes))
+
+
+def _without_unused_vertices(part: MeshPart) -> MeshPart:
+    """Return a mesh part without the vertices that no triangle uses, whose numbers may be invalid."""
+    count, uv, normals = len(part.positions), part.uv, part.normals
+    damaged = any(array is not None and len(array) != count for array in (uv, normals))
+    if damaged or part.triangles.min() < 0 or part.triangles.max() >= count:
+        return part  # which is refused
+    used, triangles = compact_vertices(part.triangles)
+    if len(used) == count:
+        return part
+    uv, normals = (None if array is None else array[used] for array in (uv, normals))
+    return replace(select_vertices(part, used), uv=uv, normals=normals, triangles=triangles)

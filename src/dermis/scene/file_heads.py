@@ -131,7 +131,7 @@ def _with_materials(
     loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
     roles = [one.name for one in fields(Maps)]
     maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
-    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced)
+    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced, pack_skin)
     return mesh, maps, [*notes, *faults, unused]
 
 

@@ -191,12 +191,17 @@ def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bo
 
 
 def unused_properties(
-    mesh: Mesh, materials: Sequence[FileMaterial], in_file: Sequence[int], given: Collection[str]
+    mesh: Mesh,
+    materials: Sequence[FileMaterial],
+    in_file: Sequence[int],
+    given: Collection[str],
+    is_packed: bool,
 ) -> str:
     """Return the note on what of a file's materials is not drawn; empty for nothing.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
     given : roles of maps of the skin that users replace
+    is_packed : whether the pictures of several skin materials are packed
     """
     lines = dict[str, None]()
     for material, index in zip(mesh.materials, in_file, strict=True):
@@ -205,6 +210,8 @@ def unused_properties(
         unused += [text for role, text in own.missing.items() if not (is_skin and role in given)]
         if is_skin and own.maps is None:
             unused += _replaced_by_skin(own)
+        if not is_skin or is_packed:
+            unused += own.skin_only
         if unused:
             lines[f"{own.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
     return "\n  ".join(["not drawn, or replaced by the properties of skin:", *lines]) if lines else ""
@@ -215,7 +222,7 @@ def _replaced_by_skin(material: FileMaterial) -> list[str]:
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")
-    if material.metalness not in (0.0, 1.0) or "metalness" in material.textures:
+    if material.stated_metalness or "metalness" in material.textures:
         replaced.append("metalness")
     if max(material.emission) > 0.0 or "emission" in material.textures:
         replaced.append(f"emission {max(material.emission):g}")

@@ -98,7 +98,7 @@ class _Reader:
             alpha_mode=_ALPHA_MODES[self.material.get("alphaMode", "OPAQUE")],
             alpha_cutoff=float(self.material.get("alphaCutoff", 0.5)),
             roughness=float(pbr.get("roughnessFactor", 1.0)),
-            metalness=float(pbr.get("metallicFactor", 1.0)),
+            stated_metalness=float(pbr["metallicFactor"]) if "metallicFactor" in pbr else None,
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
             scatters=any(name in self.extensions for name in _SCATTERING),
