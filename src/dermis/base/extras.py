@@ -19,6 +19,8 @@ EXTRAS = {
     "distributed": "cluster",
     "pxr": "engines",
     "MaterialX": "engines",
+    "pi_heif": "formats",
+    "DracoPy": "formats",
 }
 """Name of the extra that installs each optional module."""
 _DISTRIBUTIONS = {"pxr": "usd-core"}  # distributions with other names than their modules

@@ -189,7 +189,9 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     is_skin = _match_groups(groups, names.skin, "skin_groups", source)
     if not names.skin:
         candidates = [k for k, opaque in enumerate(is_opaque) if not opaque]
-        chosen = choose_skin(*([own[k] for k in candidates] for own in (parts, groups, scatters)))
+        chosen = choose_skin(
+            [parts[k] for k in candidates], [groups[k] for k in candidates], [scatters[k] for k in candidates]
+        )
         is_skin = [False] * len(parts)
         for k, skin in zip(candidates, chosen, strict=True):
             is_skin[k] = skin

@@ -31,6 +31,6 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
         yield f"points and lines ({thin} primitives) are left out"
     if len(document.items("scenes")) > 1:
         yield f"one of its {len(document.items('scenes'))} scenes is read"
-    unread = [str(one) for one in document.items("extensionsUsed") if one not in read_extensions]
+    unread = [name for name in map(str, document.items("extensionsUsed")) if name not in read_extensions]
     if unread:
         yield f"these extensions are left out: {listed(unread)}"
