@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from dermis.base.errors import DermisError
 from dermis.base.reading import read_toml
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Layer, Medium, media, medium_from_toml
+from dermis.optics.profiles import load_profile
 from dermis.optics.tissue import load_tissue
 
 ONE = np.array([1.0])
@@ -141,3 +143,62 @@ def test_rings_alone_are_those_of_the_profile(name: str) -> None:
     tissue = load_tissue(name)
     alone, whole = tissue.rings(), tissue.profile().rings()
     assert np.array_equal(alone.energy, whole.energy) and np.array_equal(alone.total, whole.total)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            LAYER + "g = 0.9\n",
+            r"layer 1: .*it has g = 0\.9\. .* write scattering_per_mm = \[0\.1, 0\.1, 0\.1\]; ",
+        ),
+        (LAYER + "anisotropy = 0.75\n", r"no anisotropy, .*scattering_per_mm = \[0\.25, 0\.25, 0\.25\]; "),
+        (LAYER + "g = [0.5, 0.6, 0.7]\n", r"scattering_per_mm = \[0\.5, 0\.4, 0\.3\]; "),
+        (LAYER + "g = 'high'\n", r"scattering_per_mm = mu_s \(1 - g\); "),
+        ("g = 0.9\n" + LAYER, r"own\.toml: .*it has g = 0\.9\. .*mu_s \(1 - g\); then take g out"),
+    ],
+)
+def test_an_anisotropy_is_refused_with_the_reduced_scattering(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(DermisError, match=words):
+        parsed(tmp_path, text)
+
+
+MCML = """\
+1.0                      # file version
+1                        # number of runs
+temp1.mco  A             # output filename, ASCII/Binary
+100000                   # No. of photons
+20E-4  20E-4             # dz, dr
+100  100  30             # No. of dz, dr & da.
+2                        # No. of layers
+# n  mua  mus  g  d      # One line for each layer
+1.0                      # n for medium above.
+1.4  1.5  200  0.9  0.01 # epidermis
+1.4  0.2  100  0.8  1E8  # dermis
+1.0                      # n for medium below.
+"""
+
+
+@pytest.mark.parametrize("load", [load_tissue, load_profile])
+def test_files_of_mcml_are_refused_with_their_values_in_mm(
+    tmp_path: Path, load: Callable[[Path], object]
+) -> None:
+    (tmp_path / "skin.mci").write_text(MCML)
+    with pytest.raises(DermisError, match=r"skin\.mci: .*its scattering is not reduced") as caught:
+        load(tmp_path / "skin.mci")
+    assert "layer 1: absorption_per_mm 0.15, scattering_per_mm 2, thickness_mm 0.1, eta 1.4" in str(
+        caught.value
+    )
+    assert "layer 2: absorption_per_mm 0.02, scattering_per_mm 2, no thickness_mm, eta 1.4" in str(
+        caught.value
+    )
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\xff\xfe\0", b"1 2 3 4 5\n" * 9000, b"1 2 3 4 nan\n1 1 1 1 1e999\n"]
+)
+def test_damaged_files_of_mcml_are_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "skin.mco").write_bytes(content)
+    with pytest.raises(DermisError, match=r"mu_s' = mu_s \(1 - g\)") as caught:
+        load_tissue(tmp_path / "skin.mco")
+    assert len(str(caught.value)) < 1500

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from dermis.base.errors import DermisError
 from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
 from dermis.scene.field_errors import InvalidFieldsError
+from dermis.scene.files import load_scene
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.scene.tissue import skin_tissue, tissue_layers
 
@@ -79,3 +82,11 @@ def test_only_the_last_layer_is_endless() -> None:
     with pytest.raises(DermisError, match="infinite in the last layer only"):
         skin_tissue(Skin(profile="skin1", layers=layers))
     assert np.isinf(skin_tissue(Skin(profile="skin1", layers=layers[:1])).medium.layers[0].thickness_mm)
+
+
+def test_a_layer_with_an_anisotropy_is_refused_by_the_name_of_its_file(tmp_path: Path) -> None:
+    layer = "absorption_per_mm = [1, 1, 1]\nscattering_per_mm = [20, 20, 20]\ng = 0.9\n"
+    path = tmp_path / "scene.toml"
+    path.write_text(f'[head]\nname = "human"\n[[skin.layers]]\n{layer}')
+    with pytest.raises(DermisError, match=r"scene\.toml: .*g = 0\.9.* scattering_per_mm = \[2, 2, 2\]"):
+        load_scene(path)

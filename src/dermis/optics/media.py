@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_array, checked_number
 from dermis.base.tables import read_rows
+from dermis.optics.reduced_scattering import check_reduced
 
 Floats = NDArray[np.float64]
 
@@ -164,6 +165,7 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         refuse(path, "[[layers]] with absorption_per_mm and scattering_per_mm", "it has none", "Add them")
     layers = tuple(_layer_from_table(f"{path}, layer {k}", table) for k, table in enumerate(tables, 1))
+    check_reduced(str(path), document)
     unknown = sorted(set(document) - {"name", "eta", "layers"})
     if unknown:
         refuse(path, "name, eta and [[layers]]", f"got {', '.join(unknown)}", "Take them out")
@@ -172,6 +174,7 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
 
 
 def _layer_from_table(culprit: str, table: Mapping[str, Any]) -> Layer:
+    check_reduced(culprit, table)
     unknown = sorted(set(table) - {"name", "thickness_mm", *_COEFFICIENT_KEYS})
     if unknown:
         known = ", ".join(("name", "thickness_mm", *_COEFFICIENT_KEYS))

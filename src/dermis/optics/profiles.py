@@ -22,6 +22,7 @@ from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import MAX_VARIANCE_MM2, MAX_WEIGHT, GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.radial import RadialProfile
+from dermis.optics.reduced_scattering import MCML_SUFFIXES, refuse_mcml
 from dermis.optics.tissue import Tissue, load_tissue, tissue_names
 
 PUBLISHED_PRESET = "gpu-gems-3"
@@ -100,6 +101,8 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
     if str(name) in tissue_names():
         return None
     path = Path(name)
+    if path.suffix.lower() in MCML_SUFFIXES:
+        refuse_mcml(path)
     state = _file_state(path)
     if not state and path.suffix.lower() != ".toml":
         expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_CSV_FORMAT}"

@@ -32,6 +32,7 @@ from dermis.optics.pigments.parameters import DEFAULT_STRUCTURE, SKINS, SkinPara
 from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
+from dermis.optics.reduced_scattering import MCML_SUFFIXES, refuse_mcml
 
 ProfileModel = DiffusionModel | Literal["counted"]
 """Diffusion model, or "counted": tabulated photon counts for half-spaces of one medium."""
@@ -184,7 +185,8 @@ def load_tissue(
     >>> skin.parameters.melanin, skin.spectrum().shape
     (0.1, (31,))
     """
-    checked_path(name, "a tissue")
+    if checked_path(name, "a tissue").suffix.lower() in MCML_SUFFIXES:
+        refuse_mcml(Path(name))
     overrides = _checked_pigments(pigments or {})
     if str(name) in SKINS:
         return _spectral_tissue(str(name), structure or DEFAULT_STRUCTURE, SKINS[str(name)], overrides)
