@@ -47,15 +47,17 @@ def fit(
     Parameters
     ----------
     photo:
-        Photograph: PNG, JPEG or TIFF in sRGB, or EXR (linear).
+        Photograph: JPEG, HEIC, PNG, TIFF, WebP or AVIF, turned by its EXIF and converted by its colour
+        profile; or EXR or HDR (linear).
     head:
         human, human:SEED, a person (.json), a sample or a mesh file; or a scene (.toml) with head, camera and
         pose.
     camera:
         portrait, three-quarter, profile or a TOML file with [camera]. [default: camera of the scene]
     landmarks:
-        Landmarks in the photograph, from which the camera and the shape of the human are estimated: a CSV
-        file with name,x,y [pixel], the output of `dermis render --landmarks`, or JSON of MediaPipe.
+        Landmarks in the photograph, from which the camera and the shape of the human are estimated: a table
+        of name,x,y or x,y [pixel], iBUG's .pts, the output of `dermis render --landmarks`, or JSON of
+        MediaPipe.
     output:
         Folder of the results, created if necessary.
     suns:

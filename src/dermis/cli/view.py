@@ -62,7 +62,7 @@ def view(
     token:
         Require a token on this machine too, for machines with several users and behind a proxy.
     motion:
-        Motion to play: a clip of a glTF file (file.glb or file.glb#clip), a .csv of Live Link Face, a .jsonl
+        Motion to play: a clip of a glTF file (file.glb or file.glb#clip), a .csv of Live Link Face, a .json
         of MediaPipe, or a sequence of meshes (a folder, or face_%05d.obj).
     motion_fps:
         Frame rate of a motion file without times [1/s].

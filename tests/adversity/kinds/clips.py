@@ -17,6 +17,11 @@ from small_head import obj_text
 
 _SHAPES = {"jawOpen": 0.2, "mouthSmileLeft": 0.1, "_neutral": 0.0}
 _MATRIX = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -50.0], [0.0, 0.0, 0.0, 1.0]]
+_LOST = """Timecode;BlendShapeCount;JawOpen;MouthSmileLeft;HeadYaw
+10:00:00:00,000;3;12,5;;0,1
+10:00:00:15,000;0;;;
+10:00:00:30,000;3;80;50;0,2
+"""
 _FRAMES = 4
 
 
@@ -25,6 +30,19 @@ def _mediapipe() -> bytes:
     listed = [{"categoryName": name, "score": score} for name, score in _SHAPES.items()]
     theirs = {"timestamp_ms": 33, "faceBlendshapes": listed, "facialTransformationMatrix": _MATRIX}
     return "\n".join(map(json.dumps, (own, theirs, own | {"time": 0.066}))).encode()
+
+
+def _results() -> bytes:
+    """Return results as MediaPipe's JavaScript API has them, with a frame without a face."""
+    categories = [
+        {"index": k, "score": score, "categoryName": name} for k, (name, score) in enumerate(_SHAPES.items())
+    ]
+    matrix = {"rows": 4, "columns": 4, "data": [row[k] for k in range(4) for row in _MATRIX]}
+    face = {"faceBlendshapes": [{"categories": categories}], "facialTransformationMatrixes": [matrix]}
+    lost: dict[str, list[Any]] = {key: [] for key in face}
+    return json.dumps(
+        [{"timestamp": 33 * k} | frame for k, frame in enumerate((face, lost, face))], indent=1
+    ).encode()
 
 
 @cache
@@ -39,7 +57,9 @@ def files_of_motions() -> dict[str, dict[str, bytes]]:
     frames = {f"frames/face_{k:03}.obj": obj_text().encode() for k in range(_FRAMES)}
     return {
         "take.jsonl": {"take.jsonl": _mediapipe()},
+        "results.json": {"results.json": _results()},
         "take.csv": {"take.csv": angles.encode()},
+        "lost.csv": {"lost.csv": _LOST.encode()},
         "clip.glb#talk": {"clip.glb": moving_files()[0]},
         "turning.glb": {"turning.glb": moving_files()[1]},
         "frames": frames,

@@ -227,6 +227,26 @@ def _take_landmarks(plan: Plan) -> None:
     check_finite((found.weight, found.point), "landmarks")
 
 
+def _photo_landmarks(rng: Random) -> Input:
+    points = [(rng.uniform(0, 300), rng.uniform(0, 400)) for _ in range(68)]
+    lines = [f"{x:.2f} {y:.2f}" for x, y in points]
+    texts = {
+        "face.pts": "\n".join(["version: 1", "n_points: 68", "{", *lines, "}"]),
+        "face.txt": "\n".join(lines),
+        "face.csv": "\n".join(["name;x;y", *(f"{k};{x:.2f};{y:.2f}" for k, (x, y) in enumerate(points))]),
+        "face.json": json.dumps({"faceLandmarks": [[{"x": x, "y": y, "z": 0.0} for x, y in points]]}),
+    }
+    name = rng.choice(tuple(texts))
+    return Input({name: texts[name].encode()}, {"file": name})
+
+
+def _take_photo_landmarks(plan: Plan) -> None:
+    from dermis.apps.inverse.fitting.landmark_files import read_landmarks
+
+    _, pixels = read_landmarks(plan["file"], (300, 400))
+    check_finite(list(pixels.values()), "landmarks")
+
+
 @cache
 def _ball() -> Any:
     from dermis.mesh.head import Head
@@ -243,5 +263,6 @@ KINDS = (
     Kind("person", _person, _take_person, share=8),
     Kind("regions", _regions, _take_regions, share=6),
     Kind("landmarks", _landmarks, _take_landmarks, share=3),
+    Kind("photo landmarks", _photo_landmarks, _take_photo_landmarks, share=4),
     Kind("profile", _profile, _take_profile, share=8),
 )
