@@ -13,7 +13,7 @@ from viewer_input import FEWEST, MOTIONS, STEP, Clock, InputDriver, Plan, counte
 from viewer_page import resident_mb
 
 from dermis.apps.validation.pages import JsonObject
-from dermis.apps.viewer.controls import CAMERA_PRESETS
+from dermis.apps.viewer.controls import PRESET_NAMES
 from dermis.apps.viewer.navigation import dolly, drag_light, orbit, pan
 from dermis.apps.viewer.state import ViewerState
 from dermis.gpu.memory import allocated_bytes
@@ -179,7 +179,7 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
     elif kind == "size":
         driver.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
     elif kind == "preset":
-        session.controls.set_camera_preset(chance.choice(CAMERA_PRESETS))
+        session.controls.set_camera_preset(chance.choice(PRESET_NAMES))
     else:
         session.change(driver.first)
 

@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.formats.mesh_checks import UV_TOLERANCE, flat_triangles
@@ -163,20 +164,20 @@ class _Sides(NamedTuple):
     Side 3 t + k runs from corner k of triangle t to its next corner.
 
     side : (3f,) sides, ordered by edge
-    first, count : (e,) index in `side` of the first side of each edge, and number of its sides
+    first, counts : (e,) index in `side` of the first side of each edge, and number of its sides
     start, end : (3f,) points at the ends of each side
     """
 
     side: Index
     first: Index
-    count: Index
+    counts: Index
     start: Index
     end: Index
 
     @property
     def pairs(self) -> Index:
         """Return the two sides of each edge of two triangles, (n, 2)."""
-        first = self.first[self.count == 2]
+        first = self.first[self.counts == 2]
         return np.column_stack((self.side[first], self.side[first + 1]))
 
 
@@ -189,7 +190,7 @@ def _group_sides(corners: Index) -> _Sides:
     return _Sides(side, first, np.diff(first, append=len(key)), start, end)
 
 
-def _label(count: int, links: Index) -> Index:
+def _label(count: int, links: NDArray[np.integer]) -> Index:
     """Return the connected component of each node of a graph, (count,).
 
     links : (n, 2) nodes at the ends of each link
@@ -203,16 +204,16 @@ def _label(count: int, links: Index) -> Index:
 
 def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with separate points for the sheets that meet at edges of more than two triangles."""
-    count = int((mesh.sides.count > 2).sum())
+    count = int((mesh.sides.counts > 2).sum())
     if not count:
         return mesh
     notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
     links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
     mesh = mesh.with_corners(_split_points(mesh, links))
     sides = mesh.sides
-    if (sides.count > 2).any():  # sheets that are joined elsewhere around both ends of an edge
+    if (sides.counts > 2).any():  # sheets that are joined elsewhere around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
-        kept[sides.side[sides.first[sides.count == 1]]] = True
+        kept[sides.side[sides.first[sides.counts == 1]]] = True
         kept[np.concatenate((sides.pairs, _continue_sheets(mesh, rounds=1)))] = True
         apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
@@ -229,8 +230,8 @@ def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Ind
     rounds : most pairs of an edge
     """
     sides, material = mesh.sides, mesh.material
-    crowded = np.flatnonzero((sides.count > 2) & (sides.count <= _MAX_PAIRED_SIDES))
-    count = sides.count[crowded, None]
+    crowded = np.flatnonzero((sides.counts > 2) & (sides.counts <= _MAX_PAIRED_SIDES))
+    count = sides.counts[crowded, None]
     column = np.arange(int(count.max(initial=0)))
     table = np.where(
         column < count, sides.side[sides.first[crowded, None] + np.minimum(column, count - 1)], -1
@@ -275,7 +276,7 @@ def _split_points(mesh: RawMesh, links: Index) -> Index:
     links : (n, 2) pairs of sides across which sheets continue
     """
     sides, flat = mesh.sides, mesh.corners.ravel()
-    crowded = sides.side[sides.first[sides.count > 2]]
+    crowded = sides.side[sides.first[sides.counts > 2]]
     busy = np.zeros(int(flat.max()) + 1, bool)
     busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
     first, second = links.T  # a side has the index of the corner at its start

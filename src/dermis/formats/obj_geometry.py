@@ -40,7 +40,9 @@ READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAIN
 STATEMENTS_WITHOUT_MEANING = ("s", "mg", "")
 """Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
 LEFT_OUT = {
-    "l": "lines", "p": "points", "vp": "curves",
+    "l": "lines",
+    "p": "points",
+    "vp": "curves",
     **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con"), "curves"),
     **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
 }
@@ -228,7 +230,7 @@ def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
-            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)
+            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
         except ValueError:
             return index
     return 0

@@ -35,10 +35,25 @@ _MAX_PROPERTIES, _MAX_LISTS = 256, 8
 _FORMATS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _SPACE = 32
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
-    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8",
-    "float16": "f2", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float16": "f2",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
 }
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -102,8 +117,8 @@ class _Columns(dict[str, "Numbers | _List"]):
 
     def take(self, names: Sequence[str]) -> Numbers | None:
         """Return properties that are no lists side by side, (n, k); None unless all of them exist."""
-        columns = [self.get(name) for name in names]
-        if not columns or any(not isinstance(column, np.ndarray) for column in columns):
+        columns = [column for name in names if isinstance(column := self.get(name), np.ndarray)]
+        if not columns or len(columns) < len(names):
             return None
         self.used.update(names)
         return np.column_stack(columns)
@@ -290,7 +305,7 @@ class _ElementReader:
         row, item = expand_runs(np.zeros_like(count), count)
         first = start[row] + stored.itemsize * item
         values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
-        return values.astype(dtype)
+        return np.asarray(values.astype(dtype))
 
     def _lengths(self, position: int) -> list[Index]:
         """Return the lengths of each list property, (n,) each."""
@@ -330,7 +345,7 @@ class _ElementReader:
 
         rest : size of the properties after the last list [bytes]
         """
-        lengths, data, end = [], memoryview(self.data), len(self.data)
+        lengths, data, end = [], memoryview(self.data.tobytes()), len(self.data)
         readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in steps]
         walked = [
             (step.skip, reader.unpack_from, reader.size, step.item_size)
@@ -388,7 +403,7 @@ def _strip_triangles(strips: _List) -> Index:
     odd = step[:-2] % 2 == 1
     triangles[odd] = triangles[odd][:, [1, 0, 2]]
     a, b, c = triangles.T
-    return triangles[(triangles.min(axis=1) >= 0) & (a != b) & (b != c) & (c != a)]
+    return np.asarray(triangles[(triangles.min(axis=1) >= 0) & (a != b) & (b != c) & (c != a)])
 
 
 def _uv(

@@ -16,7 +16,7 @@ def linear_colours(values: Numbers) -> tuple[Doubles, list[str]]:
     """
     notes = []
     if values.dtype.kind in "iu":
-        scale = float(np.iinfo(values.dtype).max)
+        scale = float(np.iinfo(values.dtype.str).max)
     else:
         largest = np.fmax.reduce(values, axis=None, initial=0.0)
         scale = 255.0 if largest > 1 else 1.0

@@ -169,7 +169,7 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted:
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
     lost = _rows_without_face(values, is_angle, counted)
     values[lost] = np.nan
-    empty = np.isnan(values).all(axis=0)
+    empty = np.asarray(np.isnan(values).all(axis=0))
     if empty.all():
         refuse(path, "frames with a face", "all rows are empty", "Record it again")
     if empty.any():
@@ -193,10 +193,10 @@ def _rows_without_face(values: Doubles, is_angle: Mask, counted: Mask) -> Mask:
     Faces are never zero if most other rows have a turned head, or if others count their blend shapes.
     """
     numbers = np.nan_to_num(values)
-    zero = ~numbers.any(axis=1)
-    turned = numbers[:, is_angle].any(axis=1)
+    zero = np.asarray(~numbers.any(axis=1))
+    turned = np.asarray(numbers[:, is_angle].any(axis=1))
     always_turned = bool(turned[~zero].sum() > 0.5 * (~zero).sum())
-    return np.isnan(values).all(axis=1) | (zero & (always_turned | (~counted & counted.any())))
+    return np.asarray(np.isnan(values).all(axis=1)) | (zero & (always_turned | (~counted & counted.any())))
 
 
 def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, fps: float | None) -> Doubles:

@@ -281,7 +281,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
             times[unstated] = to_seconds(path, times[unstated], None)
         if missing.any():
             notify(f"{path}: {missing.sum()} of {len(frames)} frames have no time; it is interpolated")
-        times = fill_gaps(np.arange(len(frames)), times[:, None])[:, 0]
+        times = fill_gaps(np.arange(len(frames), dtype=np.float64), times[:, None])[:, 0]
     for (before, after), frame in zip(pairwise(times.tolist()), frames[1:], strict=True):
         if after < before:
             actual = f"{after:g} s comes after {before:g} s"
