@@ -10,6 +10,7 @@ import pytest
 from loaded_mesh import load_mesh
 
 from dermis.base.errors import DermisError
+from dermis.formats.load import load_rigged
 
 
 def _glb(path: Path, *, material: str | None = "Skin", mirror: bool = False, drop_uv: bool = False) -> Path:
@@ -123,6 +124,5 @@ def test_unit_is_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_mesh(path, unit_mm=10).size_mm, [2, 3, 0], atol=1e-5)
 
 
-def test_missing_uv_names_the_group(tmp_path: Path) -> None:
-    with pytest.raises(DermisError, match=r"uv at every vertex.*'Skin'"):
-        load_mesh(_glb(tmp_path / "face.glb", drop_uv=True))
+def test_a_group_without_uv_is_known(tmp_path: Path) -> None:
+    assert load_rigged(_glb(tmp_path / "face.glb", drop_uv=True)).surface.has_uv == (False,)

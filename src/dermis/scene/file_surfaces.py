@@ -203,6 +203,8 @@ def unused_properties(
     given : roles of maps of the skin that users replace
     is_packed : whether the pictures of several skin materials are packed
     """
+    if any(one.maps is not None for one in materials):  # this package wrote the file
+        return ""
     lines = dict[str, None]()
     for material, index in zip(mesh.materials, in_file, strict=True):
         own, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"

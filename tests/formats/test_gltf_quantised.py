@@ -1,0 +1,49 @@
+"""Quantised attributes of glTF files (KHR_mesh_quantization) against the same file with floats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gltf_file import GltfFile
+
+from dermis.formats.load import load_rigged
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import uv_sphere
+
+BALL = uv_sphere(1.0, 24, 12)
+RADIUS_M = 0.12
+
+
+def ball(path: Path, kind: str, normalized: bool, *, scaled_uv: bool = True) -> Mesh:
+    """Load a ball whose attributes have an integer type; the node's scale makes it 240 mm large."""
+    file, largest = GltfFile(), 1.0 if kind == "<f4" else float(np.iinfo(kind).max)
+    stored: Callable[[np.ndarray], np.ndarray] = lambda values: np.round(values * largest)  # noqa: E731
+    if kind == "<f4":
+        stored = lambda values: values  # noqa: E731
+    uv_kind = kind.replace("i", "u")
+    uv_largest = 1.0 if kind == "<f4" else float(np.iinfo(uv_kind).max)
+    uv = BALL.uv if kind == "<f4" else np.round(BALL.uv * uv_largest)
+    attributes = {
+        "POSITION": file.numbers(stored(BALL.positions), kind, normalized=normalized),
+        "NORMAL": file.numbers(stored(BALL.normals), kind, normalized=kind != "<f4"),
+        "TEXCOORD_0": file.numbers(uv, uv_kind, normalized=kind != "<f4"),
+    }
+    primitive = {"attributes": attributes, "indices": file.numbers(BALL.triangles.reshape(-1, 1), "<u2")}
+    file.tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+    scale = RADIUS_M if normalized or kind == "<f4" else RADIUS_M / largest
+    node = file.add("nodes", mesh=file.add("meshes", primitives=[primitive]), scale=[scale] * 3)
+    return load_rigged(file.write(path, node)).mesh
+
+
+@pytest.mark.parametrize("normalized", [False, True])
+@pytest.mark.parametrize("kind", ["<i1", "<i2"])
+def test_quantised_attributes_are_those_of_floats(kind: str, normalized: bool, tmp_path: Path) -> None:
+    exact, read = ball(tmp_path / "a.glb", "<f4", False), ball(tmp_path / "b.glb", kind, normalized)
+    step = 1.0 / np.iinfo(kind).max
+    assert len(read.positions) == len(exact.positions)
+    np.testing.assert_allclose(read.positions, exact.positions, atol=1000 * RADIUS_M * step)
+    np.testing.assert_allclose(read.uv, exact.uv, atol=step)
+    np.testing.assert_allclose(read.normals, exact.normals, atol=2 * step)
