@@ -73,8 +73,8 @@ def test_a_name_of_the_last_release_warns_and_works(module: ModuleType) -> None:
 OLD_MODULES = """
 import sys, warnings
 from importlib import import_module
-from dermis.base.renamed import MODULES
-for old, new in MODULES.items():
+from dermis.base.renamed import RENAMED_MODULES
+for old, new in RENAMED_MODULES.items():
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         module = import_module(f"dermis.{old}")

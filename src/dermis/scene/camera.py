@@ -236,7 +236,7 @@ def full_body(head: Head) -> Camera:
     >>> from dermis.mesh.primitives import uv_sphere
     >>> camera = dermis.full_body(dermis.Head("ball", uv_sphere(450.0, 8, 4), Maps()))
     >>> round(camera.position[2]), round(camera.frame_mm)
-    (2700, 1006)
+    (2700, 972)
     """
     return _show_all(head, 0.0)
 

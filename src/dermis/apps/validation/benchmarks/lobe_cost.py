@@ -59,7 +59,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
 
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
-    """Return the time of one compute pass by timestamps, or by the clock without them [ms].
+    """Return the time of one compute pass by timestamps, or by `perf_counter` without them [ms].
 
     bound : resources by the names of their bindings
     side : side of the square of invocations
