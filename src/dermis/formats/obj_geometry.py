@@ -40,11 +40,10 @@ READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAIN
 STATEMENTS_WITHOUT_MEANING = ("s", "mg", "")
 """Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
 LEFT_OUT = {
+    **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con", "vp"), "curves"),
+    **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
     "l": "lines",
     "p": "points",
-    "vp": "curves",
-    **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con"), "curves"),
-    **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
 }
 """What some statements describe that are left out with a note, as all unknown ones are."""
 

@@ -35,25 +35,17 @@ _MAX_PROPERTIES, _MAX_LISTS = 256, 8
 _FORMATS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _SPACE = 32
 _TYPES = {
-    "char": "i1",
-    "int8": "i1",
-    "uchar": "u1",
-    "uint8": "u1",
-    "short": "i2",
-    "int16": "i2",
-    "ushort": "u2",
-    "uint16": "u2",
-    "int": "i4",
-    "int32": "i4",
-    "uint": "u4",
-    "uint32": "u4",
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
     "int64": "i8",
     "uint64": "u8",
     "float16": "f2",
-    "float": "f4",
-    "float32": "f4",
-    "double": "f8",
-    "float64": "f8",
 }
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -67,9 +59,7 @@ PROPERTIES_WITHOUT_MEANING = {
 _SCALAR_PREFIX = "scalar_"  # of such properties in CloudCompare
 _ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
 _HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
-_STRUCT_CODES = dict(
-    zip(("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"), "bBhHiIqQefd", strict=True)
-)
+_STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=True))
 
 
 class _Property(NamedTuple):
