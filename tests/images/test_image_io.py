@@ -95,7 +95,7 @@ def test_exr_layers_are_ignored(tmp_path: Path) -> None:
     import OpenEXR
 
     grey, colour = np.ones(SHAPE, np.float32), np.full((*SHAPE, 3), 2, np.float32)
-    OpenEXR.File({}, {"RGB": colour, "depth": grey, "irradiance": colour}).write(str(tmp_path / "a.exr"))
+    OpenEXR.File({}, {"RGB": colour, "depth": grey, "irradiance": grey + 4}).write(str(tmp_path / "a.exr"))
     np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), colour)
 
 
@@ -157,12 +157,7 @@ def test_missing_file_and_folder_are_named(tmp_path: Path) -> None:
             read_image(path)
 
 
-def test_unusual_pixels_are_refused(tmp_path: Path) -> None:
-    from PIL import Image
-
-    Image.new("CMYK", (32, 32)).save(tmp_path / "cmyk.jpg")
-    with pytest.raises(DermisError, match=r"cmyk\.jpg.*CMYK"):
-        read_image(tmp_path / "cmyk.jpg")
+def test_huge_pictures_are_refused(tmp_path: Path) -> None:
     header = struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
     huge = bytearray(_pillow_bytes(np.zeros((16, 16, 3), np.uint8), "PNG"))
     huge[16:33] = header + struct.pack(">I", zlib.crc32(b"IHDR" + header))

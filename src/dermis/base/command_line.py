@@ -108,15 +108,16 @@ def print_failure(name: str, message: str) -> int:
 
 def _show_notes() -> None:
     """Show each `DermisWarning` once, as a note on stderr; other warnings are shown as usual."""
-    default = warnings.showwarning
+    default, shown = warnings.showwarning, set[str]()
 
     def show(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
-        if issubclass(category, DermisWarning):
-            sys.stderr.write(f"note: {message}\n")
-        else:
+        if not issubclass(category, DermisWarning):
             default(message, category, *args, **kwargs)
+        elif str(message) not in shown:
+            shown.add(str(message))
+            sys.stderr.write(f"note: {message}\n")
 
-    warnings.simplefilter("default", DermisWarning)
+    warnings.simplefilter("always", DermisWarning)
     warnings.showwarning = show
 
 

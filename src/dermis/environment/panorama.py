@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 from dermis.formats.samples import SAMPLES, fetch_sample
 from dermis.images.colour import luminance
-from dermis.images.io import read_image
+from dermis.images.io import mended_radiance, read_colours
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
@@ -32,20 +32,20 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     name : a sample, a file (.hdr, .exr), or "uniform"
     max_rows : largest h; larger pictures are reduced by averaging
 
+    A few infinite, NaN or negative pixels are mended, with a note.
+
     Raises DermisError for any other name, and for a picture without radiance.
     """
     path = panorama_file(name)
     if path is None:
         return np.ones((_MIN_ROWS, 2 * _MIN_ROWS, 3))
-    image = read_image(path)
+    image, space = read_colours(path)
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
-    low, high = float(rgb.min()), float(rgb.max())
-    if low < 0 or not 0 < high <= _MAX_RADIANCE:
-        expected = f"radiance from 0 to {_MAX_RADIANCE:g}, not all of it 0"
-        refuse(name, expected, f"it is from {low:g} to {high:g}", "Export it again")
+    rgb = space.linear(mended_radiance(name, image[..., :3]))
+    if (highest := float(rgb.max())) > _MAX_RADIANCE:
+        refuse(name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again")
     height, width = rgb.shape[:2]
     if width != 2 * height:
         actual, advice = f"it is {width}x{height}", "Export it as latitude and longitude"

@@ -1,10 +1,9 @@
-"""Decoding of PNG, JPEG and TIFF files at full bit depth, and encoding of PNG files."""
+"""Decoding of PNG, JPEG, TIFF, WebP, AVIF and HEIC files at full bit depth, and encoding of PNG files."""
 
 from __future__ import annotations
 
 import io
 import struct
-import threading
 import zlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Floats, Numbers
 from dermis.base.extras import import_extra
+from dermis.images.header import UnsupportedError
+from dermis.images.opening import PNG_SIGNATURE, open_picture, table_transform
 from dermis.images.sizes import MAX_PIXELS, check_size
 
 if TYPE_CHECKING:
@@ -21,48 +22,53 @@ if TYPE_CHECKING:
 
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
-PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-PILLOW_SIGNATURES = (PNG_SIGNATURE, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
 _UP_FILTER = 2  # number of PNG's filter that stores differences from the row above
 
-_PILLOW_LOCK = threading.Lock()
 _STRIP_PIXELS = 1 << 20  # pixels converted at a time
-_JPEG_SCAN = b"\xff\xda"
-_MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
 _PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
     "L": ("L", np.uint8),
     "RGB": ("RGB", np.uint8),
+    "RGBX": ("RGB", np.uint8),
     "RGBA": ("RGBA", np.uint8),
+    "RGBa": ("RGBA", np.uint8),
     "P": ("RGB", np.uint8),
     "PA": ("RGBA", np.uint8),
     "LA": ("RGBA", np.uint8),
     "La": ("RGBA", np.uint8),
+    "CMYK": ("RGB", np.uint8),
+    "YCbCr": ("RGB", np.uint8),
     "I;16": ("I;16", np.uint16),
     "I;16B": ("I;16B", np.uint16),
     "F": ("F", np.float32),
 }
 """Pillow's mode and the NumPy type of the result by Pillow's mode of the file."""
 _PNG_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
+_TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_RGB = 258, 262, 2
 
 
-def decode_with_pillow(data: bytes) -> Pixels:
-    """Decode a PNG, JPEG or TIFF file at full bit depth to an array (H, W, C).
+def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
+    """Decode a picture at full bit depth to an array (H, W, C), in the colour space of its header.
 
-    C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF.
+    C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF. CMYK becomes sRGB.
+
+    convert_tables : convert colours to 8-bit sRGB if the file has an ICC profile of tables
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or of an unsupported
     type.
     """
-    picture = _open_checked(data)
-    pixel_format = _format_of_16_bit(data, picture)
+    picture = open_picture(data)
+    if picture.format == "PNG":
+        open_picture(data).verify()  # the checksums, which Pillow does not check when it decodes
+    to_srgb = table_transform(picture) if convert_tables or picture.mode == "CMYK" else None
+    pixel_format = None if to_srgb else _format_of_16_bit(data, picture)
     if pixel_format:
         image = decode_up_filtered_png(data)
         return _decode_16_bit(data, pixel_format, picture) if image is None else image
     if picture.mode not in _PIXEL_MODES:
-        raise ValueError(f"its pixels are of kind {picture.mode}, not 8 or 16 bit grey, RGB or RGBA")
+        raise UnsupportedError(f"its pixels are of kind {picture.mode}")
     mode, dtype = _PIXEL_MODES[picture.mode]
     if picture.mode == "P" and "transparency" in picture.info:
         mode = "RGBA"
@@ -71,15 +77,10 @@ def decode_with_pillow(data: bytes) -> Pixels:
     image = np.empty((picture.height, picture.width, channels), dtype)
     for rows in strips(image):
         strip = picture.crop((0, rows.start, picture.width, rows.stop))
+        strip = to_srgb.apply(strip) if to_srgb else strip
         strip = strip if strip.mode == mode else strip.convert(mode)
         image[rows] = np.asarray(strip).reshape(image[rows].shape)
     return image
-
-
-def pillow_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of a PNG, JPEG or TIFF file from its header."""
-    picture = _open_header(data)
-    return check_size(picture.width, picture.height)
 
 
 def strips(image: Numbers) -> Iterator[slice]:
@@ -92,31 +93,6 @@ def strips(image: Numbers) -> Iterator[slice]:
         yield slice(top, min(top + rows, len(image)))
 
 
-def _open_checked(data: bytes) -> Image:
-    """Open a picture with Pillow after checking its header, its size and the checksums of a PNG file."""
-    picture = _open_header(data)
-    check_size(picture.width, picture.height)
-    if picture.format == "PNG":
-        _open_header(data).verify()  # the checksums, which Pillow does not check when it decodes
-    scanned = data.count(_JPEG_SCAN) * picture.width * picture.height
-    if picture.format == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
-        raise ValueError("it was stored in too many scans")
-    return picture
-
-
-def _open_header(data: bytes) -> Image:
-    import PIL.Image
-
-    with _PILLOW_LOCK:  # Pillow's own limit is a global variable and differs
-        limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
-        try:
-            return PIL.Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "TIFF"))
-        except PIL.UnidentifiedImageError as fault:
-            raise ValueError("its header cannot be read") from fault
-        finally:
-            PIL.Image.MAX_IMAGE_PIXELS = limit
-
-
 def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
     """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for others.
 
@@ -125,7 +101,8 @@ def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
     if data.startswith(PNG_SIGNATURE):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
-    bits = getattr(picture, "tag_v2", {}).get(258, ())
+    tags = getattr(picture, "tag_v2", {})
+    bits = tags.get(_TIFF_BITS, ()) if tags.get(_TIFF_PHOTOMETRIC) == _TIFF_RGB else ()
     return {3: "rgb48", 4: "rgba64"}.get(len(bits)) if 16 in bits else None
 
 

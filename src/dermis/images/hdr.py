@@ -4,21 +4,39 @@ from __future__ import annotations
 
 import io
 import re
-from math import prod
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Bytes, Floats, Index
+from dermis.base.arrays import Bytes, Doubles, Floats, Index
+from dermis.base.errors import shorten
+from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_space
+from dermis.images.exr_layers import ExrLayer, choose_layer
+from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
-_READABLE_CHANNELS = ("RGBA", "RGB", "Y")
 _CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # by number of channels
 _MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
+_ASPECT_TOLERANCE = 1e-3
+_MAX_NAME = 60  # characters
+Slices = tuple[slice, ...]
 RADIANCE_SIGNATURE = b"#?"
+_XYZ_FORMAT = b"FORMAT=32-bit_rle_xyze"
+_RADIANCE_FORMATS = {b"FORMAT=32-bit_rle_rgbe", _XYZ_FORMAT}
+_XYZ_PRIMARIES = np.array([1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3])
+_RADIANCE_VALUES = {
+    "EXPOSURE": [1.0],
+    "COLORCORR": [1.0] * 3,
+    "PRIMARIES": [0.0] * 8,
+    "GAMMA": [1.0],
+    "PIXASPECT": [1.0],
+}
+"""Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
 _MAX_HEADER = 1 << 16
 _STRIP_PIXELS = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
@@ -27,65 +45,115 @@ _CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
 
 
 def decode_exr(data: bytes) -> Floats:
-    """Decode an OpenEXR file with channels Y, RGB or RGBA to an array (H, W, 1, 3 or 4).
+    """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4), 0 outside its data window.
 
-    Raises ValueError for a file with other channels, and for one that is too large or damaged.
+    Raises ValueError for a file without a layer of R, G, B or Y, and for one that is too large or damaged.
     """
     import OpenEXR
 
-    names = _check_exr_header(_exr_header(data))
-    file = OpenEXR.File(io.BytesIO(data), separate_channels=True)
-    if not file.parts:
+    layer, _ = _checked_layer(_open_exr_header(data))
+    parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
+    if len(parts) <= layer.part:
         raise ValueError("its pixels are truncated or damaged")
-    channels = file.channels()
-    image = np.empty((*channels[names[0]].pixels.shape, len(names)), np.float32)
-    for index, name in enumerate(names):
-        image[..., index] = channels[name].pixels
+    part = parts[layer.part]
+    (width, height), stored, placed = _windows(part.header)
+    image = np.zeros((height, width, len(layer.channels)), np.float32)
+    for index, name in enumerate(layer.channels):
+        image[(*placed, index)] = part.channels[name].pixels[stored]
     return image
 
 
-def exr_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of an OpenEXR file after checking its header; pixels are not decoded."""
-    file = _exr_header(data)
-    _check_exr_header(file)
-    return _window_size(file.parts[0].header["dataWindow"])
+def exr_header(data: bytes) -> PictureHeader:
+    """Return what the header of an OpenEXR file says about its picture; pixels are not decoded."""
+    file = _open_exr_header(data)
+    layer, layer_note = _checked_layer(file)
+    header = file.parts[layer.part].header
+    size, stored, placed = _windows(header)
+    space, colour_note = _exr_colour_space(header)
+    notes = [layer_note] if layer_note else []
+    if not _covers(placed, size):
+        notes.append("its data window is a part of its display window, and the rest is black")
+    if not _covers(stored, _window_size(header["dataWindow"])):
+        notes.append("its pixels outside its display window are left out")
+    if abs((aspect := header.get("pixelAspectRatio", 1.0)) - 1.0) > _ASPECT_TOLERANCE:
+        notes.append(f"its pixel aspect of {aspect:g} is not used")
+    is_grey = len(layer.channels) == 1
+    return PictureHeader(size, space, notes=tuple(notes), colour_note=colour_note, is_grey=is_grey)
 
 
-def _exr_header(data: bytes) -> Any:
+def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
+    """Return the colour space of a part of an OpenEXR file, and a note unless that is linear Rec. 709."""
+    import OpenEXR
+
+    primaries, name = header.get("chromaticities"), header.get("colorInteropID", "")
+    if primaries is None and name not in ("", "data", "unknown"):
+        primaries = OpenEXR.colorInteropIDToChromaticities(name)
+        if primaries is None:
+            shown = shorten("".join(one for one in name if one.isprintable()), _MAX_NAME)
+            return (
+                SRGB,
+                f"its colour space, {shown}, is unknown, and its colours are taken as linear Rec. 709",
+            )
+    space = gamma_space("", None, primaries)
+    return space, None if space.is_default else "its colours are converted from its primaries to Rec. 709"
+
+
+def _open_exr_header(data: bytes) -> Any:
     import OpenEXR
 
     return OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True)
 
 
-def _check_exr_header(file: Any) -> str:
-    """Check the header of an OpenEXR file, and return the channels to decode: "RGBA", "RGB" or "Y".
+def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
+    """Check the header of an OpenEXR file, and return the layer to decode, with a note if there are several.
 
     The size of all channels of all parts is limited, because the library decodes all of them.
 
     file : OpenEXR.File that was opened with header_only
     """
-    samples = 0
+    samples, channel_count = 0, 0
     for part in file.parts:
         width, height = _window_size(part.header["dataWindow"])
         check_size(width, height)
         if "deep" in str(part.header.get("type", "")).lower():
-            raise ValueError("it has deep samples, not pixels")
+            raise UnsupportedError("it has deep samples, not pixels")
         tiles = part.header.get("tiles")
         if tiles is not None:
             check_size(tiles.xSize, tiles.ySize)
         samples += width * height * len(part.header["channels"])
+        channel_count += len(part.header["channels"])
     if not file.parts:
         raise ValueError("its header is truncated or damaged")
     if samples > _MAX_SAMPLES:
         raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
-    channels = {channel.name: channel for channel in file.parts[0].header["channels"]}
-    names = next((names for names in _READABLE_CHANNELS if set(names) <= channels.keys()), None)
-    if names is None or len(channels) > _MAX_CHANNELS:
-        listed = ", ".join(sorted(channels)[:20])
-        raise ValueError(f"it has channels {listed}, not R, G, B or Y")
-    if any((channels[name].xSampling, channels[name].ySampling) != (1, 1) for name in names):
-        raise ValueError("its channels have different sizes")
-    return names
+    if channel_count > _MAX_CHANNELS:
+        raise UnsupportedError(f"it has {channel_count} channels")
+    channels = [{one.name: one for one in part.header["channels"]} for part in file.parts]
+    layer, note = choose_layer(
+        [(part.name() or "", list(names)) for part, names in zip(file.parts, channels, strict=True)]
+    )
+    chosen = [channels[layer.part][name] for name in layer.channels]
+    if any((one.xSampling, one.ySampling) != (1, 1) for one in chosen):
+        raise UnsupportedError("its channels have different sizes")
+    check_size(*_window_size(file.parts[layer.part].header["displayWindow"]))
+    return layer, note
+
+
+def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
+    """Return the size of the display window, and rows and columns of the data window inside it.
+
+    They are relative to the data window, then to the display window.
+    """
+    data, shown = (np.array(header[name], np.int64)[:, ::-1] for name in ("dataWindow", "displayWindow"))
+    low, high = np.maximum(data[0], shown[0]), np.minimum(data[1], shown[1]) + 1
+    if not (low < high).all():
+        raise UnsupportedError("its data window is outside its display window")
+    stored, placed = (tuple(map(slice, low - one[0], high - one[0])) for one in (data, shown))
+    return _window_size(header["displayWindow"]), stored, placed
+
+
+def _covers(part: Slices, size: tuple[int, int]) -> bool:
+    return tuple((one.start, one.stop) for one in part) == ((0, size[1]), (0, size[0]))
 
 
 def _window_size(window: Any) -> tuple[int, int]:
@@ -108,15 +176,34 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
     return file.getvalue()
 
 
-def decode_radiance(data: bytes) -> Floats:
-    """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the EXPOSURE in its header.
+@dataclass(frozen=True)
+class _RadianceHeader:
+    """Header of a Radiance .hdr file.
 
-    Rows must be top-down and pixels left to right, as programs write them. FFmpeg is not used because it
-    accepts truncated files.
-
-    Raises ValueError for a file that is truncated, damaged, or in another order or colour space.
+    axes : directions of the scanlines and of the pixels in them, such as "-Y" and "+X"
+    lengths : number of scanlines, and of pixels in each
+    values : numbers by name, such as EXPOSURE; those that may be repeated are multiplied
+    is_xyz : whether the colours are CIE XYZ
+    offset : byte at which the pixels start
     """
-    height, width, exposure, offset = _radiance_header(data)
+
+    axes: tuple[str, str]
+    lengths: tuple[int, int]
+    values: Mapping[str, Doubles]
+    is_xyz: bool
+    offset: int
+
+
+def decode_radiance(data: bytes) -> Floats:
+    """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the exposures in its header.
+
+    FFmpeg is not used because it accepts truncated files.
+
+    Raises ValueError for a file that is truncated or damaged.
+    """
+    header = _radiance_header(data)
+    (height, width), offset = header.lengths, header.offset
+    exposure, correction = header.values["EXPOSURE"], header.values["COLORCORR"]
     compressed = data[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
     if len(data) - offset < height * (4 if compressed else 4 * width):
         raise ValueError("it is truncated")
@@ -127,31 +214,51 @@ def decode_radiance(data: bytes) -> Floats:
         decode = _decode_runs if compressed else _decode_flat
         rgbe, offset = decode(data, offset, len(strip), width)
         # A mantissa byte is in units of 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black as well.
-        scale = np.ldexp(np.float32(1 / exposure), rgbe[..., 3].astype(np.int32) - 136)
+        scale = np.ldexp(np.float32(1 / exposure[0]), rgbe[..., 3].astype(np.int32) - 136)
         np.multiply(rgbe[..., :3], scale[..., None], out=strip)
-    return radiance
+    if (correction != 1.0).any():
+        radiance /= correction.astype(np.float32)
+    rows_first = radiance if "Y" in header.axes[0] else radiance.swapaxes(0, 1)
+    return rows_first[:: -1 if "+Y" in header.axes else 1, :: -1 if "-X" in header.axes else 1]
 
 
-def radiance_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of a Radiance .hdr file from its header."""
-    height, width, _, _ = _radiance_header(data)
-    return width, height
+def radiance_header(data: bytes) -> PictureHeader:
+    """Return what the header of a Radiance .hdr file says."""
+    header = _radiance_header(data)
+    rows_first = "Y" in header.axes[0]
+    size = header.lengths[::-1] if rows_first else header.lengths
+    primaries = _XYZ_PRIMARIES if header.is_xyz else header.values["PRIMARIES"]
+    space = gamma_space("", None, primaries) if np.any(primaries) else SRGB
+    notes = [
+        f"its {name} of {float(header.values[name][0]):g} is not used"
+        for name in ("GAMMA", "PIXASPECT")
+        if header.values[name][0] != 1.0
+    ]
+    colour_note = None if space.is_default else "its colours are converted from its primaries to Rec. 709"
+    return PictureHeader(size, space, notes=tuple(notes), colour_note=colour_note)
 
 
-def _radiance_header(data: bytes) -> tuple[int, int, float, int]:
-    """Parse the header of a Radiance .hdr file: height, width, exposure, and byte offset of the pixels."""
-    found = re.search(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n", data[:_MAX_HEADER])
-    if not found:
+def _radiance_header(data: bytes) -> _RadianceHeader:
+    found = re.search(rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", data[:_MAX_HEADER])
+    if not found or found[1][1:] == found[3][1:]:
         raise ValueError("its header has no size of the form -Y height +X width")
     lines = data[: found.start()].splitlines()
-    if b"FORMAT=32-bit_rle_rgbe" not in lines:
-        raise ValueError("its header does not say FORMAT=32-bit_rle_rgbe")
-    exposure = prod(float(line[9:]) for line in lines if line.startswith(b"EXPOSURE="))
-    if not 1e-30 < exposure < 1e30:
-        raise ValueError(f"its EXPOSURE is {exposure:g}")
-    height, width = int(found[1]), int(found[2])
-    check_size(width, height)
-    return height, width, exposure, found.end()
+    formats = {line for line in lines if line.startswith(b"FORMAT=")}
+    if len(formats) != 1 or not formats <= _RADIANCE_FORMATS:
+        raise ValueError("its header does not say FORMAT=32-bit_rle_rgbe or 32-bit_rle_xyze")
+    values = {}
+    for name, default in _RADIANCE_VALUES.items():
+        start = f"{name}=".encode()
+        rows = [
+            [float(one) for one in line[len(start) :].split()] for line in lines if line.startswith(start)
+        ]
+        values[name] = np.prod([row for row in rows if len(row) == len(default)] or [default], axis=0)
+    for name in ("EXPOSURE", "COLORCORR"):
+        if not ((values[name] > 1e-30) & (values[name] < 1e30)).all():
+            raise ValueError(f"its {name} is {' '.join(f'{one:g}' for one in values[name])}")
+    axes, lengths = (found[1].decode(), found[3].decode()), (int(found[2]), int(found[4]))
+    check_size(*lengths)
+    return _RadianceHeader(axes, lengths, values, _XYZ_FORMAT in formats, found.end())
 
 
 def _scanline_marker(width: int) -> bytes:

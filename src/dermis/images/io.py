@@ -1,4 +1,4 @@
-"""Reading and writing of picture files: PNG, JPEG, TIFF, OpenEXR and Radiance."""
+"""Reading and writing of picture files: PNG, JPEG, TIFF, WebP, AVIF, HEIC, OpenEXR and Radiance."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,24 +14,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base import atomic_write
-from dermis.base.arrays import Numbers
-from dermis.base.errors import DermisError, error_text, refuse
+from dermis.base.arrays import Floats, Numbers
+from dermis.base.errors import DermisError, error_text, notify, refuse
 from dermis.base.reading import read_file
-from dermis.images.codecs import PILLOW_SIGNATURES, Pixels, decode_with_pillow, encode_png, pillow_size
+from dermis.images.codecs import Pixels, decode_with_pillow, encode_png
 from dermis.images.colour import encode_srgb8
+from dermis.images.colour_spaces import SRGB, ColourSpace
 from dermis.images.hdr import (
     EXR_SIGNATURE,
     RADIANCE_SIGNATURE,
     decode_exr,
     decode_radiance,
-    exr_size,
-    radiance_size,
+    exr_header,
+    radiance_header,
 )
+from dermis.images.header import PictureHeader, UnsupportedError
+from dermis.images.opening import picture_format, pillow_header
 from dermis.images.sizes import MAX_FILE_BYTES, TooLargeError
 
 OUTPUT_SUFFIXES = (".png", ".exr")
 T = TypeVar("T")
-_EXPECTED_PICTURE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
+_EXPECTED_PICTURE = "a picture (PNG, JPEG, TIFF, WebP, AVIF, HEIC, EXR or HDR)"
+
+
+_OTHER_FORMATS = {
+    EXR_SIGNATURE: "OpenEXR inside another file",
+    b"GIF8": "GIF",
+    b"BM": "BMP",
+    b"8BPS": "a Photoshop document",
+    b"\xabKTX": "KTX",
+    b"DDS ": "DDS",
+    b"\xff\x0a": "JPEG XL",
+    b"\0\0\0\x0cJXL ": "JPEG XL",
+    b"\0\0\0\x0cjP  ": "JPEG 2000",
+}
+"""Formats that are not read, by their first bytes."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +56,7 @@ class EmbeddedPicture:
     """Picture file that is part of another file, such as a .glb file.
 
     name : for error messages
-    data : bytes of the PNG, JPEG or TIFF file
+    data : bytes of the picture file, in any format but OpenEXR
     """
 
     name: str
@@ -50,18 +68,82 @@ class EmbeddedPicture:
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the pixels (H, W, C) of a picture file as stored, row 0 at the top.
+    """Return the pixels (H, W, C) of a picture file of numbers as stored, row 0 at the top.
 
-    C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA. Colour profiles and camera orientation
-    are ignored, as usual for textures.
+    C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
+    camera orientation are not used. Notes name other properties that are not used.
 
-    path : PNG, JPEG or TIFF, returned as uint8 or uint16 (a float TIFF as float32), or EXR or HDR, returned
-        as linear float32; the format is recognised by content, not by suffix
+    path : PNG, JPEG, TIFF, WebP, AVIF or HEIC, returned as uint8 or uint16 (a float TIFF as float32), or EXR
+        or HDR, returned as linear float32; the format is recognised by content, not by suffix
 
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
-    image: Pixels = _apply_codec(path, read_bytes(path), decode_exr, decode_radiance, decode_with_pillow)
-    return image[..., None] if image.ndim == 2 else image
+    data = read_bytes(path)
+    _note(path, _header(path, data), colours=False, upright=False)
+    return _pixels(path, data, convert_tables=False)
+
+
+def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
+    """Return the pixels (H, W, C) of a picture of colours as `read_image`, and their colour space.
+
+    The colour space is that of the file's profile or primaries. Pictures inside other files are sRGB or
+    linear Rec. 709, as glTF demands.
+
+    upright : turn the picture as its EXIF says, as for photographs
+
+    Raises DermisError as `read_image`.
+    """
+    data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
+    header = _header(path, data)
+    _note(path, header, colours=True, upright=upright)
+    image = _pixels(path, data, convert_tables=not embedded)
+    return _turned(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
+
+
+def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
+    """Issue the note of `read_image` or `read_colours` for a picture that is in a cache.
+
+    colours : whether its pixels are colours, to which profiles apply
+    """
+    _note(path, _header(path, read_bytes(path)), colours, upright=False)
+
+
+def _note(path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bool, upright: bool) -> None:
+    notes = [*header.notes, *["it is grey, without colours"] * (colours and header.is_grey)]
+    if colours and header.colour_note:
+        embedded = isinstance(path, EmbeddedPicture)
+        notes.append("its colour profile is not used, as glTF demands" if embedded else header.colour_note)
+    if header.orientation != 1:
+        turned = "it is turned upright as its EXIF says"
+        notes.append(turned if upright else "it is not turned as its EXIF says, as usual for textures")
+    if notes:
+        notify(f"{path}: {'; '.join(notes)}")
+
+
+def mended_radiance(name: object, radiance: Floats) -> Floats:
+    """Return radiance (H, W, C) without infinite, NaN and negative values, with a note of their number.
+
+    Infinite values become the largest finite one, other values 0.
+
+    name : of the file, for messages
+
+    Raises DermisError if most pixels are not finite, or no value is above 0.
+    """
+    finite = np.isfinite(radiance)
+    if finite.all() and radiance.min() >= 0.0 and radiance.max() > 0.0:
+        return radiance
+    texels = radiance[..., 0].size
+    odd = int((~finite.all(axis=-1)).sum())
+    highest = float(radiance.max(where=finite, initial=0.0))
+    if 2 * odd > texels or highest <= 0.0:
+        actual = f"{odd:,} of its {texels:,} pixels are not finite, and the largest value is {highest:g}"
+        refuse(name, "a picture of radiance above 0", actual, "Export it again")
+    negative = int(((radiance < 0.0) & finite).any(axis=-1).sum())
+    faults = {"infinite or NaN": odd, "negative": negative}
+    counts = " and ".join(f"{count:,} {kind}" for kind, count in faults.items() if count)
+    result = f"infinite values become {highest:g}, the largest finite one, others 0"
+    notify(f"{name}: {counts} of its {texels:,} pixels; {result if odd else 'they become 0'}")
+    return np.maximum(np.nan_to_num(radiance, nan=0.0, posinf=highest, neginf=0.0), np.float32(0.0))
 
 
 def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
@@ -69,8 +151,25 @@ def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
 
     Raises DermisError when the file is missing, not a picture or too large.
     """
-    size: tuple[int, int] = _apply_codec(path, read_bytes(path), exr_size, radiance_size, pillow_size)
-    return size
+    return _header(path, read_bytes(path)).size
+
+
+def _header(path: str | Path | EmbeddedPicture, data: bytes) -> PictureHeader:
+    header: PictureHeader = _apply_codec(path, data, exr_header, radiance_header, pillow_header)
+    return header
+
+
+def _pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: bool) -> Pixels:
+    pillow = partial(decode_with_pillow, convert_tables=convert_tables)
+    image: Pixels = _apply_codec(path, data, decode_exr, decode_radiance, pillow)
+    return image
+
+
+def _turned(image: Pixels, orientation: int) -> Pixels:
+    """Return a picture (H, W, C) turned and mirrored by EXIF's number of its orientation, 1 to 8."""
+    upright = image.swapaxes(0, 1) if orientation >= 5 else image
+    upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright
+    return np.ascontiguousarray(upright[:, ::-1] if orientation in (2, 3, 6, 7) else upright)
 
 
 def _apply_codec(
@@ -82,18 +181,23 @@ def _apply_codec(
 ) -> T:
     """Call the function for the format of a picture file, which its first bytes determine.
 
-    exr, radiance, pillow : functions of the file's bytes, for OpenEXR, for .hdr, and for PNG, JPEG and TIFF
+    exr, radiance, pillow : functions of the file's bytes, for OpenEXR, for .hdr, and for other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
-    kinds = {EXR_SIGNATURE: exr, RADIANCE_SIGNATURE: radiance} | dict.fromkeys(PILLOW_SIGNATURES, pillow)
-    codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
+    codec = pillow if picture_format(data) else None
+    for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
+        codec = other if data.startswith(start) else codec
     if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
-        refuse(path, _EXPECTED_PICTURE, "its first bytes match none of these formats", "Convert it to PNG")
+        other = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
+        actual = f"it is {other}" if other else "its first bytes match none of these formats"
+        refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
     try:
         return codec(data)
     except TooLargeError as fault:
         refuse(path, "a picture of at most 8192 x 8192 pixels", str(fault), "Resize it")
+    except UnsupportedError as fault:
+        refuse(path, _EXPECTED_PICTURE, str(fault), "Convert it to PNG, or to EXR if it is linear")
     except DermisError as fault:  # a package is missing
         raise DermisError(f"{path}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data

@@ -18,9 +18,16 @@ from dermis.apps.inverse.fitting.inputs import Photograph, fit_subject, read_pho
 from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_normal_equations, squared_residual
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
-from dermis.apps.inverse.fitting.solve import ROBUST_LIMIT, FitProblem, fit_uncertainty, light_tint, solve_fit
+from dermis.apps.inverse.fitting.solve import (
+    ROBUST_LIMIT,
+    FitProblem,
+    block_residual,
+    fit_uncertainty,
+    light_tint,
+    solve_fit,
+)
 from dermis.apps.inverse.fitting.unknowns import FitPoint, prior_point, tangents
-from dermis.base.errors import format_value, refuse
+from dermis.base.errors import format_value, notify, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
 from dermis.human.skin.painted import skin_colour_table
@@ -38,6 +45,8 @@ of the coarse search are 35 degrees apart."""
 DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
 _MIN_PIXELS = 200
+_MAX_BLOCK_RESIDUAL = 0.1
+"""Largest residual of blocks of a picture that shows the head, see docs/fit.md [-]."""
 WhitePoint = Sequence[float] | Literal["specular"]
 
 
@@ -159,7 +168,8 @@ def fit(
     Parameters
     ----------
     photo : str, Path or array_like
-        File (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear.
+        File (JPEG, HEIC, PNG, TIFF, WebP, AVIF, EXR or HDR), which is turned by its EXIF and converted by its
+        colour profile; or pixels (h, w, 3): bytes in sRGB, floats linear.
     head : Scene, Head, Human, str or Path
         A scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`.
     camera : Camera, str, Path or None
@@ -228,6 +238,7 @@ def fit(
         scene = frames.lit_scene(state.point, state.strengths)
         picture = frames.picture(scene) * scale * light_tint(state.point)
     relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
+    note_residual(photo if isinstance(photo, str | Path) else "photo", block_residual(problem, state))
     return FitResult(
         subject,
         state.point,
@@ -243,6 +254,20 @@ def fit(
         frames.frame_count,
         time.perf_counter() - started,
     )
+
+
+def note_residual(photo: object, residual: float) -> None:
+    """Issue a note if the residual of a fit is so large that the picture does not show the head.
+
+    photo : its name
+    residual : median relative residual of blocks of the picture [-]
+    """
+    if residual > _MAX_BLOCK_RESIDUAL:
+        notify(
+            f"{photo}: the fit differs from it by {100 * residual:.0f} % (median of blocks); 1 % is usual, "
+            "up to 10 % for the shape of another person. It probably does not show the head in this place, "
+            "and the results mean nothing: check the camera and that it is upright, or use landmarks"
+        )
 
 
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from dermis.base.errors import format_value, refuse
+from dermis.base.errors import format_value, notify, refuse
 from dermis.human.person import Human
 from dermis.human.skin.painted import PaintedMaps
-from dermis.images.colour import decode_srgb_levels
-from dermis.images.io import EmbeddedPicture, read_image
+from dermis.images.colour_spaces import SRGB
+from dermis.images.io import EmbeddedPicture, mended_radiance, read_colours
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
@@ -34,7 +34,7 @@ class Photograph:
     """Photograph in linear light, at full or reduced size.
 
     linear : (h, w, 3) linear Rec. 709 as in the file, including exposure and white balance
-    unclipped : (h, w) fraction of each pixel's area in which no channel is clipped
+    unclipped : (h, w) fraction of each pixel's area that is opaque, and in which no channel is clipped
     """
 
     linear: Floats
@@ -59,27 +59,35 @@ class Photograph:
 def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
     """Read a photograph from a file or an array, and convert it to linear light.
 
-    source : file (PNG, JPEG or TIFF in sRGB; EXR and HDR linear), or (h, w, 3) bytes in sRGB, or floats in
-        linear Rec. 709
+    source : file, which is turned by its EXIF and converted by its colour profile; or (h, w, 3) bytes in
+        sRGB, or floats in linear Rec. 709
 
-    Raises DermisError if the source is not a colour picture.
+    Raises DermisError if the source is not a picture.
     """
-    image = read_image(source) if isinstance(source, str | Path | EmbeddedPicture) else np.asarray(source)
-    name = source if isinstance(source, str | Path | EmbeddedPicture) else "photo"
-    if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _MIN_SIDE:
-        expected = f"a colour picture (h, w, 3) of at least {_MIN_SIDE} pixels a side"
+    name: object = "photo"
+    space = SRGB
+    if isinstance(source, str | Path | EmbeddedPicture):
+        name = source
+        image, space = read_colours(source, upright=True)
+    else:
+        image = np.asarray(source)
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_SIDE:
+        expected = f"a picture (h, w, 3) of at least {_MIN_SIDE} pixels a side"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
-    image = image[..., :3]
-    if image.dtype.kind == "f":
-        if not np.isfinite(image).all() or image.min() < 0.0 or image.max() <= 0.0:
-            refuse(name, "radiance of 0 or more", "some is negative or not finite", "Export it again")
-        return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
-    levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
-    max_level = np.iinfo(levels.dtype).max
-    unclipped = (levels.max(axis=2) < _CLIP_LEVEL * max_level).astype(np.float64)
-    return Photograph(decode_srgb_levels(levels).astype(np.float64), unclipped)
+    is_linear = image.dtype.kind == "f"
+    full = 1.0 if is_linear else float(np.iinfo(image.dtype.str).max)
+    usable = np.ones(image.shape[:2], bool)
+    if image.shape[2] == 4 and (opaque := image[..., 3] >= full).any() and not opaque.all():
+        notify(f"{name}: its {int((~opaque).sum()):,} transparent pixels are not fitted")
+        usable = opaque
+    colours = image[..., :3]
+    if is_linear:
+        colours = mended_radiance(name, colours)
+    else:
+        usable &= colours.max(axis=2) < _CLIP_LEVEL * full
+    return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
 def _area_average(image: Floats, size: tuple[int, int]) -> Floats:

@@ -259,6 +259,17 @@ def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -
     return Uncertainty(sd_by_name, undetermined, correlated, tuple(map(float, singular_values)))
 
 
+def block_residual(problem: FitProblem, state: FitState) -> float:
+    """Return the median relative residual of blocks of the picture, which hardly depends on noise [-]."""
+    block = _pixel_blocks(problem.frames)
+    residual, target = (
+        np.stack([np.bincount(block, column) for column in values.T])
+        for values in (state.residual, problem.target)
+    )
+    lit = target > 0.0
+    return float(np.median(np.abs(residual[lit]) / target[lit]))
+
+
 def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:
     """Return the index of the block of the picture that contains each masked pixel (p,)."""
     rows, columns = np.nonzero(frames.mask)

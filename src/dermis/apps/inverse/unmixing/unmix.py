@@ -214,7 +214,7 @@ def unmix(
     Parameters
     ----------
     picture : str, Path, EmbeddedPicture or array_like
-        File (PNG or JPEG in sRGB, EXR linear), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
+        File (PNG, JPEG, HEIC, EXR and others), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
@@ -256,7 +256,7 @@ def unmix(
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
     if isinstance(picture, str | Path | EmbeddedPicture):
-        colours = colour_map(picture)
+        colours = colour_map(picture, upright=True)
     else:
         colours = _checked_colours(picture)
 

@@ -1,0 +1,200 @@
+"""Colour spaces that picture files state, and conversion of their pixels to linear Rec. 709."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Floats, Numbers
+from dermis.base.errors import shorten
+from dermis.images.colour import decode_srgb, decode_srgb_levels
+
+_D65 = (0.3127, 0.329)
+_PRIMARIES: dict[str, tuple[float, ...]] = {
+    "Rec. 709": (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, *_D65),
+    "Rec. 601": (0.63, 0.34, 0.31, 0.595, 0.155, 0.07, *_D65),
+    "PAL": (0.64, 0.33, 0.29, 0.6, 0.15, 0.06, *_D65),
+    "Rec. 2020": (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, *_D65),
+    "Display P3": (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, *_D65),
+    "Adobe RGB": (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65),
+}
+"""Chromaticities x, y of red, green, blue and white."""
+_ADOBE_GAMMA = 563 / 256
+_CODED_PRIMARIES = {1: "Rec. 709", 2: "Rec. 709", 5: "PAL", 6: "Rec. 601", 9: "Rec. 2020", 12: "Display P3"}
+_CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14: None, 15: None}
+"""Gamma by the number of a transfer function in ITU-T H.273; None for sRGB and for the curves of video, which
+programs display as sRGB."""
+_HDR_CURVES = {16: "PQ", 18: "HLG"}
+_CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
+_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
+_SAME_SPACE = 5e-3  # largest difference of a matrix or a curve from those of sRGB
+_D50_XYZ = np.array([0.9642, 1.0, 0.8249])
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+_ICC_HEADER, _MAX_ICC_TAGS = 128, 200
+_MAX_NAME = 60  # characters
+
+
+@dataclass(frozen=True, eq=False)
+class ColourSpace:
+    """Colour space of a picture's pixels; the default is sRGB for levels and linear Rec. 709 for floats.
+
+    name : for notes
+    to_rec709 : (3, 3) matrix from linear colours to linear Rec. 709; None for the primaries of Rec. 709
+    curves : (3, 65536) linear values of evenly spaced levels by channel; None for the curve of sRGB
+    """
+
+    name: str = "sRGB"
+    to_rec709: Doubles | None = None
+    curves: Floats | None = None
+
+    @property
+    def is_default(self) -> bool:
+        """Return whether pixels are sRGB levels, or floats of linear Rec. 709."""
+        return self.to_rec709 is None and self.curves is None
+
+    def linear(self, pixels: Numbers) -> Floats:
+        """Convert pixels (..., 1, 3 or 4) to linear Rec. 709 (..., 3); grey is repeated, alpha is dropped.
+
+        Converted colours outside Rec. 709 are clipped: levels to 0 to 1, floats to 0 and above.
+        """
+        rgb = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels, 3, axis=-1)
+        if rgb.dtype.kind == "f":
+            linear = np.ascontiguousarray(rgb, np.float32)
+        elif self.curves is None:
+            linear = decode_srgb_levels(rgb)
+        else:
+            index = rgb * np.uint16(_MAX_LEVEL // np.iinfo(rgb.dtype).max)
+            linear = np.stack([self.curves[c][index[..., c]] for c in range(3)], axis=-1)
+        if self.to_rec709 is None:
+            return linear
+        converted = linear @ self.to_rec709.T.astype(np.float32)
+        return np.clip(converted, 0.0, None if rgb.dtype.kind == "f" else 1.0, out=converted)
+
+
+SRGB = ColourSpace()
+
+
+def adobe_rgb() -> ColourSpace:
+    """Return Adobe RGB (1998), which cameras state in EXIF without a profile."""
+    return _space("Adobe RGB", _to_rec709(_PRIMARIES["Adobe RGB"]), _LEVELS**_ADOBE_GAMMA)
+
+
+def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
+    """Return the colour space of code points of ITU-T H.273, as in AVIF, HEIC and PNG; None for unknown ones.
+
+    Raises ValueError for the transfer functions of HDR displays.
+    """
+    if transfer in _HDR_CURVES:
+        raise ValueError(f"its levels are coded for HDR displays ({_HDR_CURVES[transfer]})")
+    if primaries not in _CODED_PRIMARIES or transfer not in _CODED_GAMMAS:
+        return None
+    name, gamma = _CODED_PRIMARIES[primaries], _CODED_GAMMAS[transfer]
+    return gamma_space(name, gamma, _PRIMARIES[name])
+
+
+def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
+    """Return the colour space of a gamma, None for the curve of sRGB, and primaries, None for Rec. 709.
+
+    primaries : chromaticities x, y of red, green, blue and white
+
+    Raises ValueError for primaries that span no colours.
+    """
+    matrix = np.eye(3) if primaries is None else _to_rec709(primaries)
+    return _space(name, matrix, None if gamma is None else _LEVELS**gamma)
+
+
+def profile_name(icc: bytes) -> str:
+    """Return the printable name of an ICC profile; empty if it cannot be read."""
+    from PIL import ImageCms
+
+    try:
+        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc)))
+    except (OSError, ImageCms.PyCMSError):
+        return ""
+    return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_NAME)
+
+
+def profile_space(icc: bytes) -> ColourSpace | None:
+    """Return the colour space of an ICC profile of primaries and curves, or a grey curve; None for tables.
+
+    Such profiles are converted here at the full depth of the picture, because LittleCMS in Pillow has 8 bits.
+
+    Raises ValueError, ArithmeticError and struct.error for a damaged profile.
+    """
+    (count,) = struct.unpack_from(">I", icc, _ICC_HEADER)
+    rows = struct.iter_unpack(">4sII", icc[_ICC_HEADER + 4 :][: 12 * min(count, _MAX_ICC_TAGS)])
+    tags = {name: icc[offset : offset + size] for name, offset, size in rows}
+    kind, channels = icc[16:20], b"rgb"
+    if b"A2B0" in tags or {b"RGB ": b"rTRC", b"GRAY": b"kTRC"}.get(kind, b"") not in tags:
+        return None
+    if kind == b"GRAY":
+        return _space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
+    columns = [_fixed(tags[b"%cXYZ" % one], 3) for one in channels]
+    curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
+    to_rec709 = np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
+    return _space(profile_name(icc), to_rec709, np.array(curves))
+
+
+def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
+    """Return a colour space, in which parts equal to those of sRGB are None.
+
+    to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
+    """
+    if curves is not None:
+        same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SAME_SPACE)
+        curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
+    same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SAME_SPACE)
+    return ColourSpace(name, None if same else to_rec709, None if curves is None else np.float32(curves))
+
+
+def _to_rec709(primaries: Sequence[float]) -> Doubles:
+    """Return the matrix (3, 3) from linear RGB of other primaries to linear Rec. 709; white stays white."""
+    return np.asarray(np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ _xyz_of(primaries))
+
+
+def _xyz_of(primaries: Sequence[float]) -> Doubles:
+    """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to the white D50 of profiles by Bradford.
+
+    primaries : chromaticities x, y of red, green, blue and white
+    """
+    x, y = np.asarray(primaries, np.float64).reshape(4, 2).T
+    xyz = np.stack([x, y, 1.0 - x - y])
+    if not (np.isfinite(xyz).all() and y[3] > 0.0 and abs(np.linalg.det(xyz[:, :3])) > 1e-6):
+        raise ValueError("its primaries span no colours")
+    white = xyz[:, 3] / y[3]
+    adapted = _BRADFORD @ _D50_XYZ / (_BRADFORD @ white)
+    adaptation = np.linalg.inv(_BRADFORD) @ (adapted[:, None] * _BRADFORD)
+    return np.asarray(adaptation @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], white)))
+
+
+def _profile_curve(tag: bytes) -> Doubles:
+    """Return the linear values (65536,) of evenly spaced levels, from the tag of a curve in a profile."""
+    kind, (count,) = tag[:4], struct.unpack_from(">I", tag, 8)
+    if kind == b"curv" and count < 2:
+        gamma = struct.unpack_from(">H", tag, 12)[0] / 256.0 if count else 1.0
+        return np.asarray(_LEVELS**gamma)
+    if kind == b"curv":
+        values = np.frombuffer(tag, ">u2", count, 12) / _MAX_LEVEL
+        return np.asarray(np.interp(_LEVELS, np.linspace(0.0, 1.0, count), values))
+    if kind != b"para" or count >> 16 > 4:
+        raise ValueError("a curve is of an unknown kind")
+    function = count >> 16
+    numbers = _fixed(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
+    if function <= 2:  # constant up to -b / a
+        (g, a, b), offset = numbers[:3], sum(numbers[3:])
+        c, d, e, f = 0.0, -b / a, offset, offset
+    else:
+        g, a, b, c, d, e, f = (*numbers, 0.0, 0.0)[:7]
+    with np.errstate(all="ignore"):
+        power = np.maximum(a * _LEVELS + b, 0.0) ** g + e
+    curve = np.where(d <= _LEVELS, power, c * _LEVELS + f)
+    return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
+
+
+def _fixed(tag: bytes, count: int, offset: int = 8) -> list[float]:
+    """Return numbers of a tag of an ICC profile, in signed fixed point with 16 fractional bits."""
+    return [value / 65536.0 for value in struct.unpack_from(f">{count}i", tag, offset)]

@@ -1,0 +1,83 @@
+"""Layers of OpenEXR files: which channels of which part are the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from dermis.base.errors import shorten
+from dermis.images.header import UnsupportedError
+
+_CHANNEL_LETTERS = {"red": "R", "green": "G", "blue": "B", "alpha": "A"}
+_READABLE_CHANNELS = ("RGBA", "RGB", "Y")
+_MAIN_LAYERS = ("beauty", "combined", "composite", "image", "rgba", "rgb", "color", "colour", "c", "main")
+_MAX_NAME = 60  # characters
+_MAX_LISTED = 6
+
+
+@dataclass(frozen=True)
+class ExrLayer:
+    """Layer of an OpenEXR file with the channels of a picture.
+
+    part : index of its part
+    name : of the layer; in files of several parts with the name of its part; empty for plain R, G and B
+    channels : names of the channels of red, green, blue and, if there is one, alpha; or of grey
+    """
+
+    part: int
+    name: str
+    channels: tuple[str, ...]
+
+
+def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
+    """Return the layer of an OpenEXR file that is read, and a note if there are several with colours.
+
+    A layer without a name has precedence over one whose name means the whole picture, and that over others.
+
+    parts : name and channels of each part
+
+    Raises UnsupportedError for a file without such a layer, unless it has a single channel.
+    """
+    found = [layer for number, part in enumerate(parts) for layer in _layers(number, *part, len(parts) > 1)]
+    if found:
+        chosen = min(found, key=_rank)
+        colours = [_shown(layer.name) for layer in found if len(layer.channels) > 1]
+        if len(colours) < 2:
+            return chosen, None
+        listed = ", ".join(colours[:_MAX_LISTED]) + ", ..." * (len(colours) > _MAX_LISTED)
+        return chosen, f"of its layers, {listed}, only {_shown(chosen.name)} is read"
+    names = [name for _, channels in parts for name in channels]
+    if len(names) == 1:
+        return ExrLayer(0, "", (names[0],)), None
+    listed = ", ".join(map(_shown, names[:20]))
+    raise UnsupportedError(f"it has channels {listed}, and no layer with R, G and B or Y")
+
+
+def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> Iterator[ExrLayer]:
+    """Yield the layers of a part that are pictures: R, G, B in any case or in words, with or without A, or Y.
+
+    several : whether the file has several parts, and layers are named by them
+    """
+    groups: dict[str, dict[str, str]] = {}
+    for channel in channels:
+        layer, _, last = channel.rpartition(".")
+        groups.setdefault(layer, {}).setdefault(_CHANNEL_LETTERS.get(last.lower(), last.upper()), channel)
+    for layer, letters in groups.items():
+        names = next((names for names in _READABLE_CHANNELS if set(names) <= letters.keys()), None)
+        is_vector = names == "Y" and "X" in letters
+        if names == "Y" and {"RY", "BY"} & letters.keys():
+            raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
+        if names and not is_vector:
+            title = ".".join(filter(None, (part if several else "", layer)))
+            yield ExrLayer(number, title, tuple(letters[name] for name in names))
+
+
+def _rank(layer: ExrLayer) -> tuple[bool, int]:
+    """Return a key that sorts layers with colours before grey ones, and the picture before its parts."""
+    last = layer.name.rpartition(".")[2].lower()
+    by_name = 0 if not layer.name else 1 if last in _MAIN_LAYERS else 2
+    return len(layer.channels) == 1, by_name
+
+
+def _shown(name: str) -> str:
+    return shorten("".join(one for one in name if one.isprintable()), _MAX_NAME) or "the one without a name"

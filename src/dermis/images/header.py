@@ -1,0 +1,31 @@
+"""What the header of a picture file says about its pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dermis.images.colour_spaces import SRGB, ColourSpace
+
+
+class UnsupportedError(ValueError):
+    """Error for a valid picture with pixels that are not read."""
+
+
+@dataclass(frozen=True)
+class PictureHeader:
+    """Size and colour space of a picture file, and what is done with its other properties.
+
+    size : width and height of the stored picture [pixel]
+    colour_space : of the decoded pixels
+    orientation : EXIF's number of the turn or mirroring that shows the picture upright; 1 is none
+    notes : sentences about properties that are converted or not used
+    colour_note : sentence about the conversion of colours, for pictures whose pixels are colours
+    is_grey : whether the pixels have one colour channel
+    """
+
+    size: tuple[int, int]
+    colour_space: ColourSpace = SRGB
+    orientation: int = 1
+    notes: tuple[str, ...] = ()
+    colour_note: str | None = None
+    is_grey: bool = False

@@ -1,0 +1,253 @@
+"""Opening of PNG, JPEG, TIFF, WebP, AVIF and HEIC files with Pillow, and what their headers say."""
+
+from __future__ import annotations
+
+import io
+import struct
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from dermis.base.errors import refuse
+from dermis.base.extras import import_extra
+from dermis.base.reading import MALFORMED_DATA_ERRORS
+from dermis.images.colour_spaces import (
+    SRGB,
+    ColourSpace,
+    adobe_rgb,
+    coded_space,
+    gamma_space,
+    profile_name,
+    profile_space,
+)
+from dermis.images.header import PictureHeader, UnsupportedError
+from dermis.images.sizes import check_size
+
+if TYPE_CHECKING:
+    from PIL.Image import Exif, Image
+    from PIL.ImageCms import ImageCmsTransform
+
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_FORMATS = {PNG_SIGNATURE: "PNG", b"\xff\xd8\xff": "JPEG"} | dict.fromkeys(
+    (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "TIFF"
+)
+_BRANDS = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
+    (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs"), "HEIC"
+)
+"""Formats by brand of the container that AVIF and HEIC share."""
+_MAX_BRAND_BYTES = 64
+_PILLOW_LOCK = threading.Lock()
+_JPEG_SCAN = b"\xff\xda"
+_MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
+_GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
+_EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
+_ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
+_TIFF_SUBFILE, _TIFF_DNG_VERSION = 254, 50706
+_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # as PNG files state it
+
+
+def picture_format(data: bytes) -> str | None:
+    """Return the name of a picture's format by its first bytes; None if this module does not read it."""
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "WEBP"
+    if data[4:8] == b"ftyp":
+        end = min(int.from_bytes(data[:4]), _MAX_BRAND_BYTES)
+        brands = (data[start : start + 4] for start in range(8, end, 4))
+        return next((_BRANDS[brand] for brand in brands if brand in _BRANDS), None)
+    return next((name for start, name in _FORMATS.items() if data.startswith(start)), None)
+
+
+def open_picture(data: bytes) -> Image:
+    """Open a picture with Pillow after checking its header and its size; pixels are not decoded.
+
+    Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
+    DermisError if a package is missing.
+    """
+    import PIL.Image
+    from PIL import features
+
+    name = picture_format(data) or "PNG"
+    with _PILLOW_LOCK:  # Pillow's own limit is a global variable and differs
+        limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
+        try:
+            if name == "HEIC":
+                picture: Image = import_extra("pi_heif", "a HEIC picture").HeifImageFile(io.BytesIO(data))
+            elif name in ("WEBP", "AVIF") and not features.check(name.lower()):
+                refuse(
+                    f"a picture in {name}",
+                    "Pillow with this format",
+                    "it is built without",
+                    "Update it: pip install --upgrade pillow",
+                )
+            else:
+                picture = PIL.Image.open(io.BytesIO(data), formats=(name,))
+        except (PIL.UnidentifiedImageError, SyntaxError) as fault:
+            raise ValueError("its header cannot be read, or its kind of pixels is not supported") from fault
+        finally:
+            PIL.Image.MAX_IMAGE_PIXELS = limit
+    check_size(picture.width, picture.height)
+    tags = getattr(picture, "tag_v2", {})
+    if _TIFF_DNG_VERSION in tags or tags.get(_TIFF_SUBFILE, 0) & 1:
+        raise UnsupportedError("it is a camera's raw file, of which only a preview can be read")
+    scanned = data.count(_JPEG_SCAN) * picture.width * picture.height
+    if name == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
+        raise ValueError("it was stored in too many scans")
+    return picture
+
+
+def pillow_header(data: bytes) -> PictureHeader:
+    """Return what the header of a picture file says; pixels are not decoded.
+
+    Raises errors as `open_picture`.
+    """
+    picture = open_picture(data)
+    exif = _exif(picture)
+    orientation = exif.get(_EXIF_ORIENTATION, 1)
+    space, colour_note = _colour_space(data, picture, exif)
+    orientation = orientation if orientation in range(1, 9) else 1
+    notes = tuple(_notes(data, picture))
+    is_grey = picture.mode in (*_GREY_MODES, "F")
+    return PictureHeader((picture.width, picture.height), space, orientation, notes, colour_note, is_grey)
+
+
+def table_transform(picture: Image) -> ImageCmsTransform | None:
+    """Return the conversion to 8-bit sRGB by a picture's ICC profile, if that consists of tables; else None.
+
+    Profiles of tables are those of CMYK and of some scanners. The conversion is relative to white and black.
+    """
+    from PIL import ImageCms
+
+    icc, mode = picture.info.get("icc_profile"), picture.mode
+    if not icc or mode not in ("RGB", "RGBA", "CMYK") or _has_curves(icc):
+        return None
+    try:
+        return ImageCms.buildTransform(
+            ImageCms.ImageCmsProfile(io.BytesIO(icc)),
+            ImageCms.createProfile("sRGB"),
+            mode,
+            "RGB" if mode == "CMYK" else mode,
+            ImageCms.Intent.RELATIVE_COLORIMETRIC,
+            ImageCms.Flags.BLACKPOINTCOMPENSATION,
+        )
+    except (OSError, ImageCms.PyCMSError):  # damaged, or for another kind of pixels
+        return None
+
+
+def _has_curves(icc: bytes) -> bool:
+    try:
+        return profile_space(icc) is not None
+    except (ValueError, *MALFORMED_DATA_ERRORS):
+        return False
+
+
+def _exif(picture: Image) -> Exif:
+    import PIL.Image
+
+    if picture.format == "PNG" and "exif" not in picture.info:
+        return PIL.Image.Exif()  # Pillow would decode all pixels to search for it
+    try:
+        return picture.getexif()
+    except Exception:  # Pillow raises anything for damaged data
+        return PIL.Image.Exif()
+
+
+def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
+    """Return the colour space of the decoded pixels, and a note if it is not sRGB or not known."""
+    icc = picture.info.get("icc_profile")
+    coded = _code_points(data, picture)
+    if icc and not (coded and picture.format == "PNG"):
+        return _profiled_space(picture, icc)
+    if coded:
+        space = coded_space(*coded)
+        if space is None:
+            return SRGB, f"its colour code points {coded} are unknown, and its colours are taken as sRGB"
+    elif _is_adobe_rgb(exif):
+        space = adobe_rgb()
+    else:
+        space = _png_space(picture)
+    return space, None if space.is_default else _conversion_note(space.name)
+
+
+def _conversion_note(name: str) -> str:
+    return f"its colours are converted from {name} to sRGB"
+
+
+def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None]:
+    """Return the colour space of the decoded pixels of a picture with an ICC profile, and a note."""
+    name = profile_name(icc) or "a profile without a name"
+    is_grey = picture.mode in _GREY_MODES
+    try:
+        space = profile_space(icc)
+    except (ValueError, *MALFORMED_DATA_ERRORS):
+        return SRGB, "its colour profile is damaged, and its colours are taken as sRGB"
+    if space is None and table_transform(picture):
+        is_cmyk = picture.mode == "CMYK"  # noted where it is converted
+        return SRGB, None if is_cmyk else f"{_conversion_note(name)}, at 8 bits a channel"
+    if space is None or picture.mode in ("CMYK", "F") or (icc[16:20] == b"GRAY" and not is_grey):
+        return SRGB, f"its colour profile, {name}, does not fit its pixels, and is not used"
+    return space, None if space.is_default else _conversion_note(name)
+
+
+def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
+    """Return the numbers of primaries and transfer function that a PNG, AVIF or HEIC file states, or None."""
+    if picture.format == "PNG" and (start := data.find(b"cICP", 0, data.find(b"IDAT"))) > 0:
+        return data[start + 4], data[start + 5]
+    if picture.format in ("AVIF", "HEIF") and (start := data.find(b"colrnclx")) > 0:
+        primaries, transfer = struct.unpack_from(">HH", data, start + 8)
+        return primaries, transfer
+    return None
+
+
+def _is_adobe_rgb(exif: Exif) -> bool:
+    """Return whether a camera states Adobe RGB in EXIF, which most cameras do without a profile."""
+    try:
+        file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
+        return (
+            file_kind == _ADOBE_RGB_FILE or exif.get_ifd(_EXIF_IFD).get(_EXIF_COLOURS) == _ADOBE_RGB_COLOURS
+        )
+    except Exception:  # Pillow raises anything for damaged data
+        return False
+
+
+def _png_space(picture: Image) -> ColourSpace:
+    """Return the colour space by the gamma and chromaticities in a PNG file; sRGB for other files."""
+    gamma, corners = picture.info.get("gamma"), picture.info.get("chromaticity")
+    if picture.format != "PNG" or "srgb" in picture.info or not gamma:
+        return SRGB
+    is_srgb = abs(gamma - _SRGB_GAMMA) < _GAMMA_TOLERANCE
+    primaries = (*corners[2:], *corners[:2]) if corners else None
+    return gamma_space(f"gamma {gamma:.3g}", None if is_srgb else 1.0 / gamma, primaries)
+
+
+def _notes(data: bytes, picture: Image) -> Iterator[str]:
+    """Yield sentences about properties that are converted or not used."""
+    if picture.mode == "CMYK":
+        profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
+        how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"
+        yield f"its CMYK is converted to sRGB {how}"
+    if (bits := _bits(data, picture)) > 8:
+        yield f"its {bits} bits a channel are reduced to 8"
+    if picture.info.get("original_orientation", 1) not in (None, 1):
+        yield "it is turned upright by its EXIF"
+    if _has_several(picture):
+        yield "it has several pictures, and only the first is read"
+
+
+def _bits(data: bytes, picture: Image) -> int:
+    """Return the stored bits per channel of AVIF and HEIC, and of TIFF in CMYK; 8 for other files."""
+    if picture.format == "AVIF" and (start := data.find(b"av1C")) > 0 and data[start + 6] & 0x40:
+        return 12 if data[start + 6] & 0x20 else 10
+    if picture.mode == "CMYK":
+        return max(getattr(picture, "tag_v2", {}).get(258, (8,)))
+    return int(picture.info.get("bit_depth", 8))
+
+
+def _has_several(picture: Image) -> bool:
+    """Return whether a file has further pictures: frames, pages, or the gain map of a phone's photograph."""
+    if picture.format != "TIFF":
+        return bool(getattr(picture, "is_animated", False))
+    try:
+        picture.seek(1)
+    except (EOFError, OSError, ValueError, SyntaxError, *MALFORMED_DATA_ERRORS):
+        return False
+    return True
