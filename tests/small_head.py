@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from dermis.mesh.primitives import uv_sphere
@@ -17,6 +18,11 @@ def obj_text() -> str:
     uv = [f"vt {u:.6g} {1 - v:.6g}" for u, v in ball.uv]
     faces = [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in ball.triangles + 1]
     return "\n".join([*places, *uv, "usemtl skin", *faces, ""])
+
+
+def without_colour_note(stderr: str) -> str:
+    """Return what a command printed without the note that the small head has no colour."""
+    return re.sub(r"(?m)^note: .*: its skin has no colour .*\n", "", stderr)
 
 
 def write_head(path: Path) -> Path:

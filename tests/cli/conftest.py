@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from small_head import obj_text, write_head
+from small_head import obj_text, without_colour_note, write_head
 
 from dermis.images.io import write_exr, write_png
 
@@ -29,7 +29,10 @@ FORM = re.compile(r"dermis: (?P<culprit>.+?): expected .+, but .+\. \S.+[.?]\n")
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """Return a function that runs the command with the given arguments; it must end with an exit status."""
+    """Return a function that runs the command with the given arguments; it must end with an exit status.
+
+    The note that a head has no colour, as most heads of tests, is left out of stderr.
+    """
     from dermis.cli import main
 
     def call(*words: object) -> Outcome:
@@ -39,7 +42,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
             main()
         out, err = capfd.readouterr()
         assert isinstance(ended.value.code, int)
-        return Outcome(ended.value.code, out, err)
+        return Outcome(ended.value.code, out, without_colour_note(err))
 
     return call
 
@@ -147,7 +150,7 @@ def refused(
         after = {path: path.stat().st_mtime_ns for path in (*inputs.iterdir(), *tmp_path.iterdir())}
         assert (ended.code, ended.stdout, after) == (2, "", before)
         assert "Traceback" not in ended.stderr
-        message = FORM.fullmatch(re.sub(r"(?m)^note: .*\n", "", ended.stderr))
+        message = FORM.fullmatch(ended.stderr)
         assert message, ended.stderr
         return message
 

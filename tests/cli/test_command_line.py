@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from small_head import without_colour_note
 
 from dermis.base.citations import parse_bibtex
 from dermis.cli.options import option_name
@@ -50,7 +51,7 @@ def test_a_process_renders(folder: Path) -> None:
         "--json",
         folder=folder,
     )
-    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (ended.returncode, without_colour_note(ended.stderr)) == (0, "")
     assert json.loads(ended.stdout)["image"] == "a.png"
     assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
 

@@ -15,6 +15,7 @@ from typing import Any
 import child_process
 import pytest
 from rigged_head import write_rigged_head, write_take
+from small_head import without_colour_note
 
 from dermis.apps.viewer.state import ViewerState
 from dermis.scene import Scene
@@ -81,7 +82,7 @@ def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
         command, env=environment | {"DISPLAY": ":4294"}, capture_output=True, text=True, check=False
     )
     assert ended.returncode == 2
-    assert ended.stderr.startswith("dermis: window: ") and "--browser" in ended.stderr
+    assert without_colour_note(ended.stderr).startswith("dermis: window: ") and "--browser" in ended.stderr
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is sent as a signal")

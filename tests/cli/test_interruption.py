@@ -14,6 +14,7 @@ from typing import Any
 import child_process
 import pytest
 from rigged_head import write_rigged_head, write_take
+from small_head import without_colour_note
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
 
@@ -63,7 +64,7 @@ def _interrupted(folder: Path, moment: str, number: signal.Signals, words: str) 
     ) as ran:
         said, notes = ran.communicate()
     assert said == ""
-    return ran.returncode, notes
+    return ran.returncode, without_colour_note(notes)
 
 
 def _left(folder: Path) -> set[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_head import obj_text
+from small_head import obj_text, without_colour_note
 
 from dermis.cli import main
 
@@ -35,7 +35,7 @@ def test_mirrored_uv(
     with pytest.raises(SystemExit) as stopped:
         main()
     assert stopped.value.code == 0
-    noted = capsys.readouterr().err
+    noted = without_colour_note(capsys.readouterr().err)
     assert ("without scattering" in noted) == (seams == "alpha")
     if seams == "alpha":
         share = int(noted.split("note: ")[1].split("%")[0])

@@ -1,12 +1,14 @@
-"""Axes of files: which of them points up, and along which the face looks."""
+"""Axes of files: which of them points up, and along which the face looks.
+
+NumPy is imported on first use, so that help texts appear quickly.
+"""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-import numpy as np
-
-from dermis.base.arrays import Doubles
+if TYPE_CHECKING:
+    from dermis.base.arrays import Doubles
 
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
@@ -44,6 +46,8 @@ DEFAULT_AXES = Axes()
 
 def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
     """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""
+    import numpy as np
+
     if (axes.up, axes.face) == ("y", "z"):
         return vectors
     (up, up_sign), (front, front_sign) = _split(axes.up), _split(axes.face)
