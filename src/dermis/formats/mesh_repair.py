@@ -27,6 +27,8 @@ from dermis.mesh.mesh import Material, Mesh, build_mesh
 
 _MAX_FLAT = 0.5
 """Fraction of triangles without area above which a mesh is refused instead of mended [-]."""
+_MAX_CROWDED_EDGES = 100_000
+"""Edges of more than two triangles above which a mesh is refused instead of mended."""
 _MAX_PAIRED_SIDES = 8
 """Edges of more triangles are cut open, instead of a search for the sheets that continue across them."""
 _MIN_CONVEXITY = -0.05
@@ -205,7 +207,7 @@ def _label(count: int, links: NDArray[np.integer]) -> Index:
 def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with separate points for the sheets that meet at edges of more than two triangles."""
     count = int((mesh.sides.counts > 2).sum())
-    if not count:
+    if not 0 < count <= _MAX_CROWDED_EDGES:
         return mesh
     notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
     links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
