@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from egg import Egg
 from gltf_file import GltfFile
 
 from dermis.formats.load import load_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere
+from dermis.scene.heads import load_head
 
 BALL = uv_sphere(1.0, 24, 12)
 RADIUS_M = 0.12
@@ -47,3 +49,22 @@ def test_quantised_attributes_are_those_of_floats(kind: str, normalized: bool, t
     np.testing.assert_allclose(read.positions, exact.positions, atol=1000 * RADIUS_M * step)
     np.testing.assert_allclose(read.uv, exact.uv, atol=step)
     np.testing.assert_allclose(read.normals, exact.normals, atol=2 * step)
+
+
+def test_integer_uv_that_a_texture_scales_are_those_of_the_plain_file(tmp_path: Path) -> None:
+    plain, quantised = Egg(), Egg()
+    uv = uv_sphere(0.12, 12, 8).uv
+    for mesh, material in enumerate((quantised.skin, quantised.cloth)):
+        attributes = quantised.primitive(mesh)["attributes"]
+        attributes["TEXCOORD_0"] = quantised.file.numbers(np.round(uv * 4095), "<u2")
+        texture = material["pbrMetallicRoughness"]["baseColorTexture"]
+        texture["extensions"] = {"KHR_texture_transform": {"scale": [1 / 4095, 1 / 4095]}}
+    quantised.tree["extensionsRequired"] = ["KHR_mesh_quantization", "KHR_texture_transform"]
+    exact, read = (
+        load_head(egg.write(tmp_path / f"{name}.glb"), subdivide=0, skin_groups="face")
+        for name, egg in (("a", plain), ("b", quantised))
+    )
+    assert exact.maps.colour is not None and read.maps.colour is not None
+    np.testing.assert_allclose(
+        read.maps.colour.mean(axis=(0, 1)), exact.maps.colour.mean(axis=(0, 1)), atol=0.03
+    )

@@ -57,5 +57,5 @@ def test_a_decoder_that_waits_is_stopped(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_an_answer_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_decoding, "_ANSWER_BYTES", 100)
-    with pytest.raises(DermisError, match="its decoder stopped .its answer is too large"):
+    with pytest.raises(DermisError, match=r"its decoder stopped .its answer is too large"):
         answer_to("sound")

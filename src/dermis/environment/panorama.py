@@ -43,7 +43,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = space.linear(mended_radiance(name, image[..., :3]))
+    rgb = space.linear(mended_radiance(name, np.asarray(image[..., :3], np.float32)))
     if (highest := float(rgb.max())) > _MAX_RADIANCE:
         refuse(name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again")
     height, width = rgb.shape[:2]

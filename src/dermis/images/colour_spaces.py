@@ -6,10 +6,11 @@ import io
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Numbers
+from dermis.base.arrays import Bytes, Doubles, Floats, Numbers
 from dermis.base.errors import shorten
 from dermis.images.colour import decode_srgb, decode_srgb_levels
 
@@ -65,9 +66,9 @@ class ColourSpace:
         if rgb.dtype.kind == "f":
             linear = np.ascontiguousarray(rgb, np.float32)
         elif self.curves is None:
-            linear = decode_srgb_levels(rgb)
+            linear = decode_srgb_levels(cast(Bytes, rgb))
         else:
-            index = rgb * np.uint16(_MAX_LEVEL // np.iinfo(rgb.dtype).max)
+            index = rgb.astype(np.uint16) * np.uint16(_MAX_LEVEL // np.iinfo(rgb.dtype.str).max)
             linear = np.stack([self.curves[c][index[..., c]] for c in range(3)], axis=-1)
         if self.to_rec709 is None:
             return linear
@@ -148,7 +149,9 @@ def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace
         same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SAME_SPACE)
         curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
     same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SAME_SPACE)
-    return ColourSpace(name, None if same else to_rec709, None if curves is None else np.float32(curves))
+    return ColourSpace(
+        name, None if same else to_rec709, None if curves is None else np.asarray(curves, np.float32)
+    )
 
 
 def _to_rec709(primaries: Sequence[float]) -> Doubles:

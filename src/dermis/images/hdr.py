@@ -59,7 +59,7 @@ def decode_exr(data: bytes) -> Floats:
     (width, height), stored, placed = _windows(part.header)
     image = np.zeros((height, width, len(layer.channels)), np.float32)
     for index, name in enumerate(layer.channels):
-        image[(*placed, index)] = part.channels[name].pixels[stored]
+        image[..., index][placed] = part.channels[name].pixels[stored]
     return image
 
 
@@ -228,7 +228,7 @@ def radiance_header(data: bytes) -> PictureHeader:
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths
     primaries = _XYZ_PRIMARIES if header.is_xyz else header.values["PRIMARIES"]
-    space = gamma_space("", None, primaries) if np.any(primaries) else SRGB
+    space = gamma_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
     notes = [
         f"its {name} of {float(header.values[name][0]):g} is not used"
         for name in ("GAMMA", "PIXASPECT")

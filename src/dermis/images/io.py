@@ -142,7 +142,7 @@ def mended_radiance(name: object, radiance: Floats) -> Floats:
     faults = {"infinite or NaN": odd, "negative": negative}
     counts = " and ".join(f"{count:,} {kind}" for kind, count in faults.items() if count)
     result = f"infinite values become {highest:g}, the largest finite one, others 0"
-    notify(f"{name}: {counts} of its {texels:,} pixels; {result if odd else 'they become 0'}")
+    notify(f"{name}: {counts} pixels of {texels:,}; {result if odd else 'they become 0'}")
     return np.maximum(np.nan_to_num(radiance, nan=0.0, posinf=highest, neginf=0.0), np.float32(0.0))
 
 
@@ -169,7 +169,9 @@ def _turned(image: Pixels, orientation: int) -> Pixels:
     """Return a picture (H, W, C) turned and mirrored by EXIF's number of its orientation, 1 to 8."""
     upright = image.swapaxes(0, 1) if orientation >= 5 else image
     upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright
-    return np.ascontiguousarray(upright[:, ::-1] if orientation in (2, 3, 6, 7) else upright)
+    turned: Any = upright[:, ::-1] if orientation in (2, 3, 6, 7) else upright
+    pixels: Pixels = np.ascontiguousarray(turned)
+    return pixels
 
 
 def _apply_codec(
@@ -189,8 +191,8 @@ def _apply_codec(
     for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
         codec = other if data.startswith(start) else codec
     if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
-        other = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
-        actual = f"it is {other}" if other else "its first bytes match none of these formats"
+        known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
+        actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
     try:
         return codec(data)

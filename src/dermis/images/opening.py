@@ -238,7 +238,7 @@ def _bits(data: bytes, picture: Image) -> int:
     if picture.format == "AVIF" and (start := data.find(b"av1C")) > 0 and data[start + 6] & 0x40:
         return 12 if data[start + 6] & 0x20 else 10
     if picture.mode == "CMYK":
-        return max(getattr(picture, "tag_v2", {}).get(258, (8,)))
+        return int(max(getattr(picture, "tag_v2", {}).get(258, (8,))))
     return int(picture.info.get("bit_depth", 8))
 
 

@@ -80,7 +80,7 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the file's unit [mm]; by default 1000 for glTF. For OBJ and PLY, which state none, it is 1 if
+        Length of the unit of the file [mm]; by default 1000 for glTF. For OBJ and PLY, which state none, 1 if
         the mesh is then 100 to 1000 mm large, else a guess from the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.

@@ -247,6 +247,12 @@ def test_scores_in_percent_are_recognised(tmp_path: Path) -> None:
     assert clip.pose_at(0.066).weights == pytest.approx({"jawOpen": 0.5, "eyeBlinkLeft": 0.125})
 
 
+def test_large_weights_are_kept_with_a_note(tmp_path: Path) -> None:
+    path = _file(tmp_path, [{"time": 0.0, "blendshapes": {"jawOpen": 7}}])
+    clip = _load(path, "weights of up to 7 are used as they are, where 1 is the full shape")
+    assert clip.pose_at(0.0).weights == {"jawOpen": 7.0}
+
+
 HEADER = "Timecode,BlendShapeCount,JawOpen,EyeBlinkLeft,HeadYaw,HeadPitch,HeadRoll"
 ROWS = [f"10:00:00:0{k}.000,61,{w},0.125,0.4,0.1,0.05" for k, w in enumerate(WEIGHTS)]
 

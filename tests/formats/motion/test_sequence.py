@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,23 @@ def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:
         for mine, other in zip(quick, whole, strict=True):
             assert mine.dtype == other.dtype
             np.testing.assert_array_equal(mine, other)
+
+
+@pytest.mark.parametrize("change", ["carriage returns", "UTF-16", "weights"])
+def test_frames_in_other_words_have_the_same_places(folder: Path, change: str) -> None:
+    plain = [FrameReader(unit_mm=1.0).read(file) for file in frame_files(folder)]
+    for file in frame_files(folder):
+        text = file.read_text()
+        if change == "carriage returns":
+            file.write_text(text.replace("\n", "\r"))
+        elif change == "UTF-16":
+            file.write_text(text, encoding="utf-16")
+        else:
+            half = re.sub(r"^v (\S+) (\S+) (\S+)$", r"v \1e1 \2e1 \3e1 10", text, flags=re.MULTILINE)
+            file.write_text(half)
+    reader = FrameReader(unit_mm=1.0)
+    for file, expected in zip(frame_files(folder), plain, strict=True):
+        np.testing.assert_allclose(reader.read(file).positions_mm, expected.positions_mm, rtol=1e-6)
 
 
 def _without_last_face(text: str) -> str:

@@ -84,7 +84,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         usable = opaque
     colours = image[..., :3]
     if is_linear:
-        colours = mended_radiance(name, colours)
+        colours = mended_radiance(name, np.asarray(colours, np.float32))
     else:
         usable &= colours.max(axis=2) < _CLIP_LEVEL * full
     return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -69,7 +70,7 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
         else:
             points = _from_table(path, lines, size)
     name, names = _identify(path, points)
-    found = np.isfinite(points.pixels).all(axis=1)
+    found = np.asarray(np.isfinite(points.pixels).all(axis=1))
     if not found.all():
         notify(f"{path}: {len(found) - found.sum()} of {len(found)} landmarks have no position")
     pixels = {one: pixel for one, pixel, has in zip(names, points.pixels, found, strict=True) if has}
@@ -125,7 +126,7 @@ def _identify_five(pixels: Floats) -> tuple[str, Sequence[int]]:
 
 
 def _from_pts(path: str | Path, lines: Sequence[str]) -> _Points:
-    headers = dict(match.groups() for line in lines if (match := _PTS_LINE.fullmatch(line)))
+    headers = {match[1].lower(): match[2] for line in lines if (match := _PTS_LINE.fullmatch(line))}
     rows = [line.split() for line in lines if not _PTS_LINE.fullmatch(line) and line not in "{}"]
     count = headers.get("n_points", str(len(rows)))
     if int(count) != len(rows):
@@ -181,7 +182,7 @@ def _from_named_columns(
 
 def _is_number(cell: str) -> bool:
     try:
-        return np.isfinite(_number(cell))
+        return math.isfinite(_number(cell))
     except ValueError:
         return False
 
