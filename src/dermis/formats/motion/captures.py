@@ -41,6 +41,7 @@ MAX_TIME = 1e19
 _MAX_STEP_S = 2.0  # largest plausible median step between frames of a capture
 _TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _PERCENT_RANGE = (10.0, 200.0)  # largest weight of a capture in percent: more than any pose as a fraction
+_LARGE_WEIGHT = 2.0  # more than exaggerated poses have
 _COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
@@ -162,10 +163,12 @@ def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
 def to_fractions(culprit: object, weights: Doubles) -> Doubles:
     """Return blend shape weights (k, n) as fractions; those in percent are divided by 100, with a note."""
     largest = float(np.nanmax(np.abs(weights), initial=0.0))
-    if not _PERCENT_RANGE[0] < largest <= _PERCENT_RANGE[1]:
-        return weights
-    notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
-    return weights / 100
+    if _PERCENT_RANGE[0] < largest <= _PERCENT_RANGE[1]:
+        notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
+        return weights / 100
+    if _LARGE_WEIGHT < largest <= _PERCENT_RANGE[0]:
+        notify(f"{culprit}: weights of up to {largest:g} are used as they are, where 1 is the full shape")
+    return weights
 
 
 def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doubles) -> None:
