@@ -127,7 +127,8 @@ def _load_uncached(
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
-        raw, mended = mend(RawMesh(*arrays))
+        in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
+        raw, mended = mend(RawMesh(*arrays), in_file)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         check_mesh(mesh, source)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
+from dermis.formats.materials import IDENTITY, FileMaterial, Wrap
 from dermis.formats.mesh_checks import UV_TOLERANCE, flat_triangles
 from dermis.formats.parts import MeshPart
 from dermis.formats.read import select_vertices
@@ -42,6 +44,8 @@ _VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 20, 64, 120_000
 _DOUBTFUL_SAMPLES = 0.25  # fraction
 _MAX_UV_EXCESS = 0.02
 """Distance from the tile up to which uv are clamped to it [-]."""
+_NO_PERIOD = 1e9
+_PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD}
 
 
 @dataclass(frozen=True)
@@ -116,20 +120,22 @@ class RawMesh:
         )
 
 
-def mend(mesh: RawMesh) -> tuple[RawMesh, tuple[str, ...]]:
+def mend(mesh: RawMesh, materials: Sequence[FileMaterial | None]) -> tuple[RawMesh, tuple[str, ...]]:
     """Return a mesh without the faults that can be mended, and a note on each fault.
 
     Triangles without area and repeated ones are dropped; sheets that meet at an edge of more than two
     triangles become separate; pieces that are wound inside out are reversed; normals that point inwards are
     turned; uv that are slightly outside the tile are clamped, and charts in other tiles are moved by whole
     tiles. A mesh without faults is returned as it is.
+
+    materials : of the file, for each material of the mesh; None for one that the file does not describe
     """
     notes: list[str] = []
     flat = flat_triangles(mesh.positions, mesh.triangles)
     if flat.mean() > _MAX_FLAT:
         return mesh, ()
     mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, notes), notes), notes)
-    return _move_uv(mended if mended is mesh else mended.compact(), notes), tuple(notes)
+    return _move_uv(mended if mended is mesh else mended.compact(), materials, notes), tuple(notes)
 
 
 def _counted(count: int, noun: str) -> str:
@@ -447,7 +453,7 @@ def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
     return np.asarray((balance < -_SEEN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
-def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
+def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
     """Return the mesh with its uv charts moved by whole tiles and clamped, where they then fit in."""
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
@@ -459,7 +465,10 @@ def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
     np.minimum.at(low, chart, mesh.uv)
     np.maximum.at(high, chart, mesh.uv)
     outside = (np.minimum(low, 1 - high) < -UV_TOLERANCE).any(axis=1, keepdims=True)
-    shift = np.where(outside, np.floor((low + high) / 2), 0)
+    shift, period = np.where(outside, np.floor((low + high) / 2), 0), np.ones((len(low), 2))
+    periods = np.array([_uv_periods(material) for material in materials])
+    np.maximum.at(period, chart[mesh.triangles[:, 0]], periods[mesh.material])
+    shift = np.where(shift % period == 0, shift, 0)
     fits = (np.minimum(low - shift, 1 + shift - high) >= -_MAX_UV_EXCESS).all(axis=1, keepdims=True)
     shift = np.where(fits, shift, 0)
     moved = mesh.uv - shift[chart]
@@ -470,3 +479,15 @@ def _move_uv(mesh: RawMesh, notes: list[str]) -> RawMesh:
     if excess > UV_TOLERANCE:
         notes.append(f"clamped uv that are up to {excess:.2g} outside the tile")
     return replace(mesh, uv=clamped.astype(np.float32))
+
+
+def _uv_periods(material: FileMaterial | None) -> tuple[float, float]:
+    """Return the number of tiles along u and v by which uv can move without a change of the pictures."""
+    periods = [(1.0, 1.0)]
+    for texture in material.textures.values() if material else ():
+        if texture.mapping == (0, IDENTITY):
+            periods.append((_PERIODS[texture.wrap[0]], _PERIODS[texture.wrap[1]]))
+        elif texture.uv_set == 0:
+            periods.append((_NO_PERIOD, _NO_PERIOD))
+    u, v = zip(*periods, strict=True)
+    return max(u), max(v)
