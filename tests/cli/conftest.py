@@ -99,11 +99,6 @@ def _texts() -> dict[str, str]:
     good = obj_text()
     lines = good.splitlines()
     vertices = [k for k, line in enumerate(lines) if line.startswith("v ")]
-    first_face = next(line for line in lines if line.startswith("f "))
-    a, b, _ = first_face[2:].split()
-    fins = "\n".join(
-        ("v 0 500 0", "v 0 501 0", f"f {a} {b} {len(vertices) + 1}/1", f"f {a} {b} {len(vertices) + 2}/1")
-    )
     return {
         "head.obj": good,
         "text.obj": "This is a letter.\n",
@@ -111,8 +106,6 @@ def _texts() -> dict[str, str]:
         "short.obj": "\n".join(lines[: len(vertices) // 2] + lines[-3:]),
         "no_uv.obj": re.sub(r"/\d+", "", re.sub("(?m)^vt .*\n", "", good)),
         "far_uv.obj": re.sub("(?m)^vt .*$", "vt 1.5 0.5", good, count=1),
-        "flat.obj": f"{good}f {a} {b} {a}\n",
-        "fin.obj": f"{good}{fins}\n",
         "nan.obj": re.sub("(?m)^v .*$", "v nan 0 0", good, count=1),
         "empty.obj": good.replace("usemtl skin", "usemtl skin\nusemtl eyes"),
         "metres.obj": "\n".join(_in_metres(line) for line in lines),

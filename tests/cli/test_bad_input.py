@@ -29,8 +29,6 @@ MESHES = {
     "cut short": Bad("short.obj", "short.obj", "cannot be understood"),
     "no uv": Bad("no_uv.obj", "no_uv.obj", "'skin' has none"),
     "uv outside": Bad("far_uv.obj", "far_uv.obj", "to 1.5"),
-    "zero area": Bad("flat.obj", "flat.obj", "zero area"),
-    "non-manifold": Bad("fin.obj", "fin.obj", "non-manifold"),
     "NaN position": Bad("nan.obj", "nan.obj", "NaN"),
     "no triangles in skin": Bad("empty.obj", "empty.obj", "'skin' has no triangles"),
     "too small": Bad("head.obj --unit-mm 0.001", "head.obj", "it is 0.24 mm high"),

@@ -23,6 +23,7 @@ from dermis.mesh.geometry import (
     edge_keys,
     fibonacci_sphere,
     triangle_areas,
+    triangle_keys,
     weld,
 )
 from dermis.mesh.mesh import Material, Mesh, build_mesh
@@ -150,10 +151,7 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
     if flat.any():
         notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
         mesh = mesh.with_triangles(~flat)
-    a, b, c = mesh.corners.T
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    stride = int(high.max()) + 1  # its cube fits in 64 bits, as there are at most 1.25 million points
-    key = (low * stride + a + b + c - low - high) * stride + high
+    key = triangle_keys(mesh.corners, int(mesh.point.max()) + 1)
     ordered = np.sort(key)
     if (ordered[1:] == ordered[:-1]).any():
         order = np.lexsort((np.arange(len(key)), mesh.material, key))

@@ -74,6 +74,17 @@ def edge_keys(corners: NDArray[np.integer]) -> Index:
     return np.minimum(start, end) * (int(start.max(initial=0)) + 1) + np.maximum(start, end)
 
 
+def triangle_keys(corners: NDArray[np.integer], count: int) -> Index:
+    """Return for each triangle a number that is equal for triangles of the same three points, (f,).
+
+    corners : (f, 3) point indices
+    count : number of points, at most two million
+    """
+    a, b, c = corners.T.astype(np.int64)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    return np.asarray((low * count + a + b + c - low - high) * count + high)
+
+
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Return the unique edges (e, 2), the edge of each side (n,) and the number of sides per edge (e,).
 
