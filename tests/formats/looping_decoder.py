@@ -9,7 +9,7 @@ import sys
 import numpy as np
 
 from dermis.base.errors import DermisError
-from dermis.formats.native_decoding import answer_request
+from dermis.base.native_decoding import answer_request
 
 
 def decode(request: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

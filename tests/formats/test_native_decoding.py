@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.base import native_decoding
 from dermis.base.errors import DermisError
-from dermis.formats import native_decoding
-from dermis.formats.native_decoding import as_text, run_decoder
+from dermis.base.native_decoding import as_text, run_decoder
 
 MODULE = "looping_decoder"
 

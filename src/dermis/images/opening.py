@@ -6,10 +6,15 @@ import io
 import struct
 import threading
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.base.native_decoding import run_decoder
 from dermis.base.reading import MALFORMED_DATA_ERRORS
 from dermis.images.colour_spaces import (
     SRGB,
@@ -36,6 +41,7 @@ _BRANDS = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
 )
 """Formats by brand of the container that AVIF and HEIC share."""
 _MAX_BRAND_BYTES = 64
+_HEIC, _HEIC_DECODER = "HEIC", "dermis.images.heic_decoder"
 _PILLOW_LOCK = threading.Lock()
 _JPEG_SCAN = b"\xff\xda"
 _MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
@@ -67,12 +73,12 @@ def open_picture(data: bytes) -> Image:
     from PIL import features
 
     name = picture_format(data) or "PNG"
+    if name == _HEIC:
+        return _open_heic(data)
     with _PILLOW_LOCK:  # Pillow's own limit is a global variable and differs
         limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
         try:
-            if name == "HEIC":
-                picture: Image = import_extra("pi_heif", "a HEIC picture").HeifImageFile(io.BytesIO(data))
-            elif name in ("WEBP", "AVIF") and not features.check(name.lower()):
+            if name in ("WEBP", "AVIF") and not features.check(name.lower()):
                 refuse(
                     f"a picture in {name}",
                     "Pillow with this format",
@@ -93,6 +99,26 @@ def open_picture(data: bytes) -> Image:
     if name == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
         raise ValueError("it was stored in too many scans")
     return picture
+
+
+def _open_heic(data: bytes) -> Image:
+    """Return a HEIC picture, which is decoded in a separate process."""
+    import PIL.Image
+
+    import_extra("pi_heif", "a HEIC picture")
+    answer = _decoded_heic(data)
+    check_size(*answer["size"].tolist())
+    bits, turned, several = answer["facts"].tolist()
+    picture = PIL.Image.fromarray(answer["pixels"])
+    picture.info = {"icc_profile": answer["profile"].tobytes(), "bit_depth": bits, "turned": turned}
+    picture.format, picture.is_animated = _HEIC, several  # type: ignore[attr-defined]
+    return picture
+
+
+@lru_cache(maxsize=1)  # because the header and the pixels of a picture are read one after the other
+def _decoded_heic(data: bytes) -> Arrays:
+    request = Arrays(data=np.frombuffer(data, np.uint8))
+    return run_decoder(_HEIC_DECODER, request, len(data), "a HEIC picture", "pixels")
 
 
 def pillow_header(data: bytes) -> PictureHeader:
@@ -192,7 +218,7 @@ def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
     """Return the numbers of primaries and transfer function that a PNG, AVIF or HEIC file states, or None."""
     if picture.format == "PNG" and (start := data.find(b"cICP", 0, data.find(b"IDAT"))) > 0:
         return data[start + 4], data[start + 5]
-    if picture.format in ("AVIF", "HEIF") and (start := data.find(b"colrnclx")) > 0:
+    if picture.format in ("AVIF", _HEIC) and (start := data.find(b"colrnclx")) > 0:
         primaries, transfer = struct.unpack_from(">HH", data, start + 8)
         return primaries, transfer
     return None
@@ -227,7 +253,7 @@ def _notes(data: bytes, picture: Image) -> Iterator[str]:
         yield f"its CMYK is converted to sRGB {how}"
     if (bits := _bits(data, picture)) > 8:
         yield f"its {bits} bits a channel are reduced to 8"
-    if picture.info.get("original_orientation", 1) not in (None, 1):
+    if picture.info.get("turned"):
         yield "it is turned upright by its EXIF"
     if _has_several(picture):
         yield "it has several pictures, and only the first is read"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.base.disk import Arrays
-from dermis.formats.native_decoding import answer_request
+from dermis.base.native_decoding import answer_request
 
 
 def decode(request: Arrays) -> Arrays:

@@ -20,7 +20,6 @@ import numpy as np
 from dermis.base.arrays import Bytes
 from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
-from dermis.formats.size_limits import DAMAGED_ADVICE
 
 _CPU_S, _SMALL_BYTES = 8.0, 64 << 20
 """CPU time for files up to a size; that of larger ones is proportional [s, bytes]."""
@@ -29,6 +28,7 @@ _MEMORY_BYTES = 2 << 30  # of the address space, of which libraries of USD take 
 _ANSWER_BYTES = 1 << 30  # of the answer, and of each temporary file
 _REFUSED, _FAILED = "refused", "failed"
 _MAX_MESSAGE = 2000  # characters
+_DAMAGED_ADVICE = "The file is damaged: export it again"
 _VARIABLES = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
 _REMOVED_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTHONSTARTUP")
 
@@ -59,16 +59,16 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
                 check=False,
             ).returncode
         except subprocess.TimeoutExpired:
-            refuse(culprit, expected, f"its decoder takes more than {cpu_s:.0f} s", DAMAGED_ADVICE)
+            refuse(culprit, expected, f"its decoder takes more than {cpu_s:.0f} s", _DAMAGED_ADVICE)
         if status != 0 or output.seek(0, os.SEEK_END) > _ANSWER_BYTES:
             actual = f"its decoder stopped ({_stop_reason(status)})"
-            refuse(culprit, expected, actual, DAMAGED_ADVICE)
+            refuse(culprit, expected, actual, _DAMAGED_ADVICE)
         output.seek(0)
         answer = _unpack(output.read())
     if _REFUSED in answer:
         raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE))
     if _FAILED in answer:
-        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", DAMAGED_ADVICE)
+        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", _DAMAGED_ADVICE)
     return answer
 
 
