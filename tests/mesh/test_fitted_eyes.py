@@ -10,7 +10,7 @@ import pytest
 from eyed_head import EYE_MM, MIRROR, ball, ball_with_cornea, write_head
 from numpy.typing import NDArray
 
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.formats.load import is_eye_name
 from dermis.mesh.fitted_eyes.balls import Sphere, corneal_axis, fit_sphere
 from dermis.mesh.fitted_eyes.lids import lids_in_front
@@ -128,7 +128,9 @@ def test_what_is_no_eye_stays_plain(tmp_path: Path, left: object, right: object,
 
 def test_eyes_of_another_name_can_be_named(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf", names=("white_1", "white_2"))
-    assert head(path).eyes is None and head(path).note == ""
+    with pytest.warns(DermisWarning, match="not skin: 'white_"):
+        plain = head(path)
+    assert plain.eyes is None and plain.note == ""
     assert head(path, eye_groups=("white_1", "White_2")).eyes is not None
     with pytest.raises(DermisError, match="eye_groups with names of groups of the file"):
         head(path, eye_groups=("white",))

@@ -130,7 +130,8 @@ def _load_uncached(
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
         raw, mended = mend(RawMesh(*arrays), in_file)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
-        check_mesh(mesh, source)
+        has_pictures = any(one.textures for one in mesh_file.materials)
+        check_mesh(mesh, source, has_pictures=has_pictures)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
@@ -200,7 +201,10 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     stated = (
         names.skin
         or names.opaque
-        or all(skin or is_eye_name(group.names) for skin, group in zip(is_skin, groups, strict=True))
+        or all(
+            skin or eye or is_eye_name(group.names)
+            for skin, eye, group in zip(is_skin, is_eye, groups, strict=True)
+        )
     )
     index: dict[tuple[Material, int, bool], int] = {}
     of_part = []
@@ -312,7 +316,10 @@ def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[st
 
 def _from_arrays(arrays: Arrays) -> RiggedMesh:
     metadata = json.loads(arrays["metadata"].tobytes())
-    materials = [Material(**one | {"colour": tuple(one["colour"])}) for one in metadata["materials"]]
+    triples = ("colour", "emission")
+    materials = [
+        Material(**one | {name: tuple(one[name]) for name in triples}) for one in metadata["materials"]
+    ]
     mesh = Mesh(**{name: arrays[name] for name in _MESH_FIELDS}, materials=tuple(materials))
     vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
     notes, colours = tuple(metadata["notes"]), arrays["colours"] if len(arrays["colours"]) else None

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from dermis.base.arrays import Doubles
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file
 from dermis.formats.maps import PathLike
+from dermis.images.io import EmbeddedPicture, read_size
+from dermis.images.sizes import MAX_TOTAL_PIXELS
 
 Wrap = Literal["repeat", "mirror", "clamp"]
 Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular", "emission", "opacity"]
@@ -95,3 +100,23 @@ class FileMaterial:
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}
+
+
+def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
+    """Refuse materials whose pictures have too many texels together.
+
+    path : of the file, for the error
+    """
+    pictures: dict[tuple[str, str], object] = {}
+    for material in materials:
+        used = dict(material.maps or {}) | {role: one.picture for role, one in material.textures.items()}
+        pictures |= {(role, str(picture)): picture for role, picture in used.items()}
+    texels = 0
+    for picture in pictures.values():
+        if isinstance(picture, EmbeddedPicture) or (isinstance(picture, Path) and is_file(str(picture))):
+            width, height = read_size(picture)
+            texels += width * height
+    if texels > MAX_TOTAL_PIXELS:
+        advice = "Resize them, or set them by options (--colour, ...)"
+        limit = f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
+        refuse(path, limit, f"they have {texels / 1e6:.0f} million", advice)

@@ -23,10 +23,11 @@ MIN_RELATIVE_AREA = 1e-6
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
-def check_mesh(mesh: Mesh, culprit: object) -> None:
+def check_mesh(mesh: Mesh, culprit: object, *, has_pictures: bool = False) -> None:
     """Refuse a mesh that cannot be rendered as skin.
 
     culprit : source of the mesh for errors, usually its file
+    has_pictures : whether its file has pictures, which are packed so that uv outside [0, 1] are valid
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
     triangles, edges of more than two triangles, and a mesh without skin.
@@ -34,10 +35,11 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
     check_arrays(mesh.positions, mesh.uv, mesh.triangles, culprit)
     for name in ("normals", "dpdu", "dpdv"):
         _check_finite(name, getattr(mesh, name), culprit)
-    _check_uv_range(mesh, culprit)
     _check_areas(mesh, culprit)
     _check_manifold(mesh, culprit)
     _check_skin(mesh, culprit)
+    if not has_pictures:
+        check_uv_range(mesh, culprit)
 
 
 def check_arrays(
@@ -89,8 +91,14 @@ def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
     limits.check_limit(culprit, vertices, limits.MAX_VERTICES, "vertices", limits.DECIMATE_ADVICE)
 
 
-def _check_uv_range(mesh: Mesh, culprit: object) -> None:
-    low, high = mesh.uv.min(axis=0), mesh.uv.max(axis=0)
+def check_uv_range(mesh: Mesh, culprit: object) -> None:
+    """Refuse a mesh whose skin has uv outside [0, 1].
+
+    culprit : source of the mesh for errors, usually its file
+    """
+    skin = np.array([one.kind == "skin" for one in mesh.materials])[mesh.material]
+    uv = mesh.uv[mesh.triangles[skin].ravel()]
+    low, high = uv.min(axis=0), uv.max(axis=0)
     if min(low) < -UV_TOLERANCE or max(high) > 1 + UV_TOLERANCE:
         actual = f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}"
         advice = "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)"

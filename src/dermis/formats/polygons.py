@@ -74,7 +74,7 @@ class Polygons:
             group,
             self.positions[vertex] + 0.0,  # converts -0 to 0
             self.uv[uv - 1] if uv.all() else None,
-            np.vstack((np.full(3, np.nan), self.normals))[normal] + 0.0 if normal.any() else None,
+            np.where(normal[:, None], self.normals[normal - 1] + 0.0, np.nan) if normal.any() else None,
             index[triangles],
             quads=quads,
             colours=None if self.colours is None else self.colours[vertex],

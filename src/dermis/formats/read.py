@@ -19,6 +19,7 @@ from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
 from dermis.formats.parts import MeshFile, MeshPart
 from dermis.formats.ply import read_ply
+from dermis.formats.usd.read import USD_SUFFIXES, read_usd
 from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
@@ -33,6 +34,7 @@ MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".vrm": read_gltf,
     ".obj": read_obj,
     ".ply": read_ply,
+    **dict.fromkeys(USD_SUFFIXES, read_usd),
 }
 
 

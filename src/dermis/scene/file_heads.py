@@ -14,6 +14,7 @@ from dermis.formats.gltf.embedded import embedded_eye_look, embedded_materials
 from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.formats.maps import load_maps
 from dermis.formats.materials import FileMaterial
+from dermis.formats.mesh_checks import check_uv_range
 from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES, Sample, fetch_sample
@@ -92,6 +93,7 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     mesh, maps, notes = _with_materials(
         rigged, rigged.materials if materials is None else materials, path, options
     )
+    check_uv_range(mesh, path)
     check_relief(options.height_mm, maps.height, f"{name}: height_mm")
     maps, tone_note = (maps, "") if "colour" in options.given else with_skin_tone(mesh, maps)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):

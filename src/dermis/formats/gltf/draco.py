@@ -10,9 +10,9 @@ from dermis.base.arrays import Numbers
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.base.native_decoding import run_decoder
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree
-from dermis.base.native_decoding import run_decoder
 
 EXTENSION = "KHR_draco_mesh_compression"
 _TRIANGLES = 4

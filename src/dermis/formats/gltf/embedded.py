@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
-from dermis.base.errors import error_context, refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing
+from dermis.base.errors import error_context
+from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
 from dermis.formats.gltf.document import read_document
 from dermis.formats.gltf.read_materials import read_materials
-from dermis.formats.materials import FileMaterial
-from dermis.images.io import EmbeddedPicture, read_size
-from dermis.images.sizes import MAX_TOTAL_PIXELS
+from dermis.formats.materials import FileMaterial, check_pictures
 from dermis.mesh.eye_look import EyeLook
 
 
@@ -23,19 +21,7 @@ def embedded_materials(path: Path) -> tuple[FileMaterial, ...]:
     document = read_document(path)
     with parsing(path, "valid textures", *MALFORMED_DATA_ERRORS):
         materials = read_materials(document)
-    pictures: dict[tuple[str, str], object] = {}
-    for material in materials:
-        used = dict(material.maps or {}) | {role: one.picture for role, one in material.textures.items()}
-        pictures |= {(role, str(picture)): picture for role, picture in used.items()}
-    texels = 0
-    for picture in pictures.values():
-        if isinstance(picture, EmbeddedPicture) or (isinstance(picture, Path) and is_file(str(picture))):
-            width, height = read_size(picture)
-            texels += width * height
-    if texels > MAX_TOTAL_PIXELS:
-        advice = "Resize them, or set them by options (--colour, ...)"
-        limit = f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
-        refuse(path, limit, f"they have {texels / 1e6:.0f} million", advice)
+    check_pictures(path, materials)
     return materials
 
 

@@ -1,0 +1,1 @@
+"""Reading of USD scenes; the package usd-core runs in a separate process with limits."""

@@ -1,0 +1,276 @@
+"""Program that reads the meshes and materials of a USD file, see `native_decoding`."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Index, Numbers
+from dermis.base.disk import Arrays
+from dermis.base.errors import refuse
+from dermis.base.extras import import_extra
+from dermis.base.native_decoding import answer_request, as_text, from_text
+from dermis.formats import size_limits as limits
+from dermis.formats.usd.layers import open_stage
+from dermis.formats.usd.shading import MaterialReader, Tree
+from dermis.mesh.geometry import expand_runs
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdGeom, UsdShade
+
+_MM = 1000.0
+_UV_NAMES = ("st", "UVMap", "map1", "st0", "st_0", "uv")
+_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
+_HIDDEN = ("guide", "proxy")  # purposes
+_OWN_MATERIAL_ONLY = "faces of one mesh read different texture coordinates: those of the first are used"
+
+
+class _Primvar(NamedTuple):
+    """Values (n, k), and the index of the value of each corner (c,)."""
+
+    values: Doubles
+    index: Index
+
+
+class _Faces(NamedTuple):
+    """Polygons of a mesh.
+
+    counts, start : (n,) number of corners of each polygon, and its first corner
+    vertex : (c,) vertex of each corner
+    """
+
+    counts: Index
+    start: Index
+    vertex: Index
+
+    def corner_elements(self, interpolation: str) -> Index | None:
+        """Return the element of a primvar for each corner, (c,); None for an unknown interpolation."""
+        corners = len(self.vertex)
+        return {
+            "constant": np.zeros(corners, np.int64),
+            "uniform": np.repeat(np.arange(len(self.counts)), self.counts),
+            "vertex": self.vertex,
+            "varying": self.vertex,
+            "faceVarying": np.arange(corners),
+        }.get(interpolation)
+
+    def reversed_corners(self) -> Index:
+        """Return the order of corners (c,) that reverses each polygon."""
+        corner, step = expand_runs(np.zeros_like(self.counts), self.counts)
+        return np.asarray((self.start + self.counts - 1)[corner] - step)
+
+
+class _SceneReader:
+    """Reader of the meshes of a stage; collects arrays, materials and notes."""
+
+    def __init__(self, path: Path, stage: Usd.Stage, folder: Path) -> None:
+        task = f"{path}: USD scenes"
+        self.usd, self.geom, self.shade = (
+            import_extra(f"pxr.{name}", task) for name in ("Usd", "UsdGeom", "UsdShade")
+        )
+        self.path, self.stage = path, stage
+        self.time = self.usd.TimeCode.EarliestTime()
+        self.places = self.geom.XformCache(self.time)
+        self.material_reader = MaterialReader(path, folder, self.time)
+        self.material_index: dict[str, int] = {}
+        self.materials: list[Tree] = []
+        self.arrays, self.notes = Arrays(), dict[str, None]()
+        self.vertices = self.triangles = 0
+
+    def read(self) -> Arrays:
+        """Return the arrays of all meshes, named by their number, and "scene", a JSON text."""
+        meshes, unread = list[Tree](), Counter[str]()
+        for count, prim in enumerate(self._prims()):
+            limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
+            if prim.IsA(self.geom.Mesh):
+                if self._is_visible(prim):
+                    limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
+                    meshes.append(self._mesh(self.geom.Mesh(prim), str(len(meshes))))
+            elif prim.GetTypeName() not in _WITHOUT_NOTE:
+                unread[str(prim.GetTypeName())] += 1
+        if unread:
+            names = ", ".join(f"{name} ({count})" for name, count in unread.most_common(8))
+            self.notes[f"these prims are left out: {names}"] = None
+        scene = {
+            "unit_mm": self._unit_mm(),
+            "up": str(self.geom.GetStageUpAxis(self.stage)).lower(),
+            "meshes": meshes,
+            "materials": self.materials,
+            "notes": list(self.notes),
+        }
+        return self.arrays | {"scene": from_text(json.dumps(scene))}
+
+    def _prims(self) -> Iterator[Usd.Prim]:
+        predicate = self.usd.TraverseInstanceProxies(self.usd.PrimDefaultPredicate)
+        return iter(self.usd.PrimRange(self.stage.GetPseudoRoot(), predicate))
+
+    def _unit_mm(self) -> float:
+        if not self.geom.StageHasAuthoredMetersPerUnit(self.stage):
+            self.notes["its unit is not stated: USD's default is 10 mm; --unit-mm sets another"] = None
+        unit_mm = _MM * float(self.geom.GetStageMetersPerUnit(self.stage))
+        if not 0 < unit_mm < np.inf:
+            actual = f"it is {unit_mm / _MM:g}"
+            refuse(self.path, "metersPerUnit above 0", actual, "Correct it, or export again")
+        return unit_mm
+
+    def _is_visible(self, prim: Usd.Prim) -> bool:
+        own = self.geom.Imageable(prim)
+        return own.ComputePurpose() not in _HIDDEN and own.ComputeVisibility(self.time) != "invisible"
+
+    def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
+        """Add the arrays of a mesh, and return its names and materials."""
+        prim, matrix = mesh.GetPrim(), np.array(self.places.GetLocalToWorldTransform(mesh.GetPrim()))
+        points, faces = self._geometry(mesh)
+        materials, group = self._material_groups(prim, len(faces.counts))
+        uv = self._uv(prim, faces, materials)
+        normals = self._normals(mesh, faces)
+        colour, colours = self._colours(prim, faces, materials, len(points))
+        arrays: dict[str, Numbers] = {"points": points @ matrix[:3, :3] + matrix[3, :3]}
+        arrays |= {"counts": faces.counts, "group": group}
+        order = self._corner_order(mesh, faces, matrix)
+        arrays["vertex"] = faces.vertex[order]
+        for name, primvar in (("uv", uv), ("normals", normals)):
+            if primvar is not None:
+                arrays |= {name: primvar.values, f"{name} index": primvar.index[order]}
+        if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
+            arrays["normals"] = _unit(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
+        if colours is not None:
+            arrays["colours"] = colours
+        self.arrays |= {f"{number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()}
+        return {"name": prim.GetName(), "materials": materials, "colour": colour}
+
+    def _geometry(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
+        """Return points (v, 3) and polygons of a mesh, after checks of their number and indices."""
+        attributes = mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
+        given = [attribute.Get(self.time) for attribute in attributes]
+        points = np.array(given[0] or [], np.float64).reshape(-1, 3)
+        counts, vertex = (np.array(one or [], np.int64) for one in given[1:])
+        self.vertices += len(points)
+        self.triangles += int(np.maximum(counts - 2, 0).sum())
+        advice = limits.DECIMATE_ADVICE
+        limits.check_limit(self.path, self.vertices, limits.MAX_VERTICES, "vertices", advice)
+        limits.check_limit(self.path, self.triangles, limits.MAX_TRIANGLES, "triangles", advice)
+        outside = len(vertex) and (vertex.min() < 0 or vertex.max() >= len(points))
+        if (counts < 0).any() or counts.sum() != len(vertex) or outside:
+            actual = f"those of {mesh.GetPath()} do not fit its {len(points)} points"
+            refuse(self.path, "valid faces", actual, limits.DAMAGED_ADVICE)
+        return points, _Faces(counts, np.cumsum(counts) - counts, vertex)
+
+    def _corner_order(self, mesh: UsdGeom.Mesh, faces: _Faces, matrix: Doubles) -> Index:
+        """Return the order of corners (c,) in which polygons are anticlockwise from outside."""
+        is_left = mesh.GetOrientationAttr().Get(self.time) == "leftHanded"
+        if is_left != bool(np.linalg.det(matrix[:3, :3]) < 0):
+            return faces.reversed_corners()
+        return np.arange(len(faces.vertex))
+
+    def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
+        """Return the materials of a mesh, -1 for none, and the index in them of each of `count` faces.
+
+        Faces that are holes have the index -1.
+        """
+        binding = self.shade.MaterialBindingAPI(prim)
+        materials, group = [self._material(binding)], np.zeros(count, np.int64)
+        for subset in binding.GetMaterialBindSubsets():
+            faces = np.array(subset.GetIndicesAttr().Get(self.time) or [], np.int64)
+            self._check_face_indices(faces, count, subset.GetPath())
+            group[faces] = len(materials)
+            materials.append(self._material(self.shade.MaterialBindingAPI(subset.GetPrim())))
+        holes = np.array(self.geom.Mesh(prim).GetHoleIndicesAttr().Get(self.time) or [], np.int64)
+        self._check_face_indices(holes, count, prim.GetPath())
+        group[holes] = -1
+        return materials, group
+
+    def _check_face_indices(self, faces: Index, count: int, name: object) -> None:
+        if len(faces) and (faces.min() < 0 or faces.max() >= count):
+            actual = f"{name} has some from {faces.min()} to {faces.max()}"
+            refuse(self.path, f"indices of faces from 0 to {count - 1}", actual, limits.DAMAGED_ADVICE)
+
+    def _material(self, binding: UsdShade.MaterialBindingAPI) -> int:
+        material = binding.ComputeBoundMaterial()[0]
+        if not material:
+            return -1
+        key = str(material.GetPath())
+        if key not in self.material_index:
+            self.material_index[key] = len(self.materials)
+            self.materials.append(self.material_reader.read(material))
+        return self.material_index[key]
+
+    def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
+        """Return the uv coordinates of a mesh that its materials use, else those of a usual name."""
+        named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
+        if len(named) > 1:
+            self.notes[_OWN_MATERIAL_ONLY] = None
+        primvars = self.geom.PrimvarsAPI(prim)
+        typed = [one for one in primvars.GetPrimvars() if "texCoord2" in str(one.GetTypeName())]
+        names = (*named, *_UV_NAMES, *(str(one.GetPrimvarName()) for one in typed))
+        found = (self._primvar(primvars.FindPrimvarWithInheritance(name), faces, 2) for name in names)
+        return next((one for one in found if one is not None), None)
+
+    def _primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
+        """Return a primvar of `width` numbers; None if there is none of that width."""
+        if not primvar or not primvar.HasValue():
+            return None
+        values = np.array(primvar.Get(self.time), np.float64)
+        if values.size == 0 or values.shape[-1] != width:
+            return None
+        element = faces.corner_elements(str(primvar.GetInterpolation()))
+        if element is not None and primvar.IsIndexed():
+            element = np.array(primvar.GetIndices(self.time), np.int64)[element]
+        return self._checked_primvar(values.reshape(-1, width), element, primvar.GetAttr().GetPath())
+
+    def _checked_primvar(self, values: Doubles, element: Index | None, name: object) -> _Primvar:
+        if element is None or (len(element) and (element.min() < 0 or element.max() >= len(values))):
+            actual = f"{name} has other numbers of values"
+            refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
+        return _Primvar(values, element)
+
+    def _normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
+        """Return the normals of a mesh; None if it has none, or is subdivided in other programs."""
+        if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
+            return None
+        primvars = self.geom.PrimvarsAPI(mesh.GetPrim())
+        found = self._primvar(primvars.GetPrimvar("normals"), faces, 3)
+        given = mesh.GetNormalsAttr().Get(self.time)
+        if found is not None or not given:
+            return found
+        element = faces.corner_elements(str(mesh.GetNormalsInterpolation()))
+        return self._checked_primvar(np.array(given, np.float64), element, mesh.GetPath())
+
+    def _colours(
+        self, prim: Usd.Prim, faces: _Faces, materials: list[int], count: int
+    ) -> tuple[list[float] | None, Doubles | None]:
+        """Return the colour of a whole mesh, or the linear colours (count, 3) of its vertices."""
+        named = [one for k in materials if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
+        if not named and any(k >= 0 for k in materials):
+            return None, None
+        primvars = self.geom.PrimvarsAPI(prim)
+        primvar = primvars.FindPrimvarWithInheritance(named[0] if named else "displayColor")
+        found = self._primvar(primvar, faces, 3)
+        if found is None or not len(faces.vertex):
+            return None, None
+        if primvar.GetInterpolation() == "constant" and not named:
+            return found.values[0].tolist(), None
+        weight = np.maximum(np.bincount(faces.vertex, minlength=count), 1)
+        sums = [np.bincount(faces.vertex, found.values[found.index, k], count) for k in range(3)]
+        return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
+
+
+def _unit(vectors: Doubles) -> Doubles:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))
+
+
+def decode(request: Arrays) -> Arrays:
+    """Return the meshes of the file with the name "path", see `_SceneReader.read`."""
+    path = Path(as_text(request["path"]))
+    stage, folder = open_stage(path, Path.cwd())
+    return _SceneReader(path, stage, folder).read()
+
+
+if __name__ == "__main__":
+    answer_request(decode)

@@ -1,0 +1,114 @@
+"""Opening of USD stages whose layers are all in the folder of the file, or in its package (.usdz)."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+
+from dermis.base.errors import refuse
+from dermis.base.extras import import_extra
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES, check_limit
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
+LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
+_MAX_LAYERS, _MAX_ENTRIES = 256, 4096
+_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
+
+
+class OpenedStage(NamedTuple):
+    """Stage of a file, and the folder of its layers: that of the file, or a copy of a package's."""
+
+    stage: Usd.Stage
+    folder: Path
+
+
+def open_stage(path: Path, copies: Path) -> OpenedStage:
+    """Open the stage of a USD file.
+
+    copies : empty folder for layers of a package
+
+    Raises DermisError when a layer is missing, damaged, or not in the folder of the file or below it.
+    """
+    usd: Any = import_extra("pxr.Usd", f"{path}: USD scenes")
+    root, folder = path.resolve(), path.resolve().parent
+    if path.suffix.lower() == ".usdz":
+        root, folder = _extract_layers(path, copies.resolve()), copies.resolve()
+    _check_layers(path, root, folder)
+    stage = usd.Stage.Open(str(root))
+    if stage is None:
+        _refuse_damaged(path)
+    return OpenedStage(stage, folder)
+
+
+def _extract_layers(path: Path, folder: Path) -> Path:
+    """Copy the layers of a package to a folder, and return the root layer, which is the first entry."""
+    with zipfile.ZipFile(path) as package:
+        entries = package.infolist()
+        layers = [one for one in entries if Path(one.filename).suffix.lower() in LAYER_SUFFIXES]
+        check_limit(path, len(entries), _MAX_ENTRIES, "files in the package", "Export the head alone")
+        total = sum(one.file_size for one in layers)
+        check_limit(path, total, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
+        if not layers or layers[0] is not entries[0]:
+            refuse(path, "a package whose first file is a USD layer", "it is not", DAMAGED_ADVICE)
+        copies = [Path(package.extract(one, folder)) for one in layers]
+    return copies[0]
+
+
+def _check_layers(path: Path, root: Path, folder: Path) -> None:
+    """Refuse a file with layers outside its folder, before they are opened.
+
+    root : root layer
+    folder : that must contain all layers
+    """
+    sdf: Any = import_extra("pxr.Sdf", f"{path}: USD scenes")
+    pending, known, size = [root], {root}, 0
+    while pending:
+        file = pending.pop()
+        size += file.stat().st_size
+        check_limit(path, size, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
+        layer = sdf.Layer.FindOrOpen(str(file))
+        if layer is None:
+            _refuse_damaged(path)
+        for name in _layer_names(path, layer):
+            found = _layer_file(file, name, folder)
+            if found is None:
+                refuse(path, "layers in its own folder or below", f"it references {name!r}", _ADVICE)
+            if found not in known:
+                known.add(found)
+                pending.append(found)
+                check_limit(path, len(known), _MAX_LAYERS, "layers", _ADVICE)
+
+
+def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
+    """Yield the names of the layers that a layer refers to.
+
+    Raises DermisError for value clips, which name layers by patterns.
+    """
+    yield from layer.GetCompositionAssetDependencies()
+    clips = list[str]()
+
+    def visit(spec_path: Sdf.Path) -> None:
+        spec = layer.GetPrimAtPath(spec_path) if spec_path.IsPrimPath() else None
+        if spec is not None and (spec.HasInfo("clips") or spec.HasInfo("clipSets")):
+            clips.append(str(spec_path))
+
+    layer.Traverse("/", visit)
+    if clips:
+        refuse(path, "a scene without value clips", f"{clips[0]} has some", _ADVICE)
+
+
+def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
+    """Return the file of a layer that another layer names; None if it is not a layer in the folder."""
+    if any(mark in name for mark in ":[`\0"):  # schemes, packages, expressions
+        return None
+    file = (layer.parent / name).resolve()
+    is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(folder) and file.is_file()
+    return file if is_layer else None
+
+
+def _refuse_damaged(path: Path) -> NoReturn:
+    refuse(path, "a USD scene", "it cannot be opened", DAMAGED_ADVICE)

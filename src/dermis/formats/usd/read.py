@@ -1,0 +1,142 @@
+"""Mesh parts and materials of USD files: .usd, .usda, .usdc, and packages (.usdz)."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from dermis.base.arrays import Index, Numbers
+from dermis.base.disk import Arrays
+from dermis.base.errors import refuse
+from dermis.base.native_decoding import as_text, from_text, run_decoder
+from dermis.base.reading import parse_json, read_file
+from dermis.formats.axes import Axes, Axis
+from dermis.formats.materials import FileMaterial, PathLike, Role, Texture, check_pictures
+from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, parse_colour
+from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small
+from dermis.formats.referenced_files import find_referenced_file
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES
+from dermis.images.io import EmbeddedPicture
+from dermis.mesh.geometry import expand_runs
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+_DECODER = "dermis.formats.usd.decoder"
+_PACKAGE = ".usdz"
+Tree = dict[str, Any]
+
+
+def read_usd(path: Path) -> MeshFile:
+    """Read the meshes of a USD file at its first time, with their materials.
+
+    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder.
+    """
+    data = read_file(path, "a USD file", MAX_FILE_BYTES)
+    request = {"path": from_text(str(path.resolve()))}
+    answer = run_decoder(_DECODER, request, len(data), path, "a valid USD file")
+    scene: Tree = parse_json(as_text(answer["scene"]), path, "a valid USD file")
+    pictures = _Pictures(path, data)
+    materials = tuple(pictures.material(tree) for tree in scene["materials"])
+    check_pictures(path, materials)
+    parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
+    for number, mesh in enumerate(scene["meshes"]):
+        own, own_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
+        parts += own
+        notes |= dict.fromkeys(own_notes)
+    axes = Axes(cast(Axis, scene["up"]))
+    return MeshFile(parts, materials=materials, notes=tuple(notes), unit_mm=scene["unit_mm"], axes=axes)
+
+
+def _groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup]:
+    """Return the groups of a mesh: one for each of its materials."""
+    groups = []
+    for index in mesh["materials"]:
+        material = materials[index] if index >= 0 else FileMaterial(colour=mesh["colour"])
+        names = tuple(dict.fromkeys(name for name in (material.name, mesh["name"]) if name))
+        groups.append(MaterialGroup(names, parse_colour(material.colour or GREY), index))
+    return groups
+
+
+def _parts(
+    path: Path, answer: Arrays, prefix: str, groups: list[MaterialGroup]
+) -> tuple[list[MeshPart], list[str]]:
+    """Return the parts of a mesh, one for each group, and notes.
+
+    prefix : of the names of its arrays
+    """
+    mesh = {name.removeprefix(prefix): own for name, own in answer.items() if name.startswith(prefix)}
+    check_polygon_sizes(path, mesh["counts"])
+    none, vertex = np.empty((0, 3)), mesh["vertex"]
+    missing = np.full(len(vertex), -1)
+    columns = [vertex, mesh.get("uv index", missing), mesh.get("normals index", missing)]
+    kept = mesh["group"] >= 0
+    counts, corners = _selected(mesh["counts"], np.column_stack(columns), kept)
+    counts, corners, polygons, notes = without_small(counts, corners)
+    if not len(counts):
+        return [], notes
+    geometry = Polygons(
+        counts,
+        corners,
+        mesh["points"],
+        mesh.get("uv", none[:, :2]),
+        mesh.get("normals", none),
+        mesh.get("colours"),
+    )
+    return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
+
+
+def _selected(counts: Index, corners: Numbers, kept: Numbers) -> tuple[Index, Numbers]:
+    """Return the polygons of which `kept` (n,) is true: their numbers of corners, and their corners."""
+    corner = expand_runs((np.cumsum(counts) - counts)[kept], counts[kept])[1]
+    return counts[kept], corners[corner]
+
+
+class _Pictures:
+    """Pictures of a USD file: in its package, or in its folder and below.
+
+    data : bytes of the file
+    """
+
+    def __init__(self, path: Path, data: bytes) -> None:
+        self.path, self.package = path, None
+        if path.suffix.lower() == _PACKAGE:
+            self.package = zipfile.ZipFile(io.BytesIO(data))
+            self.sizes = {one.filename: one.file_size for one in self.package.infolist()}
+
+    def material(self, tree: Tree) -> FileMaterial:
+        """Return a material; pictures that are missing are left out, with a note.
+
+        tree : as `MaterialReader.read` returns it
+        """
+        textures, missing = dict[Role, Texture](), dict[str, str]()
+        for role, one in tree["textures"].items():
+            picture = self._find(one["file"])
+            if picture is None:
+                missing[role] = f"its picture {one['file']!r} is not in the {self._place()}"
+            else:
+                textures[role] = Texture(
+                    picture, 0, tuple(one["transform"]), tuple(one["wrap"]), one["channel"]
+                )
+        names = ("name", "colour", "alpha", "alpha_mode", "alpha_cutoff", "roughness", "stated_metalness")
+        values = {name: tree[name] for name in (*names, "emission", "normal_scale") if name in tree}
+        for name in ("colour", "emission"):
+            values[name] = tuple(values.get(name, ())) or getattr(FileMaterial(), name)
+        return FileMaterial(textures=textures, missing=missing, unused=tuple(tree["unused"]), **values)
+
+    def _place(self) -> str:
+        return "folder of the file" if self.package is None else "package"
+
+    def _find(self, name: str) -> PathLike | None:
+        """Return the picture with a name relative to the layers, or None."""
+        if self.package is None:
+            return find_referenced_file(self.path, name) if name else None
+        if name not in self.sizes:
+            return None
+        if self.sizes[name] > MAX_FILE_BYTES:
+            expected = f"pictures of at most {MAX_FILE_BYTES >> 20} MiB"
+            refuse(self.path, expected, f"{name!r} is larger", DAMAGED_ADVICE)
+        return EmbeddedPicture(f"{self.path}, {name}", self.package.read(name))

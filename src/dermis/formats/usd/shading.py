@@ -1,0 +1,202 @@
+"""Materials of USD scenes: UsdPreviewSurface with its textures, as plain values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from dermis.base.errors import refuse
+from dermis.base.extras import import_extra
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdShade
+
+Tree = dict[str, Any]
+_ROLES = {
+    "diffuseColor": "colour",
+    "normal": "normal",
+    "roughness": "roughness",
+    "metallic": "metalness",
+    "emissiveColor": "emission",
+}
+_DEFAULTS: Mapping[str, Any] = {
+    "diffuseColor": (0.18, 0.18, 0.18),
+    "emissiveColor": (0.0, 0.0, 0.0),
+    "roughness": 0.5,
+    "metallic": 0.0,
+    "opacity": 1.0,
+    "opacityThreshold": 0.0,
+}
+_WITHOUT_EFFECT = {
+    "clearcoat": ("clear coat", 0.0),
+    "displacement": ("displacement", 0.0),
+    "ior": ("index of refraction", 1.5),
+    "occlusion": ("picture of occlusion, which is computed from the shape", 1.0),
+    "specularColor": ("specular colour", (0.0, 0.0, 0.0)),
+}
+_WRAPS = {"repeat": "repeat", "mirror": "mirror"}
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
+_BLACK = (0.0, 0.0, 0.0)
+
+
+class _Source(NamedTuple):
+    """Output of a shader that an input is connected to."""
+
+    shader: UsdShade.Shader
+    output: str
+
+
+class MaterialReader:
+    """Reader of the materials of a stage.
+
+    folder : of the layers, to which names of pictures are relative
+    """
+
+    def __init__(self, path: Path, folder: Path, time: Usd.TimeCode) -> None:
+        self.path, self.folder, self.time = path, folder, time
+        self.shade: Any = import_extra("pxr.UsdShade", f"{path}: USD scenes")
+
+    def read(self, material: UsdShade.Material) -> Tree:
+        """Return a material as keyword arguments of `FileMaterial`, with its textures as trees.
+
+        "uv" and "vertex_colours" name the primvars of its texture coordinates and vertex colours.
+        """
+        tree: Tree = {"name": material.GetPrim().GetName(), "textures": {}, "unused": []}
+        surface = material.ComputeSurfaceSource()[0]
+        kind = surface.GetIdAttr().Get() if surface else None
+        if kind != "UsdPreviewSurface":
+            tree["unused"].append(f"surface {kind}" if kind else "material without a UsdPreviewSurface")
+            return tree
+        values = {name: self._value(surface, name, default) for name, default in _DEFAULTS.items()}
+        tree["colour"], tree["emission"] = list(values["diffuseColor"]), list(values["emissiveColor"])
+        tree |= {"roughness": values["roughness"], "stated_metalness": values["metallic"]}
+        for name, role in _ROLES.items():
+            if (source := self._source(surface, name)) is not None:
+                self._add_source(tree, name, role, source)
+        self._add_opacity(tree, surface, values)
+        self._add_unused(tree, surface)
+        return _as_unlit(tree)
+
+    def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
+        """Add what an input is connected to: a texture, or colours of vertices."""
+        kind = str(source.shader.GetIdAttr().Get())
+        if kind.startswith("UsdPrimvarReader_float") and role == "colour":
+            tree |= {"vertex_colours": self._text(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
+        elif kind != "UsdUVTexture":
+            tree["unused"].append(f"{name} from {kind}")
+        else:
+            texture = self._texture(source, tree)
+            tree["textures"][role] = texture
+            factor, bias = texture.pop("scale"), texture.pop("bias")
+            if role == "normal":
+                tree["normal_scale"] = 0.5 * factor[0] if bias[0] else 1.0
+            elif any(bias[: len(factor)]):
+                tree["unused"].append(f"bias of the picture of {name}")
+            if role in ("colour", "emission"):
+                tree[role] = factor[:3]
+            elif role != "normal":
+                key = "stated_metalness" if role == "metalness" else role
+                tree[key] = factor[texture["channel"] or 0]
+
+    def _texture(self, source: _Source, tree: Tree) -> Tree:
+        shader = source.shader
+        wraps = [self._text(shader, f"wrap{axis}") for axis in "ST"]
+        if "black" in wraps:
+            tree["unused"].append("black beyond the edges of pictures")
+        if self._text(shader, "sourceColorSpace") == "raw" and source.output == "rgb":
+            tree["unused"].append("colour space raw of pictures, except for that of normals")
+        coordinates, transform = self._source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        if coordinates is not None and coordinates.shader.GetIdAttr().Get() == "UsdTransform2d":
+            transform = self._transform(coordinates.shader)
+            coordinates = self._source(coordinates.shader, "in")
+        if coordinates is not None:
+            tree.setdefault("uv", self._text(coordinates.shader, "varname"))
+        return {
+            "file": self._file(shader),
+            "transform": transform,
+            "wrap": [_WRAPS.get(one, "clamp") for one in wraps],
+            "channel": _CHANNELS.get(source.output),
+            "scale": list(self._value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
+            "bias": list(self._value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
+        }
+
+    def _transform(self, shader: UsdShade.Shader) -> list[float]:
+        """Return the transform of uv with v down, see `Texture`; that of the shader has v up."""
+        angle = math.radians(self._value(shader, "rotation", 0.0))
+        (x, y), (scale_x, scale_y) = (
+            self._value(shader, name, default)
+            for name, default in (("translation", (0.0, 0.0)), ("scale", (1.0, 1.0)))
+        )
+        cos, sin = math.cos(angle), math.sin(angle)
+        a, b, d, e = cos * scale_x, -sin * scale_y, sin * scale_x, cos * scale_y
+        return [a, -b, b + x, -d, e, 1.0 - e - y]
+
+    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
+        """Add the opacity; a picture of it must be the alpha of the picture of the colour."""
+        source, cutoff = self._source(surface, "opacity"), values["opacityThreshold"]
+        colour = tree["textures"].get("colour")
+        if source is not None:
+            file = self._file(source.shader) if source.shader.GetIdAttr().Get() == "UsdUVTexture" else None
+            if colour is None or source.output != "a" or colour["file"] != file:
+                tree["unused"].append("picture of the opacity")
+                return
+        elif values["opacity"] >= 1.0:
+            return
+        tree |= {"alpha": 1.0 if source is not None else values["opacity"]}
+        tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
+
+    def _add_unused(self, tree: Tree, surface: UsdShade.Shader) -> None:
+        for name, (text, neutral) in _WITHOUT_EFFECT.items():
+            value = self._value(surface, name, neutral)
+            if value != neutral or self._source(surface, name) is not None:
+                tree["unused"].append(text)
+
+    def _file(self, texture: UsdShade.Shader) -> str:
+        """Return the name of a picture relative to the folder of the layers; empty if it is outside."""
+        for attribute in self._attributes(texture, "file"):
+            layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
+            file = (Path(layer.realPath).parent / str(asset.path if asset else "")).resolve()
+            if file != self.folder and file.is_relative_to(self.folder):
+                return file.relative_to(self.folder).as_posix()
+        return ""
+
+    def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
+        """Return the attributes that provide the value of an input, through interfaces of materials."""
+        entry = shader.GetInput(name)
+        found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
+        return found
+
+    def _source(self, shader: UsdShade.Shader, name: str) -> _Source | None:
+        """Return the output of a shader that an input is connected to, or None."""
+        for attribute in self._attributes(shader, name):
+            kind, output = str(attribute.GetName()).split(":", 1)
+            if kind == "outputs":
+                return _Source(self.shade.Shader(attribute.GetPrim()), output)
+        return None
+
+    def _value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
+        """Return the constant value of an input as numbers; the default if it has none."""
+        for attribute in self._attributes(shader, name):
+            if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
+                numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
+                if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
+                    actual = f"{name} of {shader.GetPath()} is not"
+                    refuse(self.path, "finite numbers in materials", actual, "Correct it, or export again")
+                return numbers
+        return default
+
+    def _text(self, shader: UsdShade.Shader, name: str) -> str:
+        values = [attribute.Get(self.time) for attribute in self._attributes(shader, name)]
+        return str(next((value for value in values if value is not None), ""))
+
+
+def _as_unlit(tree: Tree) -> Tree:
+    """Return a material in which the emission of an unlit scan is the colour of the surface."""
+    textures = tree["textures"]
+    if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
+        textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]
+        tree["emission"] = list(_BLACK)
+        tree["unused"].append("unlit colours, which are taken for the reflectance")
+    return tree
