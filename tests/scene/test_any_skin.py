@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,13 @@ def test_full_body_shows_all_of_a_body_with_a_margin() -> None:
     head = head_of(figure())
     x, y = np.abs(seen(dermis.full_body(head), head)).max(axis=0)
     assert 0.85 < y < 0.98 and x < y
+
+
+def test_the_guide_lists_all_presets() -> None:
+    guide = (Path(__file__).parents[2] / "docs" / "guide.md").read_text("utf-8")
+    section = guide.split("## Camera presets")[1].split("## ")[0]
+    rows = re.findall(r"(?m)^\| `([\w-]+)` \|", section)
+    assert rows == ["--camera", *CAMERA_PRESETS]
 
 
 def test_names_of_presets_have_hyphens_or_underscores() -> None:
