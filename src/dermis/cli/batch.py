@@ -212,18 +212,18 @@ def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
     print_lines(*lines)
 
 
-def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
+def _dry_run(spec: Spec, adapter: str, contact_sheet: Path, as_json: bool) -> int:
     from dermis.apps.batch.preview import dry_run, table_lines
     from dermis.images.io import check_output, write_png
 
-    check_output(sheet)
-    if sheet.suffix.lower() != ".png":
-        refuse(sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or omit -o")
+    check_output(contact_sheet)
+    if contact_sheet.suffix.lower() != ".png":
+        refuse(contact_sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or omit -o")
     with spinner("rendering a contact sheet"):
         rows, picture = dry_run(spec, adapter)
-    write_png(sheet, picture)
-    report = {"sheet": str(sheet), "parameters": rows}
-    print_report(as_json, report, lambda: [*table_lines(rows), str(sheet)])
+    write_png(contact_sheet, picture)
+    report = {"sheet": str(contact_sheet), "parameters": rows}
+    print_report(as_json, report, lambda: [*table_lines(rows), str(contact_sheet)])
     return 0
 
 

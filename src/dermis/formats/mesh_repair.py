@@ -314,7 +314,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
     surface = _Surface(piece, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normals(mesh))
-    doubtful = (surface.mean_cosine(surface.from_centroid()) < _MIN_CONVEXITY) | (agreement < _OPPOSED)
+    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (agreement < _OPPOSED)
     if doubtful.any():
         turned = _inside_out(surface, doubtful, agreement)
         reverse ^= turned[piece]
@@ -381,8 +381,8 @@ class _Surface:
         """Return twice the area of each triangle (f,) [mm²]."""
         return np.sqrt(dot_columns(self.area, self.area))
 
-    def from_centroid(self) -> Doubles:
-        """Return the direction from the centroid of its piece to that of each triangle, as columns (3, f)."""
+    def outward_directions(self) -> Doubles:
+        """Return the direction of each triangle from the centroid of its piece, as columns (3, f)."""
         centre = self.corners.mean(axis=0)
         total = np.maximum(np.bincount(self.piece, self.size), np.finfo(np.float64).tiny)
         for axis in centre:

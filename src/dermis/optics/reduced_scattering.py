@@ -53,9 +53,13 @@ def refuse_mcml(path: Path) -> NoReturn:
     refuse(path, expected, actual, "; ".join([advice, *values]))
 
 
-def _converted(n: float, mu_a: float, mu_s: float, g: float, d: float) -> str:
+def _converted(n: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
     """Return the keys and values of a layer of MCML in a file of this package."""
-    thickness = f"thickness_mm {10 * d:.4g}" if 10 * d <= _MAX_THICKNESS_MM else "no thickness_mm"
+    thickness = (
+        f"thickness_mm {10 * thickness_cm:.4g}"
+        if 10 * thickness_cm <= _MAX_THICKNESS_MM
+        else "no thickness_mm"
+    )
     coefficients = f"absorption_per_mm {mu_a / 10:.4g}, scattering_per_mm {_reduced(mu_s, g) / 10:.4g}"
     return f"{coefficients}, {thickness}, eta {n:.4g}"
 

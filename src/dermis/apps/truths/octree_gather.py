@@ -40,7 +40,7 @@ def gather_exitance(points: Floats, tree: Octree, table: ProfileTable, bound: fl
     """Add the exitance at each point to `exitance` (n, 3), and return the number of visited nodes and pieces.
 
     points : (n, 3) positions [mm]
-    bound : upper bound of the sum of all errors, over the profile's energy times the irradiance nearby [-]
+    bound : largest total error, relative to the profile's energy times the irradiance near a point [-]
     """
     size = 3 * _MAX_SUBDIVISIONS + 4
     stack = TriangleStack(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))

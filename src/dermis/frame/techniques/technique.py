@@ -253,7 +253,7 @@ class AtlasTechnique(Technique):
         mix.draw(graph, mixture, layout, into)
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
-        """Sum only the light through thin parts, by the passes that sum blurred levels, with weights of 0."""
+        """Sum the light through thin parts alone, with weights of 0 for the blurred levels."""
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, into, strict=False):
             unblurred, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency

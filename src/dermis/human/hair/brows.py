@@ -32,13 +32,13 @@ class SurfacePoints(NamedTuple):
     """Sampled skin points with their normals and tangents.
 
     position_mm, normal : (n, 3) positions [mm] and unit normals
-    along_x, along_y : (n, 3) derivatives of the position with respect to x and y of the front plane [-]
+    derivative_x, derivative_y : (n, 3) derivatives of the position by x and y of the front plane [-]
     """
 
     position_mm: Doubles
     normal: Doubles
-    along_x: Doubles
-    along_y: Doubles
+    derivative_x: Doubles
+    derivative_y: Doubles
 
     def step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
         """Convert steps along the skin to steps (dx, dy) in the front plane, each (n,) [mm].
@@ -46,7 +46,7 @@ class SurfacePoints(NamedTuple):
         directions : (n, 3) directions of the steps; only their tangential components count
         length : (n,) length of each step along the skin [mm]
         """
-        u, v = self.along_x, self.along_y
+        u, v = self.derivative_x, self.derivative_y
         pairs = (u, u), (u, v), (v, v), (u, directions), (v, directions)
         xx, xy, yy, x, y = (_row_dots(a, b) for a, b in pairs)
         dx, dy = yy * x - xy * y, xx * y - xy * x
@@ -100,10 +100,10 @@ class BrowSurface:
         near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
         weights = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
         values = np.einsum("nk,nkc->nc", weights, self._node.take(near, axis=0))
-        position, normal, along_x, along_y, plane = np.split(values, [3, 6, 9, 12], axis=1)
+        position, normal, derivative_x, derivative_y, plane = np.split(values, [3, 6, 9, 12], axis=1)
         # a curved surface is as far from its chords as from its tangent planes
         lift = 0.5 * (plane - _row_dots(position, normal)[:, None])
-        return SurfacePoints(position + lift * normal, normal, along_x, along_y)
+        return SurfacePoints(position + lift * normal, normal, derivative_x, derivative_y)
 
 
 def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:

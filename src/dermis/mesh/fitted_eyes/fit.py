@@ -28,7 +28,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
+_GRID_SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
 _MATERIAL_NAMES = "left eye", "right eye"
 _INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
@@ -67,7 +67,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
         return replace(head, note=reason)
     replaced = _ball_triangles(mesh, control.stencils, balls)
     shapes = _eye_shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
-    points, quads = build_eyeball(_SIDE)
+    points, quads = build_eyeball(_GRID_SIDE)
     pairs = list(zip(balls, shapes, strict=True))
     eyeballs = [
         FittedEyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs
@@ -79,7 +79,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
         rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
     new_mesh = _replace_eyeballs(mesh, replaced, [one.points for one in eyeballs], quads)
     starts = np.array([begin, begin + count], np.int32)
-    apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_SIDE))
+    apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_GRID_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
     radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
     gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in pairs])
@@ -130,7 +130,7 @@ def _eyeball_points(ball: Sphere, shape: _EyeShape) -> Doubles:
 
 def _shape_points(shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of an eyeball before scaling, about its centre and with axis +Z [mm]."""
-    points, _ = build_eyeball(_SIDE)
+    points, _ = build_eyeball(_GRID_SIDE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
     centre, radius = cornea_centre_mm() - shape.centre_offset_mm, shape.radius_mm
@@ -197,7 +197,7 @@ def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Mat
     count, faces = len(positions[0]), len(quads)
     return build_mesh(
         np.concatenate(positions),
-        np.tile(eyeball.eyeball_uv(_SIDE), (2, 1)),
+        np.tile(eyeball.eyeball_uv(_GRID_SIDE), (2, 1)),
         split_quads(np.concatenate([quads, count + quads])),
         np.repeat([0, 1], 2 * faces),
         materials,

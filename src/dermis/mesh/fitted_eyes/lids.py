@@ -44,7 +44,7 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return how far in front of its centre each ray meets the ball (n,); 0 for rays beside it [mm]."""
+        """Return how far in front of the ball's centre rays meet it (n,) [mm]; 0 for rays that miss it."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property

@@ -91,7 +91,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
 
 
 def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
-    """Downsample a picture (h, w, c) by area; pixels at the edges of larger ones count in part.
+    """Downsample a picture (h, w, c) by area; a pixel that straddles pixels of the result counts in each.
 
     size : width and height of the result [pixel]
     """

@@ -42,7 +42,7 @@ class _Points(NamedTuple):
     """Landmarks of a file.
 
     pixels : (n, 2) coordinates, NaN for missing landmarks [pixel]
-    names : names of the landmarks; None for those of a set in its order
+    names : names of the landmarks; None if they are all landmarks of a known set, in the order of that set
     set_name : name of the set, if the file states it
     """
 

@@ -107,7 +107,7 @@ def zero_width_row(subject: ComparisonSubject, light: str) -> str:
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
-    """Return the surface integral (h, w, 3) for an irradiance of 1 everywhere; 1 outside the head."""
+    """Return the light (h, w, 3) that leaves under an irradiance of 1, by the surface integral."""
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
