@@ -97,7 +97,7 @@ def test_the_size_is_judged_before_pixels_are_decoded(
 def test_heic_is_read_upright(tmp_path: Path, blocks: Bytes) -> None:
     pytest.importorskip("pi_heif")
     path = written(tmp_path / "a.jpg", TURNED_HEIC)
-    with pytest.warns(DermisWarning, match=r"a\.jpg: it is turned upright"):
+    with pytest.warns(DermisWarning, match=r"a\.jpg: it is turned upright as its EXIF says"):
         pixels = read_image(path)
     assert read_size(path) == (32, 48)
     assert np.median(np.abs(pixels.astype(int) - np.rot90(blocks, -1))) <= 2
@@ -132,16 +132,26 @@ def test_cmyk_is_converted_by_its_profile(tmp_path: Path) -> None:
     assert np.abs(pixels.astype(int) - (0, 193, 255)).max() <= 12
 
 
+def tiff(photometric: int, pixels: NDArray[np.uint16], gap: bytes = b"") -> bytes:
+    """Return a TIFF file of 16 bits, which Pillow does not write.
+
+    gap : bytes between its first eight bytes and its directory
+    """
+    rows, columns, samples = pixels.shape
+    values = {256: columns, 257: rows, 258: 0, 259: 1, 262: photometric, 273: 0, 277: samples, 278: rows}
+    start = 8 + len(gap)
+    end = start + 2 + 12 * (len(values) + 1) + 4
+    values |= {258: end, 273: end + 2 * samples, 279: pixels.nbytes}
+    entries = [struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items()]
+    entries[2] = struct.pack("<HHII", 258, 3, samples, end)
+    head = b"II*\0" + struct.pack("<I", start) + gap + struct.pack("<H", len(entries)) + b"".join(entries)
+    return head + bytes(4) + struct.pack(f"<{samples}H", *[16] * samples) + pixels.astype("<u2").tobytes()
+
+
 def test_cmyk_of_16_bits_is_not_taken_for_rgba(tmp_path: Path) -> None:
-    entries = [(256, 3, 8), (257, 3, 8), (258, 3, 8), (259, 3, 1), (262, 3, 5), (273, 4, 122), (277, 3, 4)]
-    entries += [(278, 3, 8), (279, 4, 512)]
-    rows = [struct.pack("<HHI", tag, kind, 1) + struct.pack("<I", value) for tag, kind, value in entries]
-    rows[2] = struct.pack("<HHII", 258, 3, 4, 634)
-    head = b"II*\0" + struct.pack("<IH", 8, len(rows)) + b"".join(rows) + bytes(4)
-    data = head + struct.pack("<4H", 0, 32768, 65535, 0) * 64 + struct.pack("<4H", 16, 16, 16, 16)
-    assert len(head) == 122
+    inks = np.broadcast_to(np.uint16([0, 32768, 65535, 0]), (8, 8, 4))
     with pytest.warns(DermisWarning, match="without a profile.*; its 16 bits a channel are reduced to 8"):
-        pixels = read_image(written(tmp_path / "a.tif", data))
+        pixels = read_image(written(tmp_path / "a.tif", tiff(5, inks)))
     assert np.abs(pixels.astype(int) - (255, 127, 0)).max() <= 1
 
 
@@ -160,6 +170,9 @@ def test_only_the_first_of_several_pictures_is_read(tmp_path: Path, blocks: Byte
 def test_a_preview_of_a_camera_raw_file_is_not_taken_for_the_picture(tmp_path: Path, blocks: Bytes) -> None:
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
+    data = tiff(2, np.zeros((8, 8, 3), np.uint16), b"CR\2\0\0\0\0\0")
+    with pytest.raises(DermisError, match=r"a\.cr2: .*raw file"):
+        read_image(written(tmp_path / "a.cr2", data))
     for tag, value in ((50706, b"\1\4\0\0"), (254, 1)):
         tags = ImageFileDirectory_v2()
         tags[tag] = value

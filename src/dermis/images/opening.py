@@ -48,7 +48,7 @@ _MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the la
 _GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
 _EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
 _ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
-_TIFF_SUBFILE, _TIFF_DNG_VERSION = 254, 50706
+_TIFF_SUBFILE, _TIFF_DNG_VERSION, _CANON_RAW = 254, 50706, b"CR"
 _SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # as PNG files state it
 
 
@@ -64,7 +64,7 @@ def picture_format(data: bytes) -> str | None:
 
 
 def open_picture(data: bytes) -> Image:
-    """Open a picture with Pillow after checking its header and its size; pixels are not decoded.
+    """Open a picture with Pillow after checking its header and its size; only HEIC is decoded at once.
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
     DermisError if a package is missing.
@@ -93,7 +93,7 @@ def open_picture(data: bytes) -> Image:
             PIL.Image.MAX_IMAGE_PIXELS = limit
     check_size(picture.width, picture.height)
     tags = getattr(picture, "tag_v2", {})
-    if _TIFF_DNG_VERSION in tags or tags.get(_TIFF_SUBFILE, 0) & 1:
+    if _TIFF_DNG_VERSION in tags or tags.get(_TIFF_SUBFILE, 0) & 1 or data[8:10] == _CANON_RAW:
         raise UnsupportedError("it is a camera's raw file, of which only a preview can be read")
     scanned = data.count(_JPEG_SCAN) * picture.width * picture.height
     if name == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
@@ -122,7 +122,7 @@ def _decoded_heic(data: bytes) -> Arrays:
 
 
 def pillow_header(data: bytes) -> PictureHeader:
-    """Return what the header of a picture file says; pixels are not decoded.
+    """Return what the header of a picture file says.
 
     Raises errors as `open_picture`.
     """
@@ -254,7 +254,7 @@ def _notes(data: bytes, picture: Image) -> Iterator[str]:
     if (bits := _bits(data, picture)) > 8:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
-        yield "it is turned upright by its EXIF"
+        yield "it is turned upright as its EXIF says"
     if _has_several(picture):
         yield "it has several pictures, and only the first is read"
 
