@@ -266,9 +266,12 @@ def _unit(vectors: Doubles) -> Doubles:
 
 
 def decode(request: Arrays) -> Arrays:
-    """Return the meshes of the file with the name "path", see `_SceneReader.read`."""
-    path = Path(as_text(request["path"]))
-    stage, folder = open_stage(path, Path.cwd())
+    """Return the meshes of a file, see `_SceneReader.read`.
+
+    request : "file", its absolute path, and "path", as users name it
+    """
+    file, path = (Path(as_text(request[name])) for name in ("file", "path"))
+    stage, folder = open_stage(file, path, Path.cwd())
     return _SceneReader(path, stage, folder).read()
 
 

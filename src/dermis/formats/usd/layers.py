@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
+_LOCATED_FAULT = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
+"""Position of a fault in a text layer, and the rest of the line."""
 _MAX_LAYERS, _MAX_ENTRIES = 256, 4096
 _ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
@@ -26,17 +29,19 @@ class OpenedStage(NamedTuple):
     folder: Path
 
 
-def open_stage(path: Path, copies: Path) -> OpenedStage:
+def open_stage(file: Path, path: Path, copies: Path) -> OpenedStage:
     """Open the stage of a USD file.
 
+    file : the file, by its absolute path
+    path : the same as users name it, for errors
     copies : empty folder for layers of a package
 
     Raises DermisError when a layer is missing, damaged, or not in the folder of the file or below it.
     """
     usd: Any = import_extra("pxr.Usd", f"{path}: USD scenes")
-    root, folder = path.resolve(), path.resolve().parent
-    if path.suffix.lower() == ".usdz":
-        root, folder = _extract_layers(path, copies.resolve()), copies.resolve()
+    root, folder = file, file.parent
+    if file.suffix.lower() == ".usdz":
+        root, folder = _extract_layers(file, path, copies.resolve()), copies.resolve()
     _check_layers(path, root, folder)
     stage = usd.Stage.Open(str(root))
     if stage is None:
@@ -44,9 +49,9 @@ def open_stage(path: Path, copies: Path) -> OpenedStage:
     return OpenedStage(stage, folder)
 
 
-def _extract_layers(path: Path, folder: Path) -> Path:
+def _extract_layers(file: Path, path: Path, folder: Path) -> Path:
     """Copy the layers of a package to a folder, and return the root layer, which is the first entry."""
-    with zipfile.ZipFile(path) as package:
+    with zipfile.ZipFile(file) as package:
         entries = package.infolist()
         layers = [one for one in entries if Path(one.filename).suffix.lower() in LAYER_SUFFIXES]
         check_limit(path, len(entries), _MAX_ENTRIES, "files in the package", "Export the head alone")
@@ -70,7 +75,11 @@ def _check_layers(path: Path, root: Path, folder: Path) -> None:
         file = pending.pop()
         size += file.stat().st_size
         check_limit(path, size, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
-        layer = sdf.Layer.FindOrOpen(str(file))
+        try:
+            layer = sdf.Layer.FindOrOpen(str(file))
+        except RuntimeError as fault:
+            reason = _LOCATED_FAULT.search(str(fault))
+            _refuse_damaged(path, f" ({reason[1]})" if reason else "")
         if layer is None:
             _refuse_damaged(path)
         for name in _layer_names(path, layer):
@@ -110,5 +119,5 @@ def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
     return file if is_layer else None
 
 
-def _refuse_damaged(path: Path) -> NoReturn:
-    refuse(path, "a USD scene", "it cannot be opened", DAMAGED_ADVICE)
+def _refuse_damaged(path: Path, reason: str = "") -> NoReturn:
+    refuse(path, "a USD scene", f"it cannot be opened{reason}", DAMAGED_ADVICE)

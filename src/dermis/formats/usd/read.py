@@ -36,7 +36,7 @@ def read_usd(path: Path) -> MeshFile:
     Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
-    request = {"path": from_text(str(path.resolve()))}
+    request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
     answer = run_decoder(_DECODER, request, len(data), path, "a valid USD file")
     scene: Tree = parse_json(as_text(answer["scene"]), path, "a valid USD file")
     pictures = _Pictures(path, data)

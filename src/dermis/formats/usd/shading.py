@@ -154,12 +154,12 @@ class MaterialReader:
                 tree["unused"].append(text)
 
     def _file(self, texture: UsdShade.Shader) -> str:
-        """Return the name of a picture relative to the folder of the layers; empty if it is outside."""
+        """Return the name of a picture relative to the folder of the layers; if it is outside, as written."""
         for attribute in self._attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
-            file = (Path(layer.realPath).parent / str(asset.path if asset else "")).resolve()
-            if file != self.folder and file.is_relative_to(self.folder):
-                return file.relative_to(self.folder).as_posix()
+            name = str(asset.path) if asset else ""
+            file = (Path(layer.realPath).parent / name).resolve()
+            return file.relative_to(self.folder).as_posix() if file.is_relative_to(self.folder) else name
         return ""
 
     def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
