@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import struct
 from collections.abc import Mapping
 from functools import cache
@@ -20,6 +21,7 @@ from adversity.kind import Kind
 from adversity.kinds.pictures import picture_bytes
 from encoded_glb import encode_glb
 from moving_head import write_moving_head
+from ply_file import ORDERS, ply_bytes
 from rigged_head import write_rigged_head
 from small_head import SIZE, obj_text
 
@@ -59,9 +61,32 @@ def head_files() -> Mapping[str, bytes]:
     return {"head.obj": "\n".join(parts).encode(), "head.mtl": _MTL.encode(), **pictures}
 
 
+@cache
+def _varied_obj() -> bytes:
+    """Return the OBJ head with a byte order mark, relative indices, colours, polypaint, curves and lines."""
+    lines = head_files()["head.obj"].decode().splitlines()
+    places, uv, faces = ([line for line in lines if line.startswith(key)] for key in ("v ", "vt", "f"))
+    mixed = re.sub(r"/\d+$", "//", faces[0])
+    relative = [
+        re.sub(r"\d+", lambda one: str(int(one[0]) - len(places) - 1), face) for face in [mixed, *faces[1:]]
+    ]
+    more = [
+        "o head",
+        "s off",
+        "#MRGB " + "ff804020" * len(places),
+        "vp 0.5",
+        "curv 0 1 -1 -2",
+        "l 1 2 \\",
+        " 3",
+    ]
+    rows = [*(f"{place} 0.5 0.25 1" for place in places), *uv, *more, "usemtl skin", *relative]
+    return "\r\n".join(["\ufeffmtllib head.mtl", *rows, ""]).encode()
+
+
 def _obj(rng: Random) -> Input:
     changed = ("head.obj",) * 4 + ("head.mtl",) * 2 + tuple(_MAPS)
-    return Input(head_files(), _plan("head.obj"), changed)
+    varied = {"head.obj": _varied_obj()} if rng.random() < 0.5 else {}
+    return Input({**head_files(), **varied}, _plan("head.obj"), changed)
 
 
 @cache
@@ -85,8 +110,27 @@ def _ply_binary() -> bytes:
     return head.replace("ascii", "binary_little_endian").encode() + b"end_header\n" + points + faces
 
 
+@cache
+def _varied_ply(order: str) -> bytes:
+    """Return the PLY head with uv of corners, colours, a picture, strips and lists of several lengths."""
+    ball = uv_sphere(0.5, 24, 12)
+    wedges = ball.uv[ball.triangles].reshape(-1, 6).tolist()
+    places = [(*place, 200, 150, 120, 255) for place in (ball.positions * SIZE).tolist()]
+    faces = [
+        ([*face], 0, uv if face[0] % 5 else [])
+        for face, uv in zip(ball.triangles.tolist(), wedges, strict=True)
+    ]
+    colours = "uchar red, uchar green, uchar blue, uchar alpha"
+    elements = {
+        "vertex": (f"double x, double y, double z, {colours}", places),
+        "face": ("list uchar int vertex_index, int texnumber, list uchar float texcoord", faces),
+        "tristrips": ("list int int vertex_indices", [([0, 1, 25, -1],)]),
+    }
+    return ply_bytes(elements, order, ["TextureFile gone.png"])
+
+
 def _ply(rng: Random) -> Input:
-    data = rng.choice((_ply_text().encode(), _ply_binary()))
+    data = rng.choice((_ply_text().encode(), _ply_binary(), *map(_varied_ply, ORDERS)))
     return Input({"head.ply": data}, _plan("head.ply"))
 
 
