@@ -34,7 +34,7 @@ class _Primvar(NamedTuple):
     """Values (n, k), and the index of the value of each corner (c,)."""
 
     values: Doubles
-    index: Index
+    corner_index: Index
 
 
 class _Faces(NamedTuple):
@@ -136,7 +136,7 @@ class _SceneReader:
         arrays["vertex"] = faces.vertex[order]
         for name, primvar in (("uv", uv), ("normals", normals)):
             if primvar is not None:
-                arrays |= {name: primvar.values, f"{name} index": primvar.index[order]}
+                arrays |= {name: primvar.values, f"{name} index": primvar.corner_index[order]}
         if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
             arrays["normals"] = _unit(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
@@ -256,7 +256,7 @@ class _SceneReader:
         if primvar.GetInterpolation() == "constant" and not named:
             return found.values[0].tolist(), None
         weight = np.maximum(np.bincount(faces.vertex, minlength=count), 1)
-        sums = [np.bincount(faces.vertex, found.values[found.index, k], count) for k in range(3)]
+        sums = [np.bincount(faces.vertex, found.values[found.corner_index, k], count) for k in range(3)]
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 

@@ -10,13 +10,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from dermis.base.arrays import Index, Numbers
+from dermis.base.arrays import Index, Mask
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.native_decoding import as_text, from_text, run_decoder
 from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
-from dermis.formats.materials import FileMaterial, PathLike, Role, Texture, check_pictures
+from dermis.formats.maps import PathLike
+from dermis.formats.materials import FileMaterial, Role, Texture, check_pictures
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, parse_colour
 from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small
 from dermis.formats.referenced_files import find_referenced_file
@@ -73,8 +74,8 @@ def _parts(
     none, vertex = np.empty((0, 3)), mesh["vertex"]
     missing = np.full(len(vertex), -1)
     columns = [vertex, mesh.get("uv index", missing), mesh.get("normals index", missing)]
-    kept = mesh["group"] >= 0
-    counts, corners = _selected(mesh["counts"], np.column_stack(columns), kept)
+    kept: Mask = np.asarray(mesh["group"] >= 0)
+    counts, corners = _selected(mesh["counts"], np.column_stack(columns).astype(np.int64), kept)
     counts, corners, polygons, notes = without_small(counts, corners)
     if not len(counts):
         return [], notes
@@ -89,7 +90,7 @@ def _parts(
     return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
 
 
-def _selected(counts: Index, corners: Numbers, kept: Numbers) -> tuple[Index, Numbers]:
+def _selected(counts: Index, corners: Index, kept: Mask) -> tuple[Index, Index]:
     """Return the polygons of which `kept` (n,) is true: their numbers of corners, and their corners."""
     corner = expand_runs((np.cumsum(counts) - counts)[kept], counts[kept])[1]
     return counts[kept], corners[corner]
