@@ -13,7 +13,7 @@ from dermis.cli.options import AdapterOption, JsonOption, Options
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
 
-_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")
+_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR", "pillow")
 
 
 def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:

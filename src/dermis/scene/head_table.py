@@ -61,7 +61,8 @@ class HeadTable(FrozenModel):
     """The [head] table of a scene file: options of `load_head`, and a table of face regions."""
 
     name: str
-    """A person (human, human:SEED, .json), a sample (lee_perry_smith) or a mesh (.glb .gltf .obj .ply)."""
+    """A person (human, human:SEED, .json), a sample (lee_perry_smith) or a mesh (.glb .gltf .vrm .usdz .obj
+    .ply .stl)."""
     colour: str | None = None
     """Colour map (sRGB)."""
     normal: str | None = None
@@ -75,11 +76,12 @@ class HeadTable(FrozenModel):
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
     unit_mm: _Unit = None
-    """Length of the file's unit [mm]; when left out 1000 for glTF, for OBJ and PLY a guess from the size."""
+    """Length of the file's unit [mm]; when left out 1000 for glTF, that stated by USD, else a guess from the
+    size."""
     v_origin: VOrigin = "auto"
     """Row of the maps at v = 0; "auto" follows the format."""
     up: Axis = "y"
-    """Upward axis of the file."""
+    """Upward axis of the file; that stated by USD replaces the default."""
     front: Front = "auto"
     """Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z."""
     normal_y: NormalY = "up"
