@@ -95,7 +95,7 @@ def test_other_files_are_refused_with_a_sentence(name: str, server: Server) -> N
     status, said = server.send(name, b"x")
     assert status != 200 and server.got == []
     if status == 400:
-        assert ".glb, .obj, .ply, .json, .toml" in said
+        assert ".glb, .vrm, .usdz, .obj, .ply, .stl, .json, .toml" in said
 
 
 @pytest.mark.parametrize("ticket", ["", "other", "secret2"])

@@ -89,7 +89,7 @@ def animate(
     Parameters
     ----------
     head:
-        Mesh (.glb .gltf .obj .ply), sample name or scene (.toml).
+        Mesh (.glb .gltf .vrm .usdz .obj .ply .stl), sample name or scene (.toml).
     motion:
         File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .json of MediaPipe, or a
         sequence of meshes such as face_%05d.obj. [default: the file of the head]

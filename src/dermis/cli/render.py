@@ -68,7 +68,7 @@ def render(
     ----------
     head:
         human (the head of the package), human:SEED (a random person), a person (.json), a sample
-        (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene (.toml).
+        (lee_perry_smith), a mesh (.glb .gltf .vrm .usdz .obj .ply .stl) or a scene (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); with alpha if --background is
         none.

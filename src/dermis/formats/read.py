@@ -19,6 +19,7 @@ from dermis.formats.mesh_checks import check_arrays, check_counts
 from dermis.formats.obj import read_obj
 from dermis.formats.parts import MeshFile, MeshPart
 from dermis.formats.ply import read_ply
+from dermis.formats.stl import read_stl
 from dermis.formats.usd.read import USD_SUFFIXES, read_usd
 from dermis.mesh.geometry import compact_vertices, expand_runs
 
@@ -34,8 +35,18 @@ MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".vrm": read_gltf,
     ".obj": read_obj,
     ".ply": read_ply,
+    ".stl": read_stl,
     **dict.fromkeys(USD_SUFFIXES, read_usd),
 }
+_BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
+_OTHER_PROGRAMS = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
+_SUFFIX_ADVICE = {
+    ".fbx": _BLENDER_ADVICE.format("File > Import > FBX, then "),
+    ".abc": _BLENDER_ADVICE.format("File > Import > Alembic, then "),
+    ".blend": _BLENDER_ADVICE.format(""),
+    **dict.fromkeys(_OTHER_PROGRAMS, "Export it as glTF (.glb) or OBJ from the program that wrote it"),
+}
+"""Advice for files of formats that are not read."""
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
@@ -149,7 +160,8 @@ def read_mesh_file(source: Path) -> MeshFile:
     reader = MESH_READERS.get(source.suffix.lower())
     if reader is None:
         actual = f"the suffix is {source.suffix!r}"
-        refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, "Export it as one of these")
+        advice = _SUFFIX_ADVICE.get(source.suffix.lower(), "Export it as one of these")
+        refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, advice)
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     # readers may raise any exception for damaged files

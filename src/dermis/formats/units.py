@@ -15,7 +15,7 @@ from dermis.formats.parts import default_unit_mm
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.skull import MAX_ELONGATION, is_standing_figure, principal_sizes
 
-WITHOUT_UNIT = (".obj", ".ply")
+WITHOUT_UNIT = (".obj", ".ply", ".stl")
 """Suffixes of formats that do not state a unit."""
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 _SIZE_MM = (1.0, 3000.0)  # smallest and largest that is accepted

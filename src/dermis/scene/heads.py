@@ -74,20 +74,22 @@ def load_head(
     ----------
     head : str or path
         "human" for the parametric human, "human:7" for the person of seed 7, a .json file written by `dermis
-        head`, a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply).
+        head`, a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .vrm, .usdz, .obj, .ply, .stl).
     colour, normal, height, specular, roughness : str or path, optional
         Image files of the maps; see `dermis.formats.maps.load_maps`.
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the unit of the file [mm]; by default 1000 for glTF. For OBJ and PLY, which state none, 1 if
-        the mesh is then 100 to 1000 mm large, else a guess from the size, with a note.
+        Length of the unit of the file [mm]; by default 1000 for glTF, and as stated for USD. For OBJ, PLY and
+        STL, which state none, 1 if the mesh is then 100 to 1000 mm large, else a guess from the size, with a
+        note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
     up : {"y", "z", "x", "-y", "-z", "-x"}
-        Upward axis of the file.
+        Upward axis of the file; that stated by USD replaces the default.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z.
+        Axis of the file along which the face looks; "auto" for -z in avatars of VRM 0, -y with z up, as in
+        Blender, else z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     skin_groups : str or sequence of str

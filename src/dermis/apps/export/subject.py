@@ -14,6 +14,7 @@ import numpy as np
 from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
+from dermis.formats.read import MESH_READERS
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyeTextures
@@ -41,7 +42,6 @@ PROFILE_MODELS: tuple[ModelName, ...] = get_args(ModelName)
 _PHOTON_COUNT = 1_000_000
 _MAP_ROLES = "colour", "normal", "roughness", "specular", "height"
 _MIN_ALBEDO = 1e-9
-_MESH_SUFFIXES = ".glb", ".gltf", ".obj", ".ply"
 _MAX_NAME_LENGTH = 40
 
 
@@ -143,7 +143,7 @@ def load_subject(
     """Load a skin or a head by name or from a file, and return it with its reference profile.
 
     source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
-        "human", "human:7", a person's .json, a sample, or a mesh (.glb, .gltf, .obj, .ply)
+        "human", "human:7", a person's .json, a sample, or a mesh (.glb, .obj, .usdz, ...)
     profile : skin of a head; by default a person's own pigments, or the default skin
     model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
@@ -152,7 +152,7 @@ def load_subject(
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
-    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in _MESH_SUFFIXES):
+    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in MESH_READERS):
         return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(source, **head)
     if profile is not None:

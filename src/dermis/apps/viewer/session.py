@@ -30,7 +30,7 @@ from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.skin import Skin
 
-HEAD_FILE_SUFFIXES = (".glb", ".obj", ".ply", ".json", ".toml")
+HEAD_FILE_SUFFIXES = (".glb", ".vrm", ".usdz", ".obj", ".ply", ".stl", ".json", ".toml")
 """Suffixes of files that a page may upload: meshes, people and scenes."""
 
 _MAX_RECENT = 8

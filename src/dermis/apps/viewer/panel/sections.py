@@ -276,7 +276,7 @@ def draw_head(session: Session) -> None:
             "###path", hint, session.head_file, _ON_ENTER_FLAG
         )
         record_position(session, "path")
-        draw_tooltip("A mesh (.glb .gltf .obj .ply), a person (.json) or a scene (.toml).")
+        draw_tooltip("A mesh (.glb .gltf .vrm .usdz .obj .ply .stl), a person (.json) or a scene (.toml).")
         imgui.same_line()
         if draw_button(session, "open###open file") or is_path_entered:
             session.heads.open(session.head_file)

@@ -1,0 +1,61 @@
+"""STL files, binary or text: triangles without uv, names and colours."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.base.errors import refuse
+from dermis.base.reading import read_file
+from dermis.formats import size_limits as limits
+from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart
+from dermis.formats.text_files import parse_numbers
+
+_HEADER_BYTES = 84
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_CORNER_LINE = re.compile(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
+
+
+def read_stl(path: Path) -> MeshFile:
+    """Read a .stl file; corners at the same position become one vertex."""
+    data = read_file(path, "an STL file", limits.MAX_FILE_BYTES)
+    count = int.from_bytes(data[_HEADER_BYTES - 4 : _HEADER_BYTES], "little")
+    is_binary = len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + count * _RECORD.itemsize
+    if is_binary or data.lstrip()[:5].lower() != b"solid":
+        corners, notes = _binary_corners(path, data, count)
+    else:
+        corners, notes = _text_corners(path, data), ()
+    positions, index = np.unique(corners, axis=0, return_inverse=True)
+    part = MeshPart(MaterialGroup(()), positions + 0.0, None, None, index.reshape(-1, 3))
+    return MeshFile([part], notes=notes)
+
+
+def _binary_corners(path: Path, data: bytes, count: int) -> tuple[Doubles, tuple[str, ...]]:
+    """Return the corners (3f, 3) of a binary file, and notes.
+
+    count : of triangles that its header states
+    """
+    _check_count(path, count)
+    if len(data) < _HEADER_BYTES + count * _RECORD.itemsize:
+        actual = f"{len(data):,} bytes are too few for its {count:,} triangles"
+        refuse(path, "a whole STL file", actual, limits.DAMAGED_ADVICE)
+    records = np.frombuffer(data, _RECORD, count, _HEADER_BYTES)
+    notes = ("colours of triangles are left out",) if records["attribute"].any() else ()
+    return records["corners"].reshape(-1, 3).astype(np.float64), notes
+
+
+def _text_corners(path: Path, data: bytes) -> Doubles:
+    """Return the corners (3f, 3) of a text file."""
+    lines = _CORNER_LINE.findall(data)
+    _check_count(path, len(lines) // 3)
+    if len(lines) % 3:
+        actual = f"it has {len(lines):,} corners"
+        refuse(path, "three corners for each triangle", actual, limits.DAMAGED_ADVICE)
+    return parse_numbers(np.frombuffer(b" ".join(lines), np.uint8), 3 * len(lines), np.float64).reshape(-1, 3)
+
+
+def _check_count(path: Path, count: int) -> None:
+    limits.check_limit(path, count, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
