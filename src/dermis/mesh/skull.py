@@ -23,6 +23,7 @@ _MIN_MEAN_NORMAL = 0.2  # of an open piece; of closed meshes it is 0
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 # Sections of a standing figure, as fractions of its height, and widths relative to its height.
 _HEAD_SECTION, _NECK_SECTIONS, _SHOULDER_SECTIONS = 0.95, (0.82, 0.85, 0.88), (0.74, 0.77, 0.8)
+_MIN_FIGURE_TO_DEPTH = 2.5
 _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 
 
@@ -48,12 +49,14 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     positions : (v, 3) vertices, Y up
     triangles : (f, 3) vertex indices
     """
-    bottom, height = float(positions[:, 1].min()), float(np.ptp(positions[:, 1]))
-    if height == 0:
+    width, height, depth = (float(one) for one in np.ptp(positions, axis=0))
+    if height <= _MIN_FIGURE_TO_DEPTH * min(width, depth):
         return False
+    points, ends = positions.astype(np.float64), positions[:, 1][triangles]
+    low, high = ends.min(axis=1), ends.max(axis=1)
     levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
-    sections = [_section(positions, triangles, bottom + level * height) for level in levels]
-    head, *others = sections
+    heights = [float(points[:, 1].min()) + level * height for level in levels]
+    head, *others = (_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
     neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
     shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
     return (
@@ -133,13 +136,14 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _section(positions: Floats, triangles: Ints, height: float) -> _Section:
-    x, y = positions[:, 0].astype(np.float64), positions[:, 1].astype(np.float64)
-    above = y[triangles] > height
-    cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
+def _section(positions: Doubles, cut: Ints, height: float) -> _Section:
+    """Return the section at a height.
+
+    cut : (n, 3) vertex indices of the triangles that it cuts
+    """
     if not len(cut):
         return _Section(0, 0.0, 0.0)
-    a, b = cut, np.roll(cut, 1, axis=1)
+    (x, y), a, b = positions.T[:2], cut, np.roll(cut, 1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing: Doubles = x[a] + (x[b] - x[a]) * (height - y[a]) / (y[b] - y[a])
     crossing[(y[a] > height) == (y[b] > height)] = np.nan

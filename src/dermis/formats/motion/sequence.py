@@ -95,9 +95,10 @@ def load_sequence(
     read immediately, the others on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
-    if unit_mm is None:
-        unit_mm = _unit_of_head(files[0], head, FrameReader(None, up, front))
-    frames = _FrameCache(tuple(files), head, FrameReader(unit_mm, up, front))
+    reader = FrameReader(unit_mm, up, front)
+    if unit_mm is None and (unit := _unit_of_head(files[0], head, reader)) != default_unit_mm(files[0]):
+        reader = FrameReader(unit, up, front)
+    frames = _FrameCache(tuple(files), head, reader)
     for index in {0, len(files) // 2, len(files) - 1}:
         frames.positions(index)
 
