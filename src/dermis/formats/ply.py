@@ -272,7 +272,7 @@ class _ElementReader:
         for one in properties:
             count = lengths.get(one, np.ones_like(start))
             start = start + (self._dtype(one.length_dtype).itemsize if one.length_dtype else 0)
-            values = self._gather(start, count, one.dtype)
+            values = self._gather(start, count, one.dtype, size)
             columns[one.name] = _List(count, values) if one.length_dtype else values
             start = start + count * self._dtype(one.dtype).itemsize
         return columns, end
@@ -289,12 +289,19 @@ class _ElementReader:
             actual = f"it ends within its elements named {self.element.name!r}"
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
-    def _gather(self, start: Index, count: Index, dtype: str) -> Numbers:
-        """Return `count` values of one type from each of the positions `start`, concatenated."""
+    def _gather(self, start: Index, count: Index, dtype: str, size: Index) -> Numbers:
+        """Return `count` values of one type from each of the positions `start`, concatenated.
+
+        size : of each row [bytes]
+        """
         stored = self._dtype(dtype)
-        row, item = expand_runs(np.zeros_like(count), count)
-        first = start[row] + stored.itemsize * item
-        values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
+        if (size == size[0]).all() and (count == count[0]).all():
+            shape, strides = (len(count), int(count[0])), (int(size[0]), stored.itemsize)
+            values = np.ndarray(shape, stored, self.data, int(start[0]), strides).reshape(-1)
+        else:
+            row, item = expand_runs(np.zeros_like(count), count)
+            first = start[row] + stored.itemsize * item
+            values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
         return np.asarray(values.astype(dtype))
 
     def _lengths(self, position: int) -> list[Index]:

@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.base.errors import refuse
 from dermis.formats import size_limits as limits
 from dermis.formats.parts import MaterialGroup, MeshPart
-from dermis.mesh.geometry import expand_runs
+from dermis.mesh.geometry import compact_vertices, expand_runs
 
 TriangleOrder = Literal["by polygon", "by kind"]
 
@@ -65,10 +65,14 @@ class Polygons:
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():
             uv = np.zeros_like(uv)
-        sizes = len(self.normals) + 1, len(self.uv) + 1
-        keys, index = np.unique((vertex * sizes[0] + normal) * sizes[1] + uv, return_inverse=True)
-        keys, uv = np.divmod(keys, sizes[1])
-        vertex, normal = np.divmod(keys, sizes[0])
+        if all(not own.any() or np.array_equal(own, vertex + 1) for own in (uv, normal)):
+            used, index = compact_vertices(vertex)
+            vertex, uv, normal = used, uv.any() * (used + 1), normal.any() * (used + 1)
+        else:
+            sizes = len(self.normals) + 1, len(self.uv) + 1
+            keys, index = np.unique((vertex * sizes[0] + normal) * sizes[1] + uv, return_inverse=True)
+            keys, uv = np.divmod(keys, sizes[1])
+            vertex, normal = np.divmod(keys, sizes[0])
         triangles, quads = triangulate(counts, order)
         return MeshPart(
             group,
@@ -102,9 +106,10 @@ def without_small(counts: Index, corners: Index) -> tuple[Index, Index, Mask, li
     Returns the numbers of corners, the corners, which polygons are left, and a note if some are left out.
     """
     kept = counts >= 3
-    lost = np.count_nonzero(~kept)
-    notes = [f"{lost:,} faces of fewer than three corners are left out"] if lost else []
-    return counts[kept], corners[np.repeat(kept, counts)], kept, notes
+    if kept.all():
+        return counts, corners, kept, []
+    note = f"{np.count_nonzero(~kept):,} faces of fewer than three corners are left out"
+    return counts[kept], corners[np.repeat(kept, counts)], kept, [note]
 
 
 def refuse_without_faces(path: Path, points: int) -> NoReturn:
