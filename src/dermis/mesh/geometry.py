@@ -135,9 +135,9 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
 
     corners : (f, 3, 3) corner positions [mm]
     """
-    p = np.asarray(corners, dtype=np.float64)
-    cross = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
+    a, b, c = np.ascontiguousarray(np.asarray(corners, np.float64).transpose(1, 2, 0))
+    cross = cross_columns(b - a, c - a)
+    return np.sqrt(dot_columns(cross, cross)) / 2
 
 
 def cross_2d(a: Doubles, b: Doubles) -> Doubles:
