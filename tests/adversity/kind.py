@@ -22,6 +22,7 @@ class Kind:
     share : number of inputs of this kind in each round of a campaign
     cpu_s : CPU time for one input [s]
     opens_device : whether it opens a device, which the process that others are forked from must not
+    warmed : number of valid inputs that are processed first: all that it can begin with
     """
 
     name: str
@@ -31,6 +32,7 @@ class Kind:
     share: int = 10
     cpu_s: float = 10.0
     opens_device: bool = False
+    warmed: int = 24
 
     def make(self, folder: Path, seed: int, number: int) -> Plan:
         """Write the files of an input to a folder and return its plan."""

@@ -277,3 +277,14 @@ def test_too_many_sheets_are_refused() -> None:
     box = np.array([[[0, 0], [1, 0]], [[1, 0], [0, 1]], [[0, 1], [0, 0]]], dtype=np.float64)
     with pytest.raises(DermisError, match="fewer charts"):
         pack_charts([box] * 40, 0.2)
+
+
+def test_a_small_closed_piece_is_cut_into_charts_with_borders() -> None:
+    ball, corners = uv_sphere(100, 24, 12), np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    points = np.unique(ball.positions.astype(np.float64).round(6), axis=0, return_inverse=True)
+    triangles = points[1].reshape(-1)[ball.triangles]
+    piece = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]) + len(points[0])
+    positions = np.vstack((points[0], 20.0 * corners + np.array([300, 0, 0])))
+    joined = np.vstack((triangles, piece))
+    layout = unwrap(positions, joined, grow_charts(positions, joined, 4))
+    assert len(np.unique(layout.chart[-4:])) > 1 and np.isfinite(layout.uv).all()

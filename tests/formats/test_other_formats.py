@@ -6,30 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stl_file import BALL, write_stl
 
 from dermis.base.errors import DermisError
 from dermis.formats.load import load_rigged
 from dermis.formats.read import read_mesh_file
 from dermis.formats.size_limits import MAX_TRIANGLES
-from dermis.mesh.primitives import uv_sphere
 from dermis.scene.heads import load_head
-
-BALL = uv_sphere(120, 12, 8)
-RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-
-
-def write_stl(path: Path, *, text: bool = False, attribute: int = 0, header: bytes = b"") -> Path:
-    """Write a ball of 240 mm."""
-    corners = BALL.positions[BALL.triangles]
-    if text:
-        rows = ["\n".join("  vertex {:.8e} {:.8e} {:.8e}".format(*one) for one in three) for three in corners]
-        facets = [f"facet normal 0 0 0\n outer loop\n{row}\n endloop\nendfacet" for row in rows]
-        path.write_text("\n".join(["solid ball", *facets, "endsolid ball", ""]))
-        return path
-    records = np.zeros(len(corners), RECORD)
-    records["corners"], records["attribute"] = corners, attribute
-    path.write_bytes(header.ljust(80, b"\0") + len(corners).to_bytes(4, "little") + records.tobytes())
-    return path
 
 
 @pytest.mark.parametrize("form", ["binary", "text", "binary that begins with solid"])

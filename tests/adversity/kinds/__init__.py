@@ -14,6 +14,7 @@ from adversity.kinds import (
     caches,
     clips,
     commands,
+    containers,
     datasets,
     frames,
     large,
@@ -27,6 +28,7 @@ from adversity.kinds import (
 
 _PARTS = (
     meshes,
+    containers,
     pictures,
     scenes,
     specs,
@@ -40,7 +42,6 @@ _PARTS = (
     commands,
 )
 KINDS: dict[str, Kind] = {kind.name: kind for part in _PARTS for kind in part.KINDS}
-_WARMED = 24  # sound inputs of each kind: all that it can begin with
 
 
 def prepare(kinds: dict[str, Kind] = KINDS) -> None:
@@ -48,6 +49,6 @@ def prepare(kinds: dict[str, Kind] = KINDS) -> None:
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for kind in (one for one in kinds.values() if not one.opens_device):
-            for number in range(_WARMED):
+            for number in range(kind.warmed):
                 with TemporaryDirectory() as folder, chdir(folder):
                     kind.take(kind.sound(Random(number)).write(Path(folder)))

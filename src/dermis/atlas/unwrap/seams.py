@@ -103,11 +103,19 @@ class ChartMesh(NamedTuple):
     triangles: Index
 
     def flatten(self, chart: Index) -> FlatCharts:
-        """Flatten charts, given as the chart of each triangle (f,), and mark faulty triangles."""
+        """Flatten charts, given as the chart of each triangle (f,), and mark faulty triangles.
+
+        Closed pieces are opened: their first triangle becomes a chart.
+        """
         corners, point = split_at_seams(self.triangles, chart)
+        piece = vertex_components(corners, len(point))[corners[:, 0]]
+        closed = np.setdiff1d(piece, piece[border_edges(corners)[1]])
+        if len(closed):
+            opened, first = chart.copy(), np.unique(piece, return_index=True)[1]
+            opened[first[closed]] = chart.max() + 1 + np.arange(len(closed))
+            return self.flatten(opened)
         ones = np.ones(len(corners))
         uv_mm = flatten(self.positions[point], corners, ones, ones)
-        piece = vertex_components(corners, len(point))[corners[:, 0]]
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
     def subset(self, chosen: Mask) -> ChartMesh:

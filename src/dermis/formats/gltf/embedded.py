@@ -30,7 +30,8 @@ def embedded_eye_look(path: Path) -> EyeLook:
 
     Raises DermisError for invalid parameters.
     """
-    notes = read_document(path).tree.get("asset", {}).get("extras")
+    asset = read_document(path).tree.get("asset")
+    notes = asset.get("extras") if isinstance(asset, dict) else None
     person = notes.get("person") if isinstance(notes, dict) else None
     eyes = person.get("eyes") if isinstance(person, dict) else None
     if not isinstance(eyes, dict):
