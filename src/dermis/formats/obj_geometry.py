@@ -6,7 +6,7 @@ Statements of numbers are parsed as arrays, all others one by one.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -37,8 +37,9 @@ _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
 _USED_NUMBERS, _MOST_NUMBERS = 6, 16  # position and colour; in a statement
 _POLYPAINT = "#MRGB"
 READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAINT)
-STATEMENTS_WITHOUT_MEANING = ("s", "mg", "")
+STATEMENTS_WITHOUT_MEANING = ("s", "mg")
 """Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
+_USED_STATEMENTS = frozenset(READ_STATEMENTS) | {"s"}
 LEFT_OUT = {
     **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con", "vp"), "curves"),
     **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
@@ -88,7 +89,7 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
     Raises DermisError with the number of the line for numbers and indices that are invalid.
     """
     limits.check_limit(path, text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
-    rows, others = _split_statements(path, _plain_text(text))
+    rows, others, unread = _split_statements(path, _plain_text(text))
     positions, colours, notes = _vertices(path, rows["v"])
     uv, normals = _table(path, rows["vt"], "vt")[0], _table(path, rows["vn"], "vn")[0]
     if np.nan_to_num(uv[:, 2]).any():
@@ -106,7 +107,7 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
         refuse_without_faces(path, len(positions))
     uv = np.column_stack((uv[:, 0], np.where(np.isnan(uv[:, 1]), 0.0, uv[:, 1])))
     polygons = Polygons(counts, corners, positions, uv, normals[:, :3], colours)
-    notes += [*faults, *missing_uv(polygons), *_unread(others, has_normals=len(normals) > 0)]
+    notes += [*faults, *missing_uv(polygons), *_unread(unread, others, has_normals=len(normals) > 0)]
     statements = "\n".join(f"{key} {value}" for _, key, value in others)
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
@@ -124,8 +125,8 @@ def _plain_text(text: str) -> str:
     return _TRAILING_COMMENT.sub(r"\1", text) if commented else text
 
 
-def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement]]:
-    """Return the statements of numbers by kind, and all others."""
+def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement], dict[str, None]]:
+    """Return the statements of numbers by kind, the others that are used, and the first words of the rest."""
     data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
@@ -146,11 +147,15 @@ def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_St
     count, items = int(other.sum()), "statements besides vertices and faces"
     limits.check_limit(path, count, 3 * limits.MAX_TRIANGLES, items, limits.DECIMATE_ADVICE)
     texts = data[np.repeat(other, length)].tobytes().decode().split("\n")[:-1]
-    words = (one.split(None, 1) or [""] for one in texts)
-    lines = np.flatnonzero(other).tolist()
-    return rows, [
-        (n, key, rest[0].strip() if rest else "") for n, (key, *rest) in zip(lines, words, strict=True)
-    ]
+    used, unread = list[_Statement](), dict[str, None]()
+    for line, words in zip(
+        np.flatnonzero(other).tolist(), (one.split(None, 1) for one in texts), strict=True
+    ):
+        if words and words[0] in _USED_STATEMENTS:
+            used.append((line, words[0], words[1].strip() if len(words) > 1 else ""))
+        elif words:
+            unread[words[0]] = None
+    return rows, used, unread
 
 
 def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
@@ -293,11 +298,12 @@ def _groups(
     return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
 
 
-def _unread(statements: Sequence[_Statement], has_normals: bool) -> list[str]:
-    """Return notes on statements that have no effect."""
-    keys = dict.fromkeys(
-        key for _, key, _ in statements if key not in (*READ_STATEMENTS, *STATEMENTS_WITHOUT_MEANING)
-    )
+def _unread(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
+    """Return notes on statements that have no effect.
+
+    keys : first words of unknown statements
+    """
+    keys = [key for key in keys if key not in STATEMENTS_WITHOUT_MEANING]
     names = [f"{key} ({LEFT_OUT[key]})" if key in LEFT_OUT else key for key in keys]
     notes = [f"statements are left out: {listed(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}

@@ -65,7 +65,8 @@ class Polygons:
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():
             uv = np.zeros_like(uv)
-        if all(not own.any() or np.array_equal(own, vertex + 1) for own in (uv, normal)):
+        is_tied = all(not own.any() or np.array_equal(own, vertex + 1) for own in (uv, normal))
+        if is_tied and len(vertex) >= len(self.positions):
             used, index = compact_vertices(vertex)
             vertex, uv, normal = used, uv.any() * (used + 1), normal.any() * (used + 1)
         else:

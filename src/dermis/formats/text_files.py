@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Collection
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -46,9 +47,9 @@ def _decode_line(line: bytes) -> str:
 
 def listed(names: Collection[str]) -> str:
     """Return names of a file for a message, without those beyond the first few."""
-    shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in names]
-    more = len(shown) - _MAX_LISTED
-    return ", ".join(shown[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+    first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
+    shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
 def run_starts(inside: Mask) -> Index:
