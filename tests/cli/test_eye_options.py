@@ -46,7 +46,7 @@ def test_eyes_that_cannot_be_fitted_are_told_of(run, tmp_path: Path, folder: Pat
     )
     unnamed = write_head(tmp_path / "white.gltf", names=("white", "white"))
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png")
-    assert outcome.code == 0 and "eyes" not in outcome.stderr
+    assert outcome.code == 0 and "note: eyes" not in outcome.stderr
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png", "--eyes", "fitted")
     assert outcome.code == 0 and "eyes: no group has a name of an eye" in outcome.stderr
     outcome = run("render", unnamed, *SMALL, "-o", tmp_path / "a.png", "--look-at", "camera")

@@ -201,6 +201,7 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     stated = (
         names.skin
         or names.opaque
+        or any(one.maps is not None for one in mesh_file.materials)  # this package wrote the file
         or all(
             skin or eye or is_eye_name(group.names)
             for skin, eye, group in zip(is_skin, is_eye, groups, strict=True)

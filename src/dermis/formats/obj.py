@@ -58,7 +58,7 @@ def parse_obj(path: Path, text: str) -> MeshFile:
     colours = [GREY if own is None else own.colour or GREY for own in known]
     groups = [MaterialGroup(name, colour) for name, colour in zip(names, colours, strict=True)]
     parts = geometry.polygons.parts(groups, geometry.pair, "by polygon")
-    used, none = [part.group for part in parts], np.empty((0, 3))
+    used, none = {part.group for part in parts}, np.empty((0, 3))
     empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in used]
     assigned, materials, notes = with_materials(path, [*parts, *empty], library)
     return MeshFile(assigned, materials=materials, notes=(*geometry.notes, *notes))

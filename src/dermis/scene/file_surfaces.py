@@ -134,6 +134,8 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
 def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
     opaque = _members(mesh, "opaque")
+    if any(one.maps is not None for one in materials):  # eyes in files of this package are fitted again
+        opaque &= ~np.array([one.eye for one in mesh.materials])
     pictured = np.zeros_like(opaque)
     for index in np.flatnonzero(opaque):
         own, in_file = np.arange(len(opaque)) == index, surface.in_file[index]

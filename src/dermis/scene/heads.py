@@ -144,6 +144,7 @@ def load_head(
     map_files = {"colour": colour, "normal": normal, "height": height}
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
+    levels, relief = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
     mesh_options: dict[str, Any] = {
         "unit_mm": unit_mm,
         "v_origin": v_origin,
@@ -153,7 +154,6 @@ def load_head(
     }
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
     check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
-    levels, relief = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
     if is_person_name(name):
         mesh_options["eyes"] = eyes
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)

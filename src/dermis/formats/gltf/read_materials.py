@@ -24,6 +24,7 @@ _SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
 _ALPHA_MODES: Mapping[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 _SCATTERING = (
     "KHR_materials_volume_scatter",
+    "KHR_materials_scatter",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_subsurface",
 )
