@@ -137,7 +137,7 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
     """
     a, b, c = np.ascontiguousarray(np.asarray(corners, np.float64).transpose(1, 2, 0))
     cross = cross_columns(b - a, c - a)
-    return np.sqrt(dot_columns(cross, cross)) / 2
+    return np.asarray(np.sqrt(dot_columns(cross, cross)) / 2)
 
 
 def cross_2d(a: Doubles, b: Doubles) -> Doubles:
