@@ -23,7 +23,7 @@ TEXTURE = """
 def Shader "{name}" {{
     uniform token info:id = "UsdUVTexture"
     asset inputs:file = @{file}@
-    float2 inputs:st.connect = </root/{material}/reader.outputs:result>
+    float2 inputs:st.connect = </model/{material}/reader.outputs:result>
     {more}
     float3 outputs:rgb
     float outputs:r
@@ -52,10 +52,10 @@ def material(
     textures = TEXTURE.format(name="picture", file=file, material=name, more=more)
     return f"""
 def Material "{name}" {{
-    token outputs:surface.connect = </root/{name}/surface.outputs:surface>
+    token outputs:surface.connect = </model/{name}/surface.outputs:surface>
     def Shader "surface" {{
         uniform token info:id = "UsdPreviewSurface"
-        color3f inputs:diffuseColor.connect = </root/{name}/picture.outputs:rgb>
+        color3f inputs:diffuseColor.connect = </model/{name}/picture.outputs:rgb>
         {inputs}
         token outputs:surface
     }}
@@ -75,7 +75,7 @@ def mesh(
     """
     uv = 'texCoord2f[] primvars:st = {} ( interpolation = "vertex" )'
     flipped = np.column_stack((BALL.uv[:, 0], 1.0 - BALL.uv[:, 1]))
-    binding = f"rel material:binding = </root/{bound}>" if bound else ""
+    binding = f"rel material:binding = </model/{bound}>" if bound else ""
     return f"""
 def Mesh "{name}" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {{
     uniform token subdivisionScheme = "none"
@@ -90,9 +90,9 @@ def Mesh "{name}" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {{
 
 
 def stage(*prims: str, metadata: str = "metersPerUnit = 1") -> str:
-    """Return a stage whose prims are below /root."""
+    """Return a stage whose prims are below /model."""
     content = "\n".join(prims or (mesh(), material()))
-    return f'#usda 1.0\n(\n{metadata}\n)\ndef Xform "root" {{\n{content}\n}}\n'
+    return f'#usda 1.0\n(\n{metadata}\n)\ndef Xform "model" {{\n{content}\n}}\n'
 
 
 def write_usd(path: Path, text: str | None = None) -> Path:

@@ -162,7 +162,7 @@ def test_subsets_of_faces_have_their_own_materials(tmp_path: Path) -> None:
         uniform token elementType = "face"
         uniform token familyName = "materialBind"
         int[] indices = {text_of(faces[100:])}
-        rel material:binding = </root/shirt>
+        rel material:binding = </model/shirt>
     }}"""
     text = stage(mesh(more=subset), material("face"), material("shirt"))
     mesh_file = read_text(tmp_path, text)
@@ -202,10 +202,10 @@ def test_a_colour_of_the_whole_mesh_is_that_of_its_group(tmp_path: Path) -> None
 def test_a_material_can_read_the_colours_of_vertices(tmp_path: Path) -> None:
     reader = """
     def Material "face" {
-        token outputs:surface.connect = </root/face/surface.outputs:surface>
+        token outputs:surface.connect = </model/face/surface.outputs:surface>
         def Shader "surface" {
             uniform token info:id = "UsdPreviewSurface"
-            color3f inputs:diffuseColor.connect = </root/face/colours.outputs:result>
+            color3f inputs:diffuseColor.connect = </model/face/colours.outputs:result>
             token outputs:surface
         }
         def Shader "colours" {
@@ -245,7 +245,7 @@ def test_values_of_a_material_are_read(tmp_path: Path) -> None:
 @in_process
 def test_pictures_of_roughness_normals_and_opacity_are_read(tmp_path: Path) -> None:
     inputs = "\n".join(
-        f"{kind} inputs:{name}.connect = </root/face/{source}.outputs:{output}>"
+        f"{kind} inputs:{name}.connect = </model/face/{source}.outputs:{output}>"
         for kind, name, source, output in (
             ("float", "roughness", "rough", "g"),
             ("normal3f", "normal", "bumps", "rgb"),
@@ -264,17 +264,17 @@ def test_pictures_of_roughness_normals_and_opacity_are_read(tmp_path: Path) -> N
 
 @in_process
 def test_a_texture_transform_is_that_of_the_specification(tmp_path: Path) -> None:
-    reader = """float2 inputs:st.connect = </root/face/place.outputs:result>"""
+    reader = """float2 inputs:st.connect = </model/face/place.outputs:result>"""
     place = """
     def Shader "place" {
         uniform token info:id = "UsdTransform2d"
-        float2 inputs:in.connect = </root/face/reader.outputs:result>
+        float2 inputs:in.connect = </model/face/reader.outputs:result>
         float inputs:rotation = 30
         float2 inputs:scale = (2, 0.5)
         float2 inputs:translation = (0.1, 0.2)
         float2 outputs:result
     }"""
-    text = material().replace("float2 inputs:st.connect = </root/face/reader.outputs:result>", reader)
+    text = material().replace("float2 inputs:st.connect = </model/face/reader.outputs:result>", reader)
     texture = material_of(tmp_path, text.rstrip().removesuffix("}") + place + "\n}").textures["colour"]
     uv, angle = np.array([[0.3, 0.6], [0.9, 0.2]]), np.radians(30)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -288,8 +288,8 @@ UNUSED = {
     "float inputs:ior = 1.4": "index of refraction",
     "float inputs:displacement = 0.1": "displacement",
     "color3f inputs:specularColor = (1, 0, 0)": "specular colour",
-    "float inputs:occlusion.connect = </root/face/picture.outputs:r>": "picture of occlusion",
-    "float inputs:opacity.connect = </root/face/picture.outputs:r>": "picture of the opacity",
+    "float inputs:occlusion.connect = </model/face/picture.outputs:r>": "picture of occlusion",
+    "float inputs:opacity.connect = </model/face/picture.outputs:r>": "picture of the opacity",
 }
 
 
@@ -301,9 +301,9 @@ def test_inputs_without_effect_are_noted(inputs: str, tmp_path: Path) -> None:
 
 @in_process
 def test_an_unlit_scan_has_the_colours_of_its_emission(tmp_path: Path) -> None:
-    inputs = "color3f inputs:emissiveColor.connect = </root/face/picture.outputs:rgb>"
+    inputs = "color3f inputs:emissiveColor.connect = </model/face/picture.outputs:rgb>"
     text = material(inputs=inputs).replace(
-        "color3f inputs:diffuseColor.connect = </root/face/picture.outputs:rgb>",
+        "color3f inputs:diffuseColor.connect = </model/face/picture.outputs:rgb>",
         "color3f inputs:diffuseColor = (0, 0, 0)",
     )
     found = material_of(tmp_path, text)
@@ -329,7 +329,7 @@ def test_pictures_that_are_not_there_are_noted(suffix: str, file: str, tmp_path:
 
 @in_process
 def test_a_picture_of_another_machine_is_looked_up_in_the_folder(tmp_path: Path) -> None:
-    texture = material_of(tmp_path, material(file="/home/someone/skin.png")).textures["colour"]
+    texture = material_of(tmp_path, material(file="/elsewhere/skin.png")).textures["colour"]
     assert texture.picture == tmp_path / "skin.png"
 
 
@@ -368,7 +368,7 @@ def test_the_first_frame_of_a_recording_is_read(tmp_path: Path) -> None:
 
 
 LAYER = "#usda 1.0\n( subLayers = [@{}@] )\n"
-REFERENCE = '#usda 1.0\n(\nmetersPerUnit = 1\n)\ndef Xform "root" ( references = @{}@</root> ) {{}}\n'
+REFERENCE = '#usda 1.0\n(\nmetersPerUnit = 1\n)\ndef Xform "model" ( references = @{}@</model> ) {{}}\n'
 
 
 @in_process
@@ -415,7 +415,7 @@ def test_layers_outside_the_folder_are_refused(text: str, name: str, tmp_path: P
 def test_layers_of_layers_are_checked_as_well(tmp_path: Path) -> None:
     (tmp_path / "inner.usda").write_text(LAYER.format("/etc/head.usda"))
     variants = """#usda 1.0
-def "root" (
+def "model" (
     variantSets = "a"
     variants = {
         string a = "y"
@@ -440,7 +440,7 @@ def test_value_clips_are_refused(tmp_path: Path) -> None:
     clips = (
         'def Xform "clips" ( clips = { dictionary default = { asset[] assetPaths = [@/etc/a.usda@] } } ) {}'
     )
-    with pytest.raises(DermisError, match="a scene without value clips, but /root/clips has some"):
+    with pytest.raises(DermisError, match="a scene without value clips, but /model/clips has some"):
         read_text(tmp_path, stage(mesh(), clips))
 
 

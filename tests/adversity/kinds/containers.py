@@ -74,7 +74,7 @@ def _stages() -> dict[str, dict[str, bytes]]:
         uniform token elementType = "face"
         uniform token familyName = "materialBind"
         int[] indices = [0, 1, 2, 3]
-        rel material:binding = </root/shirt>
+        rel material:binding = </model/shirt>
     }"""
     text = stage(mesh(more=subset), material(inputs=inputs), material("shirt"))
     found = {}
