@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,6 @@ from dermis.images.io import read_image, read_size
 from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
 
-_GROUP_OR_FACE = re.compile(r"^[ \t]*(usemtl|g|f)(?:[ \t]([^\n]*))?$", re.MULTILINE)
 _RELIEF_ROLES = ("normal", "height")
 _GREY_TEST_SAMPLES = 256  # texels that are compared along a side
 
