@@ -42,7 +42,7 @@ _MAPS = {
     "grey.png": "grey8.png",
     "normal.png": "normal.png",
 }
-_INSTANCES, _APART_M = 30, 0.2
+_INSTANCES, _APART_M = 30, 0.09
 
 
 @cache
