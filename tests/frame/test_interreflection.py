@@ -17,6 +17,8 @@ from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment
 from dermis.scene.lights import PointLight
 
+pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
+
 SIDE = 64
 
 
@@ -26,7 +28,8 @@ def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
     ball = uv_sphere(40.0, 48, 24)
     within = replace(ball, normals=-ball.normals, triangles=np.ascontiguousarray(ball.triangles[:, ::-1]))
     head = head_of(within, colour=np.full((4, 4, 3), albedo))
-    lamp = PointLight(position=place(head, (0, 0, 0)), irradiance=(3.0, 3.0, 3.0), shadows=False)
+    middle = place(head, (0, 0, 0))
+    lamp = PointLight(position=middle, target=(0, 0, 50), irradiance=(3.0, 3.0, 3.0), shadows=False)
     scene = scene_of(head, lamp, rho_s=0.0)
     shown = cached_atlas(within, SIDE).lit
     straight, all_of_it = (

@@ -12,6 +12,8 @@ from tolerances import PICTURE_MEAN, PICTURE_TAIL
 from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image, write_png
 
+pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
+
 NAMES = ("studio", "dry", "window", "ear")
 
 
