@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from chromium_input import CHROMIUM
 
-from dermis.apps.gallery.page import _equation, write_page
+from dermis.apps.gallery.page import _equation_html, write_page
 from dermis.apps.gallery.panels import panel_sheet
 from dermis.apps.gallery.script import GalleryPicture, Panel, Script, draw_pictures, encode_webp, read_script
 
@@ -48,7 +48,7 @@ def test_page_needs_nothing_else_and_escapes_what_it_says(page: Path) -> None:
 
 
 def test_equations_have_indices_and_powers() -> None:
-    shown = _equation("E_k = a^(1−mix) & x^2")
+    shown = _equation_html("E_k = a^(1−mix) & x^2")
     assert shown == "E<sub>k</sub> = a<sup>1−mix</sup> &amp; x<sup>2</sup>"
 
 

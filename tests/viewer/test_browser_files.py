@@ -74,5 +74,5 @@ def test_a_chosen_file_is_sent_and_shown_and_others_are_refused(
         choose(bad)
         assert wait(page, lambda: "broken.obj: " in session.message) and session.state is state
         choose(other)
-        page.wait_for_function("() => document.querySelector('#files').innerText.includes('.glb, .obj')")
+        page.wait_for_function("() => document.querySelector('#files').innerText.includes('.obj, .ply')")
         assert session.heads.recent == [opened] and len(list(Path(shown.folder).rglob("*.*"))) == 2
