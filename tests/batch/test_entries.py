@@ -19,6 +19,7 @@ from dermis.apps.batch.output_encoding import (
 from dermis.apps.batch.reader import decode_image
 from dermis.apps.batch.records import encode_record
 from dermis.base.errors import DermisError
+from dermis.images.skin_tone import skin_tone
 from dermis.scene.outputs import OUTPUTS
 
 ALL = tuple(OUTPUTS.names)
@@ -98,6 +99,14 @@ def test_records_are_plain_json_without_minus_zero() -> None:
     seen.camera.t[:] = -0.0, -1e-9, 5.0
     record = encode_record(1, seen, spec.parameters(1), spec)["json"]
     assert b"-0.0," not in record and json.loads(record)["camera"]["t"] == [0.0, 0.0, 5.0]
+
+
+def test_records_describe_the_colour_of_the_skin() -> None:
+    spec, seen = small_spec(), observation(1)
+    files = encode_record(1, seen, spec.parameters(1), spec, skin_tone((0.4, 0.25, 0.18)))
+    tone = decode_image(files)["skin_tone"]
+    assert tone["ita_degrees"] == pytest.approx(skin_tone((0.4, 0.25, 0.18)).ita_degrees, abs=0.01)
+    assert decode_image(encode_record(1, seen, spec.parameters(1), spec))["skin_tone"] is None
 
 
 def test_numbers_that_are_none_are_refused() -> None:

@@ -50,6 +50,10 @@ def test_a_colour_of_profile_is_unmixed_back_by_defaults(run: Run, folder: Path)
     told = json.loads(run("unmix", "skin.exr", "--adapter", "cpu", "--noise", "0.001", "--json").stdout)
     assert told["melanin"]["median"] == pytest.approx(0.02, rel=UNMIXED)
     assert told["blood"]["median"] == pytest.approx(0.01, rel=UNMIXED)
+    tone = json.loads(run(*map(str, words)).stdout)["skin_tone"]
+    assert tone["statement"] and set(tone) == set(told["skin_tone"])
+    for name in ("L", "a", "b", "ita_degrees"):
+        assert told["skin_tone"][name] == pytest.approx(tone[name], abs=0.05)
 
 
 def test_help_prints_the_default_skin(run: Run) -> None:

@@ -11,11 +11,12 @@ import numpy as np
 
 from dermis.base.atomic_write import atomic_file
 from dermis.base.extras import import_extra
+from dermis.images.skin_tone import CLASS_STATEMENT, SkinTone, skin_tone
 from dermis.optics.diffusion.models import gaussian_transmittance
 from dermis.optics.fits.burley import BurleyFit, fit_burley, unity_parameters, unreal_parameters
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 from dermis.optics.fits.separable import SeparableFit, fit_separable
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,6 +94,11 @@ class ProfileReport:
         """Return the relative error of the Gaussians (3,) in the light that emerges through rings [-]."""
         return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
+    @property
+    def tone(self) -> SkinTone | None:
+        """Return the description of the colour of a skin made of pigments; None for other media."""
+        return None if self.spectrum is None else skin_tone(rgb_weights(WAVELENGTHS_NM) @ self.spectrum)
+
     def as_json(self) -> object:
         """Return the report as nested dictionaries and lists for JSON."""
         radial, gaussians, error = self.radial, self.fit.profile, self.model_error
@@ -108,6 +114,7 @@ class ProfileReport:
                 "standard_error_per_mm2": radial.standard_error,
                 "total": radial.total,
                 "total_standard_error": radial.total_error,
+                "skin_tone": self.tone and self.tone.as_json(),
                 "gaussians": {
                     "variances_mm2": gaussians.variance_mm2,
                     "weights": gaussians.weight,
@@ -132,6 +139,8 @@ class ProfileReport:
         radial, fit = self.radial, self.fit
         total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
         lines = [f"{radial.name}, model {radial.model}", total]
+        if self.tone is not None:
+            lines += [f"tone       {self.tone.line()}", f"           ({CLASS_STATEMENT})"]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
                 path = _format_row(layer.mean_free_path_mm)

@@ -136,4 +136,10 @@ def _print_report(result: UnmixResult, written: list[Path], seconds: float, as_j
             )
         error = summary["delta_e"]
         lines.append(f"  colour error CIEDE2000 {error['median']:.2f} (median), {error['p95']:.2f} (95 %)")
+        tone = summary["skin_tone"]
+        lines.append(
+            f"  median colour L* {tone['L']:.1f}, a* {tone['a']:.1f}, b* {tone['b']:.1f}, ITA "
+            f"{tone['ita_degrees']:.0f}°, nearest Monk {tone['monk']}, Fitzpatrick {tone['fitzpatrick']}"
+        )
+        lines.append(f"  ({tone['statement']})")
     print_lines(*lines, *(f"  {path}" for path in written))

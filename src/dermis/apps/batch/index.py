@@ -32,8 +32,8 @@ def write_index(out: Path, spec: Spec) -> Path:
     """Write the index of the existing shards, with one row per image, and return its path.
 
     The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
-    "camera.t", "head_pose" and "gaze" are flattened matrices; all others are parameters, null where an image
-    has none.
+    "camera.t", "head_pose" and "gaze" are flattened matrices; "skin_tone.ita_degrees" and others describe the
+    colour of the skin; all others are parameters, null where an image has none.
 
     Equal shards give equal bytes. Raises DermisError if a shard is damaged, if pyarrow is missing, or if the
     file cannot be written.
@@ -95,7 +95,9 @@ def _row(key: str, shard: str, record: Record) -> IndexRow:
     matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
     matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
     flat = {name: _flatten_matrix(value) for name, value in matrices.items()}
-    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **flat}
+    tone = {f"skin_tone.{name}": one for name, one in (record.get("skin_tone") or {}).items()}
+    tone.pop("skin_tone.statement", None)
+    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **tone, **flat}
 
 
 def _flatten_matrix(value: object) -> object:

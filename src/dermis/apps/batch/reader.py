@@ -38,7 +38,9 @@ _RESTORE_ADVICE = "Copy or download it again, or render the shard again"
 _MAX_SHARD_NUMBER = 10**9
 _FILE_NAME = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_NAME = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
-_RESERVED_NAMES = frozenset(("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks"))
+_RESERVED_NAMES = frozenset(
+    ("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone")
+)
 
 
 class LandmarkPoints(NamedTuple):
@@ -73,8 +75,8 @@ def read_dataset(
     iterator of dict
         Each image has the keys "number", "picture" ((h, w, 3 or 4), sRGB bytes), "camera" (K, R and t in
         OpenCV's convention), "head_pose" (3, 4), "gaze" ((2, 3) or None), "landmarks" (`LandmarkPoints` by
-        the name of the set), "parameters" (by name), and one key for each output of the data set, such as
-        "depth" or "normal".
+        the name of the set), "parameters" (by name), "skin_tone" (numbers that describe the colour of the
+        skin, or None), and one key for each output of the data set, such as "depth" or "normal".
 
     Raises
     ------
@@ -251,6 +253,7 @@ def _decode_record(data: bytes, culprit: object) -> Image:
     with _refuse_malformed_record(culprit):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
+    image["skin_tone"] = record.get("skin_tone")
     return image | _decode_pose(record) | {"landmarks": landmarks}
 
 

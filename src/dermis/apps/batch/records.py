@@ -13,6 +13,7 @@ from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
 from dermis.images.codecs import encode_png
+from dermis.images.skin_tone import SkinTone
 
 PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
 """File name suffixes of the picture and of the record."""
@@ -40,10 +41,11 @@ class LandmarksRecord(TypedDict):
 
 
 class Record(TypedDict):
-    """Description of one image as stored in its JSON file: parameters, camera, pose and landmarks."""
+    """Description of one image as stored in its JSON file: parameters, tone, camera, pose and landmarks."""
 
     number: int
     parameters: Parameters
+    skin_tone: dict[str, float | int | str] | None
     camera: CameraRecord
     head_pose: NestedNumbers
     gaze: NestedNumbers | None
@@ -51,12 +53,17 @@ class Record(TypedDict):
 
 
 def encode_record(
-    number: int, observation: Observation, parameters: Parameters, spec: Spec
+    number: int,
+    observation: Observation,
+    parameters: Parameters,
+    spec: Spec,
+    tone: SkinTone | None = None,
 ) -> dict[str, bytes]:
     """Return the files of image `number` by suffix; equal arguments give equal bytes.
 
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
+    tone : description of the colour of the skin, None if it is unknown
 
     The suffixes are "png" for the picture, with alpha if it has no background; "NAME.png", "NAME.exr" or
     "NAME.npy" for each output, see `output_encoding.storage_description`; and "json" for the `Record`.
@@ -65,18 +72,21 @@ def encode_record(
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    record = _record(number, observation, parameters, spec)
+    record = _record(number, observation, parameters, spec, tone)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
     return files
 
 
-def _record(number: int, observation: Observation, parameters: Parameters, spec: Spec) -> Record:
+def _record(
+    number: int, observation: Observation, parameters: Parameters, spec: Spec, tone: SkinTone | None
+) -> Record:
     camera, gaze = observation.camera, observation.gaze
     names = {path: name for name, path in spec.landmark_tables.items()}  # records hold no absolute paths
     return {
         "number": number,
         "parameters": dict(parameters),
+        "skin_tone": None if tone is None else tone.as_json(),
         "camera": {
             "K": _rounded_list(camera.K, _MM_DIGITS),
             "R": _rounded_list(camera.R, _DIRECTION_DIGITS),

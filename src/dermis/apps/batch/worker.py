@@ -26,6 +26,8 @@ from dermis.base.errors import DermisError, DermisWarning
 from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.gpu.failures import DeviceError
+from dermis.images.skin_tone import SkinTone, skin_tone
+from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -142,8 +144,8 @@ class Worker:
 
     def _encoder_jobs(
         self, shard: Shard, failed: list[Failure]
-    ) -> Iterator[tuple[int, Observation, Parameters]]:
-        """Yield number, observation and parameters of each image that can be rendered, in order.
+    ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
+        """Yield number, observation, parameters and tone of each image that can be rendered, in order.
 
         failed : list to which images that cannot be rendered are appended
         """
@@ -153,7 +155,7 @@ class Worker:
             try:
                 for observation in self._render_images(self._plan_images(numbers, in_flight, failed)):
                     done = in_flight.popleft()
-                    yield done.number, observation, done.parameters
+                    yield done.number, observation, done.parameters, _head_tone(done.scene.head)
             except DeviceError:
                 raise
             except DermisError as fault:
@@ -248,5 +250,13 @@ def _forward_notes(forward: Callable[[str], None]) -> None:
     warnings.showwarning = show
 
 
-def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> EncodedImage:
-    return number, encode_record(number, observation, parameters, spec)
+def _head_tone(head: Head) -> SkinTone | None:
+    """Return the description of the mean colour of a head's skin, None without a colour."""
+    colour = head.maps.mean_colour
+    return None if colour is None else skin_tone(colour)
+
+
+def _encode(
+    spec: Spec, number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
+) -> EncodedImage:
+    return number, encode_record(number, observation, parameters, spec, tone)

@@ -23,6 +23,7 @@ from dermis.gpu.failures import LazyDevice
 from dermis.images.colour import delta_e_2000
 from dermis.images.hdr import encode_exr
 from dermis.images.io import EmbeddedPicture, write_image
+from dermis.images.skin_tone import skin_tone
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
@@ -138,7 +139,7 @@ class UnmixResult:
         return named | {name: one for name, one in optional.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
-        """Return medians of the pigments, colour differences, and the fraction of texels that are skin.
+        """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
         skin.
@@ -154,6 +155,7 @@ class UnmixResult:
         if skin.any():
             above = {f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _DELTA_E_LIMITS}
             result["delta_e"] = _percentiles(delta_e[skin]) | above
+            result["skin_tone"] = skin_tone(np.median(colours[skin], axis=0)).as_json()
             for name, fraction in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
                 result[name] = _percentiles(fraction[skin]) | sd

@@ -17,6 +17,7 @@ from dermis.apps.viewer.panel.fields import (
     draw_button,
     draw_combo,
     draw_fields,
+    draw_tooltip,
     record_position,
     run_action,
 )
@@ -24,6 +25,7 @@ from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.base.errors import DermisError
 from dermis.human.regions.region_table import DEFAULT_TABLE
+from dermis.images.skin_tone import CLASS_STATEMENT, skin_tone
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.optics.profiles import PUBLISHED_PRESET, preset_names
 from dermis.scene.frozen_model import fields_under
@@ -63,6 +65,7 @@ def draw_profile(session: Session) -> None:
         session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES
     )
     draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
+    _draw_tone(session)
     if skin.profile in SKINS:
         _draw_pigments(session, skin)
     elif layers := skin.layers or _profile_layers(skin.profile):
@@ -88,6 +91,14 @@ def draw_surface(session: Session) -> None:
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
             draw_fields(session, state.scene.skin, state.with_skin, SURFACE_STYLES, [name])
+
+
+def _draw_tone(session: Session) -> None:
+    """Draw the description of the mean colour of the head's skin."""
+    colour = session.state.scene.head.maps.mean_colour
+    if colour is not None:
+        imgui.text_disabled(skin_tone(colour).line())
+        draw_tooltip(CLASS_STATEMENT)
 
 
 def _draw_pigments(session: Session, skin: Skin) -> None:

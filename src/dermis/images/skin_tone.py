@@ -1,0 +1,91 @@
+"""Descriptions of a skin's colour: CIELAB, hue angle, individual typology angle (ITA) and nearest classes."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.base.arrays import Doubles
+from dermis.images.colour import decode_srgb, delta_e_2000, lab
+
+CLASS_STATEMENT = (
+    "ITA and the nearest classes describe this colour, not a person, ancestry or risk of sunburn"
+)
+"""Statement for users, beside the numbers."""
+_ITA_LIGHTNESS = 50.0  # L* of the pivot of the angle
+_MONK_SRGB = (
+    "f6ede4", "f3e7db", "f7ead0", "eadaba", "d7bd96", "a07e56", "825c43", "604134", "3a312a", "292420",
+)  # fmt: skip
+_FITZPATRICK_ITA = (("I", 55.0), ("II", 41.0), ("III", 28.0), ("IV", 10.0), ("V", -30.0))
+"""Type and the ITA above which a colour is assigned to it; VI is below all [degrees]."""
+
+
+class SkinTone(NamedTuple):
+    """Description of a skin colour under D65, without surface reflection.
+
+    L, a, b : CIELAB
+    hue_degrees : hue angle, arctan(b / a) [degrees]
+    ita_degrees : individual typology angle, arctan((L - 50) / b) [degrees]
+    monk : nearest class of the Monk Skin Tone Scale by CIEDE2000, 1 (lightest) to 10
+    fitzpatrick : Fitzpatrick type, I to VI, whose range of ITA the colour is in
+
+    Source: [Chardon1991] for the ITA and its ranges, [DelBino2013] for their correspondence to types,
+    [Monk2019] for the scale.
+    """
+
+    L: float
+    a: float
+    b: float
+    hue_degrees: float
+    ita_degrees: float
+    monk: int
+    fitzpatrick: str
+
+    def as_json(self) -> dict[str, float | int | str]:
+        """Return the description with rounded numbers, and the statement that classes describe colours."""
+        values = {name: round(one, 2) for name, one in zip(self._fields[:5], self[:5], strict=True)}
+        return {**values, "monk": self.monk, "fitzpatrick": self.fitzpatrick, "statement": CLASS_STATEMENT}
+
+    def line(self) -> str:
+        """Return the description as a line of text."""
+        numbers = f"L* {self.L:.1f}, a* {self.a:.1f}, b* {self.b:.1f}, hue {self.hue_degrees:.0f}°"
+        nearest = f"nearest Monk {self.monk}, Fitzpatrick {self.fitzpatrick}"
+        return f"{numbers}, ITA {self.ita_degrees:.0f}°, {nearest}"
+
+
+def ita_degrees(cielab: ArrayLike) -> Doubles:
+    """Return the individual typology angle (...) of CIELAB colours (..., 3) [degrees].
+
+    It is the angle of the colour around L* = 50, b* = 0, from 90 (light) to -90 (dark); colours with negative
+    b*, which are none of skin, do not wrap around.
+
+    Source: [Chardon1991].
+    """
+    L, _, b = np.moveaxis(np.asarray(cielab, np.float64), -1, 0)
+    return np.asarray(np.degrees(np.arctan2(L - _ITA_LIGHTNESS, np.maximum(b, 1e-6))))
+
+
+def hue_degrees(cielab: ArrayLike) -> Doubles:
+    """Return the hue angle (...) of CIELAB colours (..., 3), from -180 to 180 [degrees]."""
+    _, a, b = np.moveaxis(np.asarray(cielab, np.float64), -1, 0)
+    return np.asarray(np.degrees(np.arctan2(b, a)))
+
+
+def skin_tone(linear: ArrayLike) -> SkinTone:
+    """Return the description of a colour (3,), diffuse reflectance in linear Rec. 709 [-]."""
+    colour = np.asarray(linear, np.float64)
+    L, a, b = (float(one) for one in lab(colour))
+    ita = float(ita_degrees((L, a, b)))
+    monk = 1 + int(np.argmin(delta_e_2000(_monk_colours(), colour)))
+    fitzpatrick = next((name for name, lowest in _FITZPATRICK_ITA if ita > lowest), "VI")
+    return SkinTone(L, a, b, float(hue_degrees((L, a, b))), ita, monk, fitzpatrick)
+
+
+@cache
+def _monk_colours() -> Doubles:
+    """Return the colours (10, 3) of the Monk Skin Tone Scale, linear Rec. 709 [-]."""
+    levels = np.array([[int(code[k : k + 2], 16) for k in (0, 2, 4)] for code in _MONK_SRGB])
+    return np.asarray(decode_srgb(levels / 255.0), np.float64)
