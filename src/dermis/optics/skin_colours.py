@@ -60,6 +60,15 @@ def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Colou
     parameters : parameters of the skins; melanin and blood are ignored
     nodes : number of fractions along each axis of the table
     """
+    colours = spectral_table(parameters, nodes) @ rgb_weights(WAVELENGTHS_NM).T
+    return ColourTable(np.maximum(colours, 0.0))
+
+
+def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Floats:
+    """Return the diffuse reflectance (n, n, 31) at `WAVELENGTHS_NM` over melanin and blood, per incident light.
+
+    parameters, nodes : as in `colour_table`, whose fractions it has
+    """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
     blood = np.arange(nodes)
     spectra = []
@@ -69,8 +78,7 @@ def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Colou
         total = hankel_transform(medium, "layered", "layer", ZERO_FREQUENCY)[0]
         spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
     entering = 1.0 - normal_reflectance(SKIN_ETA)
-    colours = entering * np.concatenate(spectra) @ rgb_weights(WAVELENGTHS_NM).T
-    return ColourTable(np.maximum(colours, 0.0).reshape(nodes, nodes, 3))
+    return np.asarray(entering * np.concatenate(spectra)).reshape(nodes, nodes, len(WAVELENGTHS_NM))
 
 
 def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:

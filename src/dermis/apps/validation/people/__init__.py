@@ -1,0 +1,1 @@
+"""Skin of measured people: tables of a spectral archive, and drawn people compared with it."""

@@ -1,0 +1,17 @@
+"""Commands that hold drawn people against a spectral archive of measured people.
+
+They need the archive in the folder DERMIS_DATA, see docs/measured.md.
+"""
+
+from __future__ import annotations
+
+from dermis.base.command_line import run_script
+
+HERE = "dermis.apps.validation.people"
+COMMANDS = {
+    f"{HERE}.table:table": "Write the table of measured people in the package.",
+}
+"""Functions that run as commands, with their descriptions."""
+
+if __name__ == "__main__":
+    run_script(COMMANDS, f"python -m {HERE}")

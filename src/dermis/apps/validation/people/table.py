@@ -1,0 +1,289 @@
+"""Table of measured people in the package, built from the spectra of the archive."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from io import StringIO
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import rankdata
+
+from dermis.apps.validation.pages import CHECKOUT, in_checkout
+from dermis.apps.validation.people.archive import AGE_MIDDLES, Archive, load_archive
+from dermis.apps.validation.people.inversion import (
+    from_variables,
+    invert_spectra,
+    model_lab,
+    to_variables,
+)
+from dermis.base.arrays import Doubles
+from dermis.base.atomic_write import atomic_file
+from dermis.base.console import print_lines
+from dermis.human.skin.measured import GROUPS, SITES, MeasuredTable, age_term, parse_table, square_root
+from dermis.images.skin_tone import ita_degrees
+
+DATA = CHECKOUT / "src" / "dermis" / "human" / "data"
+TABLE_FILE, CELLS_FILE = "measured.json", "measured_cells.csv"
+_PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
+_CHEEK = SITES.index("cheek")
+_POOLING_PEOPLE = 30.0  # number of people of a group that weigh as much as the pooled correlation
+_MIN_PEOPLE = 20  # of a cell that is not filled from the pooled model
+_POPULATION = 2000
+_SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
+"""Scale of the corrections of the four variables that make medians of colours agree."""
+_COLOUR_SD = 0.05
+_CALIBRATION_STEPS = 6
+_WINSOR_PERCENT = 5.0
+_HEADER = """\
+# quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular reflection,
+#   melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of log2 melanin, log2
+#   blood, oxygen, log2 thickness as upper triangles by row; people 0: empty cell, filled from the pooled model
+# unit: - for fractions, mm for thickness
+# source: python -m dermis.apps.validation.people table, from Lu et al., International Skin Spectra Archive (2025),
+#   doi 10.6084/m9.figshare.28228571.v4
+# licence: CC BY 4.0
+"""
+
+
+def table() -> None:
+    """Write the table of measured people in the package from the archive."""
+    archive = load_archive()
+    variables = to_variables(invert_spectra(archive.reflectance))
+    document = build_table(archive, variables)
+    folder = in_checkout(DATA)
+    with atomic_file(folder / TABLE_FILE) as file:
+        file.write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
+    text = cells_text(archive, variables, parse_table(document))
+    with atomic_file(folder / CELLS_FILE) as file:
+        file.write_text(text, "utf-8")
+    sizes = ((folder / name).stat().st_size for name in (TABLE_FILE, CELLS_FILE))
+    print_lines(f"{TABLE_FILE} and {CELLS_FILE}: {' and '.join(f'{size:,}' for size in sizes)} bytes")
+
+
+def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
+    """Return the JSON object of a `MeasuredTable`.
+
+    variables : (n, 4) variables of the measurements, from `to_variables`
+    """
+    cheek, y = person_means(archive, variables, _CHEEK)
+    sex, age = _effects(cheek, y)
+    ages, sexes = _population()
+    document: dict[str, Any] = {
+        "source": "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4",
+        "probabilities": list(_PROBABILITIES),
+        "sex": _rounded(sex),
+        "age": _rounded(age),
+        "mean_age_term": round(float(age_term(ages).mean()), 4),
+    }
+    adjusted = y - _centred_terms(cheek, sex, age)
+    scores = {code: _scores(adjusted[rows], cheek.rows(rows)) for code, rows in _by_group(cheek)}
+    pooled = np.corrcoef(np.concatenate(list(scores.values())).T)
+    shifts, slope, spread = _sites(archive, variables)
+    document |= {"site_slope": _rounded(slope), "site_spread": _rounded(spread), "groups": {}}
+    for code, rows in _by_group(cheek):
+        n, own = int(rows.sum()), np.corrcoef(scores[code].T)
+        mixed = (n * own + _POOLING_PEOPLE * pooled) / (n + _POOLING_PEOPLE)
+        ita = ita_degrees(cheek.rows(rows).cielab)
+        document["groups"][GROUPS[code]] = {
+            "quantiles": _rounded(np.quantile(adjusted[rows], _PROBABILITIES, axis=0).T),
+            "ita": _rounded(np.quantile(ita, _PROBABILITIES), 2),
+            "correlation": _rounded(mixed, 3),
+            "sites": _rounded(shifts[list(GROUPS).index(code)]),
+        }
+    _calibrate(document, archive, ages, sexes)
+    return document
+
+
+def person_means(archive: Archive, variables: Doubles, site: int) -> tuple[Archive, Doubles]:
+    """Return one measurement for each person at a site: the one in the middle by lightness."""
+    rows = np.flatnonzero(archive.site == site)
+    order = rows[np.lexsort((archive.cielab[rows, 0], archive.person[rows]))]
+    people, first, counts = np.unique(archive.person[order], return_index=True, return_counts=True)
+    middle = order[first + counts // 2]
+    assert len(middle) == len(people)
+    return Archive(*(column[middle] for column in archive)), variables[middle]
+
+
+def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    for k, code in enumerate(GROUPS):
+        yield code, archive.group == k
+
+
+def _effects(cheek: Archive, y: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the effects (4,) of sex and of `age_term` by least squares, with a level for each group."""
+    known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
+    levels = (cheek.group[known, None] == np.arange(len(GROUPS))).astype(np.float64)
+    terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
+    low, high = np.percentile(y, (1.0, 99.0), axis=0)
+    found = np.linalg.lstsq(terms, np.clip(y[known], low, high), rcond=None)[0]
+    return found[-2], found[-1]
+
+
+def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
+    """Return the part (n, 4) of the variables that sex and age explain, relative to the mean of the group."""
+    result = np.zeros((len(cheek.group), 4))
+    for values, effect in ((cheek.sex, sex), (age_term(cheek.age), age)):
+        for _, rows in _by_group(cheek):
+            known = rows & np.isfinite(values)
+            if known.any():
+                result[known] += (values[known] - values[known].mean())[:, None] * effect
+    return result
+
+
+def _scores(y: Doubles, rows: Archive) -> Doubles:
+    """Return standard normal scores (n, 5) of the ranks of the four variables and of the ITA."""
+    columns = np.column_stack([y, ita_degrees(rows.cielab)])
+    return np.asarray(ndtri((rankdata(columns, axis=0) - 0.5) / len(columns)))
+
+
+def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+    """Return differences of sites from the cheek: medians (g, 12, 3), slopes and spreads (12, 2).
+
+    Cells with too few people have the mean of the other groups, weighted by people.
+    """
+    shifts, counts = np.zeros((len(GROUPS), len(SITES), 3)), np.zeros((len(GROUPS), len(SITES)))
+    slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
+    cheek, y = person_means(archive, variables, _CHEEK)
+    for site in (k for k in range(len(SITES)) if k != _CHEEK):
+        other, z = person_means(archive, variables, site)
+        _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
+        difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
+        for k in range(len(GROUPS)):
+            rows = cheek.group[here] == k
+            counts[k, site] = rows.sum()
+            if counts[k, site] >= _MIN_PEOPLE:
+                shifts[k, site] = np.median(difference[rows], axis=0)
+                deviation[rows] -= np.median(deviation[rows], axis=0)
+                difference[rows] -= shifts[k, site]
+        used = counts[cheek.group[here], site] >= _MIN_PEOPLE
+        x, d = (_winsorised(one[used, :2]) for one in (deviation, difference))
+        slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
+        spread[site] = np.std(d - slope[site] * x, axis=0)
+        filled = counts[:, site] >= _MIN_PEOPLE
+        shifts[~filled, site] = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
+    return shifts, slope, spread
+
+
+def _winsorised(values: Doubles) -> Doubles:
+    low, high = np.percentile(values, (_WINSOR_PERCENT, 100.0 - _WINSOR_PERCENT), axis=0)
+    return np.clip(values, low, high)
+
+
+def _population() -> tuple[Doubles, Doubles]:
+    """Return ages and sexes (n,) of adults as `Human.drawn` samples them."""
+    rng = np.random.default_rng(0)
+    return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION), rng.integers(0, 2, _POPULATION).astype(np.float64)
+
+
+def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
+    """Correct quantiles and differences of sites, so that medians of drawn colours are those of the archive."""
+    rng = np.random.default_rng(1)
+    normals = rng.standard_normal((_POPULATION, 4))
+    site_normals = rng.standard_normal((_POPULATION, len(SITES), 2))
+    for code, rows in _by_group(archive):
+        group, own = document["groups"][GROUPS[code]], archive.rows(rows)
+
+        def cheek(weights: dict[str, float] = {GROUPS[code]: 1.0}) -> tuple[MeasuredTable, Doubles]:  # noqa: B006
+            found = parse_table(document)
+            scores = normals @ square_root(found.mixture("correlation", weights)[:4, :4])
+            return found, found.variables(weights, sexes, ages, scores)
+
+        target = np.median(own.cielab[own.site == _CHEEK], axis=0)
+        y = cheek()[1]
+        shift = _matching_shift(y, target, 4)
+        group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
+        found, y = cheek()
+        differences = found.site_variables({GROUPS[code]: 1.0}, y, site_normals)
+        sites = np.array(group["sites"])
+        for site in range(len(SITES)):
+            measured = own.site == site
+            if site != _CHEEK and len(np.unique(own.person[measured])) >= _MIN_PEOPLE:
+                z = y.copy()
+                z[:, :3] += differences[:, site]
+                sites[site] += _matching_shift(z, np.median(own.cielab[measured], axis=0), 3)[:3]
+        group["sites"] = _rounded(sites)
+
+
+def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
+    """Return the shift (4,) of the first variables by which the median colour of people becomes a target.
+
+    y : (n, 4) variables of people
+    count : number of variables that may be shifted
+    """
+    shift, used = np.zeros(4), np.arange(4) < count
+
+    def median(offset: Doubles) -> Doubles:
+        return np.asarray(np.median(model_lab(from_variables(y + offset)), axis=0))
+
+    for _ in range(_CALIBRATION_STEPS):
+        error = target - median(shift)
+        steps = 0.1 * np.diag(_SHIFT_SD)
+        J = np.column_stack([(median(shift + one) - median(shift - one)) / (0.2 * sd) for one, sd in zip(steps, _SHIFT_SD, strict=True)])
+        J[:, ~used] = 0.0
+        scaled = J * _SHIFT_SD
+        gain = scaled.T @ np.linalg.inv(scaled @ scaled.T + _COLOUR_SD**2 * np.eye(3))
+        shift += _SHIFT_SD * (gain @ error)
+    return shift
+
+
+def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> str:
+    """Return the CSV table of medians and covariances by group and site, and by sex and by age group."""
+    out = StringIO()
+    out.write(_HEADER)
+    writer = csv.writer(out, lineterminator="\n")
+    names = "group site sex age people measurements L a b melanin blood oxygen thickness_mm lab_covariance covariance"
+    writer.writerow(names.split())
+    for code, rows in _by_group(archive):
+        for site, name in enumerate(SITES):
+            here = rows & (archive.site == site)
+            if not here.any():
+                writer.writerow([GROUPS[code], name, "", "", 0, 0, *_pooled_cell(found, GROUPS[code], site), "", ""])
+                continue
+            writer.writerow(_cell(archive, variables, here, (GROUPS[code], name, "", ""), True))
+            for sex, value in (("F", 0.0), ("M", 1.0)):
+                if (own := here & (archive.sex == value)).sum() >= _MIN_PEOPLE:
+                    writer.writerow(_cell(archive, variables, own, (GROUPS[code], name, sex, "")))
+            for number, middle in AGE_MIDDLES.items():
+                if (own := here & (archive.age == middle)).sum() >= _MIN_PEOPLE:
+                    writer.writerow(_cell(archive, variables, own, (GROUPS[code], name, "", number)))
+    return out.getvalue()
+
+
+def _cell(
+    archive: Archive, variables: Doubles, rows: NDArray[np.bool_], names: tuple[object, ...], full: bool = False
+) -> list[object]:
+    colours, y = archive.cielab[rows], variables[rows]
+    people = len(np.unique(archive.person[rows]))
+    melanin, blood, oxygen, thickness = np.median(y, axis=0)
+    values = [f"{one:.2f}" for one in np.median(colours, axis=0)]
+    values += [f"{np.exp2(melanin):.4f}", f"{np.exp2(blood):.5f}", f"{oxygen:.3f}", f"{np.exp2(thickness):.4f}"]
+    covariances = [_triangle(colours, 2), _triangle(y, 4)] if full and people > 2 else ["", ""]
+    return [*names, people, int(rows.sum()), *values, *covariances]
+
+
+def _pooled_cell(found: MeasuredTable, group: str, site: int) -> list[str]:
+    """Return median colour and pigments of a site without measurements by the pooled model."""
+    y = found.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
+    y[:, :3] += found.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site]
+    colour, (melanin, blood, oxygen, thickness) = model_lab(from_variables(y))[0], y[0]
+    pigments = [f"{np.exp2(melanin):.4f}", f"{np.exp2(blood):.5f}", f"{oxygen:.3f}", f"{np.exp2(thickness):.4f}"]
+    return [f"{one:.2f}" for one in colour] + pigments
+
+
+def _triangle(values: Doubles, digits: int) -> str:
+    covariance = np.cov(values.T)
+    return " ".join(f"{one:.{digits}f}" for one in covariance[np.triu_indices(len(covariance))])
+
+
+def _rounded(values: Doubles, digits: int = 4) -> Any:
+    return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
+
+
+def probability_of(scores: Doubles) -> Doubles:
+    """Return the cumulative probability of standard normal scores."""
+    return np.asarray(ndtr(scores))

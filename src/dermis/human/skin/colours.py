@@ -1,0 +1,22 @@
+"""Tables of skin colours by melanin and blood, cached for people who share the other parameters."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from threading import Lock
+
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.skin_colours import ColourTable, colour_table
+
+_LOCK = Lock()  # two threads may request the same table
+
+
+def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    """Return the table of skin colours by melanin and blood fraction; tables are cached."""
+    with _LOCK:
+        return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
+
+
+@lru_cache(maxsize=64)
+def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))

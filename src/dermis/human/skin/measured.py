@@ -1,0 +1,353 @@
+"""Pigments of measured people by ancestry, sex, age, site and skin tone, from a table of an archive.
+
+The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of the
+International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.base.arrays import Doubles
+from dermis.base.errors import format_value, refuse
+from dermis.base.quantities import checked_number
+from dermis.human.skin.colours import skin_colour_table
+from dermis.images.colour import lab
+from dermis.images.skin_tone import ita_degrees
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
+
+GROUPS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "CA": "caucasian",
+        "CN": "chinese",
+        "JP": "japanese",
+        "TH": "southeast asian",
+        "SA": "south asian",
+        "AF": "african",
+        "IQ": "iraqi",
+        "AB": "arabian",
+    }
+)
+"""Groups of the archive by its codes; "southeast asian" is Thai, "south asian" is Pakistani."""
+SITES: Final = (
+    "back of hand", "cheek", "cheek bone", "chin", "ear lobe", "forehead",
+    "inner arm", "neck", "nose tip", "outer arm", "palm", "ring finger",
+)  # fmt: skip
+"""Sites of the archive, in the order of its codes from 1."""
+FACE_SITES: Final = ("cheek_bone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
+"""Sites of the head beside the cheek, as fields of `SiteDifferences`."""
+UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
+)
+"""Groups that a name stands for together, with equal weights."""
+SKIN_ANCESTRIES: Final = (*GROUPS.values(), *UNIONS)
+"""Names of skin ancestries."""
+ITA_RANGE: Final = (-70.0, 70.0)
+"""Range of the individual typology angle that a person can be asked for [degrees]."""
+_EUROPEAN: Mapping[str, float] = MappingProxyType({"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1})
+"""Probability-like weight of fair hair and light eyes by group; an artist's choice but for the first."""
+_MAX_DOUBLINGS = 6.0
+_MAX_DEVIATION = 3.0  # of the cheek from its median to which differences of sites respond [doublings]
+_MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
+_EPIDERMIS_RANGE_MM = (0.02, 0.2)
+_ITA_NODES = 257
+Weights = Mapping[str, float]
+"""Weights of groups, with a sum of 1."""
+
+
+class MeasuredPigments(NamedTuple):
+    """Pigments of the cheek of a person.
+
+    melanin : volume fraction of melanosomes in the epidermis [-]
+    blood : volume fraction of blood in the dermis [-]
+    oxygen : oxygen saturation [-]
+    epidermis_mm : thickness of the epidermis [mm]
+    """
+
+    melanin: float
+    blood: float
+    oxygen: float
+    epidermis_mm: float
+
+
+@dataclass(frozen=True)
+class SiteDifferences:
+    """Differences of the pigments of sites of the head from those of the cheek.
+
+    Parameters
+    ----------
+    cheek_bone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
+        Difference of melanin and of blood [doublings], and of the oxygen saturation [-].
+
+    Examples
+    --------
+    >>> from dermis.human.skin.measured import SiteDifferences
+    >>> SiteDifferences(neck=(0.3, -1.0, 0.0)).neck[1]
+    -1.0
+    """
+
+    cheek_bone: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    forehead: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    chin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    nose_tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ear_lobe: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    neck: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Raise DermisError for values that are not three numbers in range."""
+        for one in fields(self):
+            values = getattr(self, one.name)
+            if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != 3:
+                expected = "differences of melanin and blood [doublings] and of oxygen"
+                refuse(f"sites.{one.name}", expected, f"got {format_value(values)}", "Write three numbers")
+            limits = (_MAX_DOUBLINGS, _MAX_DOUBLINGS, 1.0)
+            checked = tuple(
+                float(checked_number(f"sites.{one.name}", value, -limit, limit))
+                for value, limit in zip(values, limits, strict=True)
+            )
+            object.__setattr__(self, one.name, checked)
+
+    def array(self) -> Doubles:
+        """Return the differences (6, 3) in the order of `FACE_SITES`."""
+        return np.array([getattr(self, name) for name in FACE_SITES], np.float64)
+
+
+class _Group(NamedTuple):
+    """Distribution of one group: quantiles (4, k), quantiles of the ITA (k,), correlation (5, 5), sites (12, 3)."""
+
+    quantiles: Doubles
+    ita: Doubles
+    correlation: Doubles
+    sites: Doubles
+
+
+class MeasuredTable(NamedTuple):
+    """Distributions of the pigments of measured people.
+
+    The four variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] at the cheek.
+
+    probabilities : (k,) probabilities of the quantiles
+    groups : distribution by name of the group
+    sex, age : (4,) difference between male and female, and between old and young
+    mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
+    site_slope, site_spread : (12, 2) slope of a site's difference of melanin and blood over the deviation of the
+        cheek from its median, and standard deviation around it [doublings]
+    """
+
+    probabilities: Doubles
+    groups: Mapping[str, _Group]
+    sex: Doubles
+    age: Doubles
+    mean_age_term: float
+    site_slope: Doubles
+    site_spread: Doubles
+
+    def mixture(self, name: str, weights: Weights) -> Doubles:
+        """Return a field of `_Group` averaged over a mixture of groups."""
+        parts = [weight * np.asarray(getattr(self.groups[one], name)) for one, weight in weights.items()]
+        return np.asarray(np.sum(parts, axis=0))
+
+    def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, scores: Doubles) -> Doubles:
+        """Return the four variables (n, 4) of people of a mixture of groups.
+
+        sex, age : (n,) or one number
+        scores : (n, 4) standard normal scores, correlated as in the archive
+        """
+        from scipy.special import ndtri
+
+        nodes, quantiles = ndtri(self.probabilities), self.mixture("quantiles", weights)
+        values = np.column_stack([np.interp(scores[:, k], nodes, quantiles[k]) for k in range(4)])
+        sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
+        return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
+
+    def site_variables(self, weights: Weights, cheek: Doubles, normals: Doubles) -> Doubles:
+        """Return the differences of all sites from the cheek (n, 12, 3): melanin, blood [doublings], oxygen.
+
+        cheek : (n, 4) variables of the cheek
+        normals : (n, 12, 2) independent standard normal numbers, zeros for typical people
+        """
+        middle = self.mixture("quantiles", weights)[:2, len(self.probabilities) // 2]
+        deviation = np.clip(cheek[:, None, :2] - middle, -_MAX_DEVIATION, _MAX_DEVIATION)
+        found = np.broadcast_to(self.mixture("sites", weights), (len(cheek), len(SITES), 3)).copy()
+        found[:, :, :2] += self.site_slope * deviation + self.site_spread * normals
+        return found
+
+
+@cache
+def measured_table() -> MeasuredTable:
+    """Return the table of measured people in the package."""
+    text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
+    return parse_table(json.loads(text))
+
+
+def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
+    """Return a table from its JSON object."""
+    groups = {
+        name: _Group(*(np.array(one[field], np.float64) for field in _Group._fields))
+        for name, one in document["groups"].items()
+    }
+    arrays = {
+        name: np.array(document[name], np.float64)
+        for name in ("probabilities", "sex", "age", "site_slope", "site_spread")
+    }
+    return MeasuredTable(groups=groups, mean_age_term=float(document["mean_age_term"]), **arrays)
+
+
+def age_term(age: ArrayLike) -> Doubles:
+    """Return the progress of ageing of skin colour, 0 up to 38 years and 1 from 65 years.
+
+    In the archive the cheek has the same colour up to about forty and is 4 to 5 L* darker after sixty.
+    """
+    t = np.clip((np.asarray(age, np.float64) - 38.0) / 27.0, 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def group_weights(african: float, asian: float, caucasian: float, skin_ancestry: str = "") -> dict[str, float]:
+    """Return the weights of the measured groups for ancestry fractions, or for a named skin ancestry."""
+    if skin_ancestry:
+        return _spread_union(skin_ancestry, 1.0)
+    parts = {"african": african, "asian": asian, "caucasian": caucasian}
+    weights: dict[str, float] = {}
+    for name, fraction in parts.items():
+        weights |= {one: part for one, part in _spread_union(name, fraction).items() if part > 0.0}
+    return weights
+
+
+def _spread_union(name: str, weight: float) -> dict[str, float]:
+    members = UNIONS.get(name, (name,))
+    return {one: weight / len(members) for one in members}
+
+
+def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
+    """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
+    african = weights.get("african", 0.0)
+    european = sum(weight * _EUROPEAN.get(name, 0.0) for name, weight in weights.items())
+    return african, 1.0 - african - european, european
+
+
+def likely_groups(ita: float) -> dict[str, float]:
+    """Return the probability of each group among measured people of an ITA, with equal prior of the groups."""
+    table = measured_table()
+    width = 6.0  # of the window in which people are counted [degrees]
+    ends = np.array([ita - width, ita + width])
+    density = {
+        name: float(np.diff(_probability(ends, group.ita, table.probabilities))[0]) + 1e-6
+        for name, group in table.groups.items()
+    }
+    total = sum(density.values())
+    return {name: value / total for name, value in density.items()}
+
+
+def typical_pigments(
+    weights: Weights, sex: float, age: float, ita: float | None = None
+) -> tuple[MeasuredPigments, SiteDifferences]:
+    """Return the median pigments of people of a mixture of groups, sex and age, or of those of an ITA."""
+    return _person(weights, sex, age, ita, np.zeros(4), None)
+
+
+def sample_pigments(
+    rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
+) -> tuple[MeasuredPigments, SiteDifferences]:
+    """Return random pigments of a person of a mixture of groups, with correlations as measured.
+
+    The number of random draws does not depend on the arguments.
+    """
+    return _person(weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2)))
+
+
+def _person(
+    weights: Weights,
+    sex: float,
+    age: float,
+    ita: float | None,
+    normals: Doubles,
+    site_normals: Doubles | None,
+) -> tuple[MeasuredPigments, SiteDifferences]:
+    table = measured_table()
+    correlation = table.mixture("correlation", weights)
+    covariance, mean = correlation[:4, :4], np.zeros(4)
+    if ita is not None:
+        slope = correlation[:4, 4]
+        mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
+    scores = mean + square_root(covariance) @ normals
+    variables = table.variables(weights, sex, age, scores[None])
+    pigments = _pigments(variables[0])
+    if ita is not None:
+        pigments = with_ita(pigments, ita)
+        variables[0, 0] = np.log2(pigments.melanin)
+    typical = site_normals is None
+    normals_or_zeros = np.zeros((1, len(SITES), 2)) if site_normals is None else site_normals[None]
+    middle = variables if not typical or ita is not None else np.tile(_median(weights), (1, 1))
+    sites = table.site_variables(weights, middle, normals_or_zeros)[0]
+    names = [name.replace(" ", "_") for name in SITES]
+    rows = {name: tuple(np.round(sites[names.index(name)], 4).tolist()) for name in FACE_SITES}
+    return pigments, SiteDifferences(**rows)
+
+
+def _median(weights: Weights) -> Doubles:
+    table = measured_table()
+    return table.mixture("quantiles", weights)[:, len(table.probabilities) // 2]
+
+
+def _pigments(values: Doubles) -> MeasuredPigments:
+    melanin, blood, epidermis = np.exp2(values[[0, 1, 3]])
+    return MeasuredPigments(
+        float(np.clip(melanin, *_MELANIN_RANGE)),
+        float(np.clip(blood, *_BLOOD_RANGE)),
+        float(np.clip(values[2], 0.0, 1.0)),
+        float(np.clip(epidermis, *_EPIDERMIS_RANGE_MM)),
+    )
+
+
+def with_ita(pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin) -> MeasuredPigments:
+    """Return pigments with the melanin that gives a skin an ITA; the nearest possible where none does."""
+    table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
+    melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
+    found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
+    index = int(np.argmax(found <= ita)) if (found <= ita).any() else _ITA_NODES - 1
+    low, high = np.log(melanin[[max(index - 1, 0), index]])
+    for _ in range(40):  # ITA falls with melanin
+        middle = 0.5 * (low + high)
+        colour = table.lookup(np.exp([middle]), np.array([pigments.blood]))[0]
+        low, high = (middle, high) if float(ita_degrees(lab(colour))) > ita else (low, middle)
+    return pigments._replace(melanin=float(np.exp(0.5 * (low + high))))
+
+
+def _ita_score(ita: float, weights: Weights) -> float:
+    """Return the standard normal score of an ITA among people of a mixture of groups."""
+    from scipy.special import ndtri
+
+    table = measured_table()
+    quantiles = sum(weight * table.groups[name].ita for name, weight in weights.items())
+    assert isinstance(quantiles, np.ndarray)
+    probability = _probability(np.array([ita]), quantiles, table.probabilities)[0]
+    return float(ndtri(np.clip(probability, 0.002, 0.998)))
+
+
+def _probability(values: Doubles, quantiles: Doubles, at: Doubles) -> Doubles:
+    from scipy.special import ndtr, ndtri
+
+    nodes = ndtri(at)
+    return np.asarray(ndtr(np.interp(values, quantiles, nodes, left=nodes[0] - 1.0, right=nodes[-1] + 1.0)))
+
+
+def square_root(covariance: Doubles) -> Doubles:
+    """Return the symmetric square root of a covariance matrix, whose negative eigenvalues are taken as 0."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+@cache
+def typical_sites() -> SiteDifferences:
+    """Return the median differences between sites over all groups, with equal weights."""
+    count = len(GROUPS)
+    return typical_pigments(dict.fromkeys(GROUPS.values(), 1.0 / count), 0.5, 30.0)[1]
