@@ -25,6 +25,14 @@ from dermis.human.skin.look import (
     typical_eyes,
     typical_skin,
 )
+from dermis.human.skin.measured import (
+    ITA_RANGE,
+    SKIN_ANCESTRIES,
+    UNIONS,
+    group_weights,
+    likely_groups,
+    pigment_ancestry,
+)
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
@@ -67,6 +75,19 @@ _FIELD_RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
+_OPTIONAL_FIELDS = "ita", "skin_ancestry"
+_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes whose skin is South Asian or Middle Eastern, if none is given
+_OTHER_SKINS = ("south asian", "iraqi", "arabian")
+_SHAPE_OF_SKIN = {  # weights of the Dirichlet distribution of shapes: African, Asian, Caucasian; artist's values
+    "african": (3.0, 0.05, 0.05),
+    "caucasian": (0.05, 0.05, 3.0),
+    "chinese": (0.05, 3.0, 0.05),
+    "japanese": (0.05, 3.0, 0.05),
+    "southeast asian": (0.1, 3.0, 0.1),
+    "south asian": (0.5, 0.5, 3.0),
+    "iraqi": (0.3, 0.1, 3.0),
+    "arabian": (0.4, 0.1, 3.0),
+}
 _MIN_HAIR_FRACTION = 0.05
 _TARGET_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
@@ -77,9 +98,11 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
 
     given : fields that are not sampled
     """
-    macro = {name: float(value) for name, value in given.items() if name not in _LOOK_FIELDS}
+    excluded = *_LOOK_FIELDS, *_OPTIONAL_FIELDS
+    macro = {name: float(value) for name, value in given.items() if name not in excluded}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
-    ancestry = _ancestry_fractions(macro, rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3))
+    sampled = rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3)
+    ancestry, groups = _sample_ancestry(np.random.default_rng((int(seed), 3)), macro, sampled, given)
     sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
     sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     old = rng.beta(1.2, 2.2)
@@ -95,11 +118,16 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
     }
     fields |= dict(zip(_ANCESTRIES, map(float, ancestry), strict=True)) | macro
     african, asian, caucasian = ancestry
-    demographics = Demographics(african, asian, caucasian, fields["sex"], fields["age"])
-    skin, eyes = sample_skin(rng, demographics), sample_eyes(rng, demographics)
-    brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), ancestry)
+    demographics = Demographics(
+        african, asian, caucasian, fields["sex"], fields["age"], groups, given.get("ita")
+    )
+    skin = sample_skin(rng, np.random.default_rng((int(seed), 4)), demographics)
+    eyes = sample_eyes(rng, demographics)
+    hair_ancestry = np.array(pigment_ancestry(groups))
+    brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), hair_ancestry)
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
     fields |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
+    fields |= {name: given[name] for name in _OPTIONAL_FIELDS if given.get(name) is not None}
     typical = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
     hair_rng = np.random.default_rng((int(seed), 2))
     return fields | _sample_hair_and_skin(hair_rng, demographics, typical, skin, given)
@@ -113,6 +141,45 @@ def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]
     if not weights.sum() > 0:
         refuse("ancestry", "a weight of african, asian or caucasian above 0", "all given are 0", "Raise one")
     return np.asarray(weights / weights.sum())
+
+
+def _sample_ancestry(
+    rng: np.random.Generator,
+    macro: Mapping[str, float],
+    sampled: NDArray[np.float64],
+    given: Mapping[str, Any],
+) -> tuple[NDArray[np.float64], dict[str, float]]:
+    """Return ancestry fractions of the shape (3,), and the weights of the measured groups of the skin.
+
+    Skin follows the shape if that is given, and the shape follows the skin if only that or an ITA is given.
+    Otherwise some people of Caucasian shape have South Asian or Middle Eastern skin.
+
+    macro, given : fields that are not sampled
+    sampled : (3,) sampled fractions of the shape
+    """
+    picks, chance = rng.random(3), rng.random()
+    ancestry, shape_given = _ancestry_fractions(macro, sampled), any(name in macro for name in _ANCESTRIES)
+    name = str(given.get("skin_ancestry") or "")
+    if name or (given.get("ita") is not None and not shape_given):
+        group = _pick(group_weights(0, 0, 0, name) if name else likely_groups(float(given["ita"])), picks[0])
+        shape = ancestry if shape_given else rng.dirichlet(_SHAPE_OF_SKIN[group])
+        return shape, {group: 1.0}
+    groups: dict[str, float] = {}
+    for fraction, people, pick in zip(ancestry, _ANCESTRIES, picks, strict=True):
+        other = people == "caucasian" and not shape_given and chance < _OTHER_SKIN_FRACTION
+        names = _OTHER_SKINS if other else UNIONS.get(people, (people,))
+        groups[names[min(int(pick * len(names)), len(names) - 1)]] = float(fraction)
+    return ancestry, groups
+
+
+def _pick(weights: Mapping[str, float], chance: float) -> str:
+    """Return the name at a cumulative probability."""
+    total = 0.0
+    for name, weight in weights.items():
+        total += weight
+        if chance < total:
+            break
+    return name
 
 
 def _sample_hair_and_skin(
@@ -222,6 +289,12 @@ class Human:
         Look of the eyes; by default typical for the person.
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
+    skin_ancestry : str
+        Measured group whose skin, eyes and hair colour the person has, such as "south asian", so that skin and
+        shape vary apart; "" for those of the shape's ancestries.
+    ita : float, optional
+        Individual typology angle of the cheek of skin that is not set by `skin`, -70 (darkest) to 70 (lightest)
+        [degrees]; all else is as measured people of this angle have it.
 
     Raises
     ------
@@ -249,10 +322,13 @@ class Human:
     skin: SkinLook | None = None
     eyes: EyeLook | None = None
     hair: HairLook | None = None
+    skin_ancestry: str = ""
+    ita: float | None = None
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
         check_fields(self, _FIELD_RANGES)
+        _check_skin_fields(self.skin_ancestry, self.ita)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a weight of african, asian or caucasian above 0", "all are 0", "Raise one")
         if not isinstance(self.targets, Mapping):
@@ -275,8 +351,9 @@ class Human:
         seed : int
             0 to 2**32 - 1; the same seed gives the same person.
         **given
-            Fields that are not sampled, such as `age=70`, or some values of targets, skin, eyes and hair,
-            such as `skin={"melanin": 0.1}`. Skin and hair are sampled for the given age, sex and ancestry.
+            Fields that are not sampled, such as `age=70` or `ita=-30`, or some values of targets, skin, eyes
+            and hair, such as `skin={"melanin": 0.1}`. Skin and hair are sampled for the given age, sex and
+            ancestry; without any, the ancestry of `ita` is that of measured people.
 
         Returns
         -------
@@ -296,6 +373,9 @@ class Human:
         """
         for name in given.keys() & _FIELD_RANGES.keys():
             checked_number(name, given[name], *_FIELD_RANGES[name])
+        _check_skin_fields(given.get("skin_ancestry", ""), given.get("ita"))
+        if given.get("ita") is not None and "melanin" in given.get("skin", {}):
+            refuse("ita", "an ITA or the melanin of the skin", "both are given", "Remove one of them")
         return cls(**sample_fields(seed, given))
 
     def head(
@@ -394,7 +474,10 @@ class Human:
     def _demographics(self) -> Demographics:
         total = self.african + self.asian + self.caucasian
         fractions = self.african / total, self.asian / total, self.caucasian / total
-        return Demographics(*fractions, self.sex, self.age)
+        groups = group_weights(*fractions, self.skin_ancestry)
+        if self.ita is not None and not self.skin_ancestry and len(set(fractions)) == 1:
+            groups = likely_groups(self.ita)  # no ancestry is given
+        return Demographics(*fractions, self.sex, self.age, groups, self.ita)
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:
@@ -441,6 +524,14 @@ class Human:
             for sex, sex_fraction in (("female", 1.0 - self.sex), ("male", self.sex))
             for age, age_fraction in (("young", 1.0 - old), ("old", old))
         }
+
+
+def _check_skin_fields(skin_ancestry: object, ita: object) -> None:
+    if skin_ancestry != "" and skin_ancestry not in SKIN_ANCESTRIES:
+        expected, actual = f"one of {', '.join(SKIN_ANCESTRIES)}", f"got {format_value(skin_ancestry)}"
+        refuse("skin_ancestry", expected, actual, "Choose one, or leave it out")
+    if ita is not None:
+        checked_number("ita", ita, *ITA_RANGE, "degrees")
 
 
 def _blend_steps(value: float) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.human.person import Human
-from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
+from dermis.optics.pigments.parameters import SPECTRAL_PRESET
 from dermis.scene.skin import Pigments, Skin
 
 
@@ -21,6 +21,6 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
         eumelanin=look.eumelanin,
         blood=look.blood,
         oxygen=look.oxygen,
-        epidermis_mm=DEFAULT_SKIN.epidermis_mm,
+        epidermis_mm=look.epidermis_mm,
     )
     return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL_PRESET, "pigments": pigments}))

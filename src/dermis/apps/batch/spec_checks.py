@@ -18,7 +18,7 @@ from dermis.human.landmarks.points import read_landmark_table
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.makehuman import human_targets
 from dermis.human.person import Human
-from dermis.human.skin.look import SkinLook
+from dermis.human.skin.look import SITES_FIELD, SkinLook
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.pose import MAX_WEIGHT
 from dermis.scene.heads import HUMAN
@@ -129,7 +129,7 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
 def _check_looks(sampled: Mapping[str, Distribution]) -> None:
     """Refuse parameters of people, skins and morph targets with unknown names or invalid values."""
     for part, kind in _LOOK_MODELS.items():
-        known = [one.name for one in fields(kind) if one.name != _SEED_FIELD]
+        known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", sampled, known, kind)
     _check_table("person.targets", sampled, human_targets(), lambda **values: Human(targets=values))
     known = [name for name in Skin.model_fields if name not in _UNSAMPLED_SKIN_FIELDS]

@@ -11,6 +11,7 @@ from pydantic_core import core_schema
 
 from dermis.apps.batch.distributions import Constant, Distribution, Uniform, parse_distribution, require
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
+from dermis.human.skin.measured import ITA_RANGE, SKIN_ANCESTRIES
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.lights import light_presets
 
@@ -154,6 +155,7 @@ _ANGLE_FIELD = NumberField(-180, 180, "degrees")
 _ELEVATION_FIELD = NumberField(-85, 85, "degrees: straight above, the yaw is undefined")
 _FRACTION_FIELD = NumberField(0, 1)
 _AGE_FIELD = NumberField(YOUNG_AGE, OLD_AGE, "years: the ages that the human model covers")
+_ITA_FIELD = NumberField(*ITA_RANGE, "degrees: of measured people")
 _SIGNED_FIELD = NumberField(-1, 1, "0 is the average")
 _MELANIN_FIELD = NumberField(0, 10, "0.3 is blond, 8 black")
 _DISTANCE_FIELD = NumberField(150, 20_000, "mm: from close-up to telephoto")
@@ -177,6 +179,11 @@ class PersonTable(FrozenModel):
     """Fraction of Asian ancestry."""
     caucasian: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of Caucasian ancestry."""
+    skin_ancestry: Annotated[Distribution | None, NameField(lambda: SKIN_ANCESTRIES)] = None
+    """Measured group whose skin, eyes and hair colour people have, whatever their shape; omitted: from the shape."""
+    ita: Annotated[Distribution | None, _ITA_FIELD] = None
+    """Individual typology angle of the cheek, from -70 (darkest) to 70 (lightest) [degrees]; all else is as
+    measured people of this angle have it."""
     weight: Annotated[Distribution | None, _SIGNED_FIELD] = None
     """Body weight, from -1 (lowest) to 1 (highest)."""
     muscle: Annotated[Distribution | None, _SIGNED_FIELD] = None

@@ -141,7 +141,7 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
     """Return an amount (n,), such as that of hair or beard, summed over the Gaussian zones of the face.
 
     name : one of `ZONE_AMOUNTS`
-    rows : (k, 20) zones from `zone_table`
+    rows : (k, 24) zones from `zone_table`
     points : (n, 3 or more) positions on the average person [mm]
     """
     column, total = _amount_column(name), np.zeros(len(points))

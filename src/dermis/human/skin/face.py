@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import float_columns, read_rows
+from dermis.human.skin.measured import FACE_SITES, SiteDifferences
 
 Floats = NDArray[np.float32]
 
@@ -28,11 +29,13 @@ MOVEMENTS = (
 """Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
 FOLD_MOVEMENTS = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
-ZONE_AMOUNTS = (
+_TABLE_AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
-    "sun", "level", "around", "hair", "beard", "veins",
+    "sun", "level", "around", "hair", "beard", "veins", "flush",
 )  # fmt: skip
-"""Quantities that zones change, see zones.csv."""
+ZONE_AMOUNTS = (*_TABLE_AMOUNTS, "oxygen", "_unused", "_unused_too")
+"""Quantities that zones change, see zones.csv; their number is a multiple of four."""
+_REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
 _HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
@@ -62,21 +65,42 @@ def _movement_matrix(names: tuple[str, ...]) -> Floats:
 
 
 @lru_cache(maxsize=_CACHE_SIZE)
-def zone_table(recession: float = 0.0) -> Floats:
-    """Return the Gaussian zones of the face as rows (k, 20) for the paint shader.
+def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> Floats:
+    """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
-    Columns: centre [mm], a zero, inverse radii [1/mm], a zero, and the twelve `ZONE_AMOUNTS`.
+    Columns: centre [mm], a zero, inverse radii [1/mm], a zero, and the sixteen `ZONE_AMOUNTS`.
 
     recession : thinning of hair at the crown, 0 to 1, see `SkinLook`
+    sites : differences of pigments between measured sites; none if None
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
         if row["zone"] == _CROWN_ZONE:
             row["hair"] = str(recession * float(row["hair"]))
-    columns = "x y z", "rx ry rz", " ".join(ZONE_AMOUNTS)
+    columns = "x y z", "rx ry rz", " ".join(_TABLE_AMOUNTS)
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
+    amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_TABLE_AMOUNTS)))])
+    if sites is not None:
+        columns_of = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
+        amounts[:, columns_of] += _site_amounts() @ np.vstack([np.zeros(3), sites.array()])
     none = np.zeros((len(rows), 1))
     return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
+
+
+@cache
+def _site_amounts() -> NDArray[np.float64]:
+    """Return the amounts (k, 7) by which zones paint a difference of one at each site and none at the others.
+
+    The sites are the cheek and `FACE_SITES`. The zones of a site share its difference; as zones overlap, the
+    shares are scaled so that the sum is exact at the places of the sites.
+    """
+    zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
+    places = {row["site"]: row for row in read_rows(__package__, "sites")}
+    points = float_columns([places[name] for name in names], "x y z")
+    centres, radii = float_columns(zones, "x y z"), float_columns(zones, "rx ry rz")
+    weights = np.exp(-(((points[:, None] - centres) / radii) ** 2).sum(axis=-1))
+    shares = np.array([[float(row["share"]) * (row["site"] == name) for name in names] for row in zones])
+    return np.asarray(shares @ np.linalg.inv(weights @ shares))
 
 
 @lru_cache(maxsize=_CACHE_SIZE)

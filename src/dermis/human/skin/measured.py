@@ -59,7 +59,7 @@ _MAX_DOUBLINGS = 6.0
 _MAX_DEVIATION = 3.0  # of the cheek from its median to which differences of sites respond [doublings]
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
-_ITA_NODES = 257
+_ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
 
@@ -308,14 +308,25 @@ def _pigments(values: Doubles) -> MeasuredPigments:
     )
 
 
-def with_ita(pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin) -> MeasuredPigments:
-    """Return pigments with the melanin that gives a skin an ITA; the nearest possible where none does."""
-    table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
-    melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
-    found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
-    index = int(np.argmax(found <= ita)) if (found <= ita).any() else _ITA_NODES - 1
+def with_ita(
+    pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin
+) -> MeasuredPigments:
+    """Return pigments with the melanin that gives a skin an ITA.
+
+    Where no melanin does, as for very light skin full of blood, there is also less blood with more oxygen.
+    """
+    for _ in range(_MAX_PALING_STEPS):
+        table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
+        melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
+        found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
+        if found[0] >= ita:
+            break
+        oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
+        pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
+    below = np.flatnonzero(found <= ita)
+    index = int(below[0]) if len(below) else _ITA_NODES - 1
     low, high = np.log(melanin[[max(index - 1, 0), index]])
-    for _ in range(40):  # ITA falls with melanin
+    for _ in range(_BISECTIONS):  # ITA falls with melanin
         middle = 0.5 * (low + high)
         colour = table.lookup(np.exp([middle]), np.array([pigments.blood]))[0]
         low, high = (middle, high) if float(ita_degrees(lab(colour))) > ita else (low, middle)

@@ -3,47 +3,45 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-from threading import Lock
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
-from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
-from dermis.optics.skin_colours import ColourTable, colour_table
 
-LIP_EPIDERMIS_MM = 0.03
-"""Thickness of the epidermis of the lips, which is thinner than elsewhere [mm]."""
-_LOCK = Lock()  # two threads may request the same table
+LIP_THICKNESS_RATIO = 0.6
+"""Thickness of the epidermis of the lips over that of the cheek [-]."""
+_MIN_OXYGEN_RANGE = 1e-3
 MIN_SIDE, MAX_SIDE = 256, 4096
 """Sides of painted maps [texels]."""
 
 
-def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Return the table of skin colours by melanin and blood fraction; tables are cached."""
-    with _LOCK:
-        return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
-
-
-@lru_cache(maxsize=64)
-def _cached_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))
-
-
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
-    """Return the colour (3,) of skin that has the mean pigments of a look everywhere, linear Rec. 709 [-]."""
-    table = skin_colour_table(look.eumelanin, look.oxygen, DEFAULT_SKIN.epidermis_mm)
+    """Return the colour (3,) of skin that has the pigments of the cheek everywhere, linear Rec. 709 [-]."""
+    table = skin_colour_table(look.eumelanin, look.oxygen, look.epidermis_mm)
     return np.asarray(table.lookup(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
-def face_and_lip_colours(look: SkinLook) -> NDArray[np.float32]:
-    """Return the colour tables (2, n, n, 3) of face and lips by pigment fractions, as in `ColourTable`."""
-    thick = DEFAULT_SKIN.epidermis_mm, LIP_EPIDERMIS_MM
-    both = [skin_colour_table(look.eumelanin, look.oxygen, mm).colours for mm in thick]
-    return np.stack(both).astype(np.float32)
+def oxygen_range(look: SkinLook) -> tuple[float, float]:
+    """Return the lowest and the highest oxygen saturation of the skin of a head [-]."""
+    differences = look.sites.array()[:, 2]
+    low, high = (look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0)))
+    low = min(max(low, 0.0), 1.0 - _MIN_OXYGEN_RANGE)
+    return low, max(min(high, 1.0), low + _MIN_OXYGEN_RANGE)
+
+
+def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
+    """Return colour tables (3, n, n, 3) by pigment fractions, as in `ColourTable`.
+
+    They are those of skin at both ends of `oxygen_range`, and of lips.
+    """
+    lips = look.oxygen, LIP_THICKNESS_RATIO * look.epidermis_mm
+    kinds = *((oxygen, look.epidermis_mm) for oxygen in oxygen_range(look)), lips
+    return np.stack([skin_colour_table(look.eumelanin, *kind).colours for kind in kinds]).astype(np.float32)
 
 
 @dataclass(frozen=True, repr=False)

@@ -30,7 +30,7 @@ from dermis.apps.inverse.fitting.unknowns import FitPoint, prior_point, tangents
 from dermis.base.errors import format_value, notify, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
-from dermis.human.skin.painted import skin_colour_table
+from dermis.human.skin.colours import skin_colour_table
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 from dermis.scene.settings import Settings

@@ -171,7 +171,7 @@ def _without_light(scene: Scene) -> Scene:
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look
-        fixed_pigments |= {"eumelanin": look.eumelanin, "oxygen": look.oxygen}
+        fixed_pigments |= {name: getattr(look, name) for name in fixed_pigments}
     if scene.skin.pigments is not None:
         fixed_pigments |= scene.skin.pigments.overrides()
     fixed = {"profile": SPECTRAL_PRESET, "pigments": Pigments(**fixed_pigments)}

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from dermis.apps.validation.pages import CHECKOUT, in_checkout
@@ -37,6 +37,7 @@ _POPULATION = 2000
 _SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Scale of the corrections of the four variables that make medians of colours agree."""
 _COLOUR_SD = 0.05
+_MAX_STEP = 1.0  # of a correction, in `_SHIFT_SD`
 _CALIBRATION_STEPS = 6
 _WINSOR_PERCENT = 5.0
 _HEADER = """\
@@ -225,9 +226,10 @@ def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
         steps = 0.1 * np.diag(_SHIFT_SD)
         J = np.column_stack([(median(shift + one) - median(shift - one)) / (0.2 * sd) for one, sd in zip(steps, _SHIFT_SD, strict=True)])
         J[:, ~used] = 0.0
-        scaled = J * _SHIFT_SD
-        gain = scaled.T @ np.linalg.inv(scaled @ scaled.T + _COLOUR_SD**2 * np.eye(3))
-        shift += _SHIFT_SD * (gain @ error)
+        scaled = J * _SHIFT_SD / _COLOUR_SD
+        normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
+        step = np.linalg.solve(normal, scaled.T @ error / _COLOUR_SD - shift / _SHIFT_SD)
+        shift += _SHIFT_SD * np.clip(step, -_MAX_STEP, _MAX_STEP)
     return shift
 
 
@@ -282,8 +284,3 @@ def _triangle(values: Doubles, digits: int) -> str:
 
 def _rounded(values: Doubles, digits: int = 4) -> Any:
     return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
-
-
-def probability_of(scores: Doubles) -> Doubles:
-    """Return the cumulative probability of standard normal scores."""
-    return np.asarray(ndtr(scores))

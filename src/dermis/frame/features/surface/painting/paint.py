@@ -37,7 +37,8 @@ from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human.skin import face, textures
 from dermis.human.skin.face import FOLD_MOVEMENTS, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.painted import face_and_lip_colours
+from dermis.human.skin.measured import SiteDifferences
+from dermis.human.skin.painted import oxygen_range, painted_colour_tables
 from dermis.human.skin.surface import PaintedSurface
 from dermis.human.skin.textures import (
     DOT_LAYERS,
@@ -87,7 +88,8 @@ class PaintInputs(NamedTuple):
 
     paint : uniform record of the look: pigments, gloss, age, ...
     tables : tables of the face: noises, dots, zones, folds and hairline
-    colours : (2, n, n, 3) colour tables of the face and of the lips, linear Rec. 709 [-]
+    colours : (3, n, n, 3) colour tables of skin with the lowest and the highest oxygen saturation, and of
+        lips, linear Rec. 709 [-]
     surface : mesh that is painted
     """
 
@@ -109,9 +111,11 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInp
         refuse("painted skin", f"fewer than {_MAX_TRIANGLES:,} triangles", actual, "Subdivide less")
     text = _shader_text(_SKIN_SHADER)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
-    paint = make_record(text, "Paint", side=side, **{name: getattr(look, name) for name in names})
-    tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession))
-    return PaintInputs(paint, tables, face_and_lip_colours(look), surface)
+    values = {name: getattr(look, name) for name in names}
+    low, high = oxygen_range(look)
+    paint = make_record(text, "Paint", side=side, low_oxygen=low, high_oxygen=high, **values)
+    tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession, look.sites))
+    return PaintInputs(paint, tables, painted_colour_tables(look), surface)
 
 
 def cache_key(inputs: PaintInputs, driver: str) -> str:
@@ -126,16 +130,17 @@ def _shader_text(shader: str) -> str:
     return shader_source(FEATURES_FOLDER / shader, shader_folders()).text
 
 
-def _face_tables(recession: float) -> bytes:
+def _face_tables(recession: float, sites: SiteDifferences) -> bytes:
     """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
 
     recession : recession of the hairline [-]
+    sites : differences of pigments between measured sites
     """
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), _PADDING)
     hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _PADDING)
-    tables = textures.noise_table(), textures.dot_table(), face.zone_table(recession), curves, folds.knots
+    tables = textures.noise_table(), textures.dot_table(), face.zone_table(recession, sites), curves, folds.knots
     return b"".join(table.tobytes() for table in (*tables, hairline))
 
 

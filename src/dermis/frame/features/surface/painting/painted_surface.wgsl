@@ -10,6 +10,7 @@ struct Paint {
     seed: u32,
     melanin: f32, // this and the following: fields of SkinLook
     blood: f32,
+    oxygen: f32,
     redness: f32,
     freckles: f32,
     moles: f32,
@@ -20,6 +21,8 @@ struct Paint {
     beard: f32,
     oil: f32,
     age: f32,
+    low_oxygen: f32, // of the two colour tables of skin
+    high_oxygen: f32,
 }
 
 struct Vertex {

@@ -4,7 +4,7 @@
 //#include "lines.wgsl"
 
 @group(0) @binding(3) var<storage, read> owners: array<u32>;
-@group(0) @binding(10) var colour_tables: texture_2d_array<f32>; // of skin and of lips, over the square roots of blood and melanin fractions
+@group(0) @binding(10) var colour_tables: texture_2d_array<f32>; // of skin with the lowest and highest oxygen, and of lips, over the square roots of blood and melanin fractions
 @group(0) @binding(11) var colour: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(12) var specular: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(13) var roughness: texture_storage_2d<rgba16float, write>;
@@ -18,6 +18,8 @@ const FRECKLE: f32 = 1.7;
 const AGE_SPOT: f32 = 1.3;
 const MOLE: f32 = 3.4;
 const TAN: f32 = 1.2; // between covered and most exposed skin
+const TYPICAL_TAN: f32 = 0.3; // that measured differences between sites include
+const LIPS: u32 = 2u; // colour table
 const LIP_BLOOD: f32 = 1.9;
 const LIP_MELANIN: f32 = 0.5;
 const MUCOSA_BLOOD: f32 = 3.2;
@@ -50,6 +52,13 @@ fn colour_of(table: u32, melanin: f32, blood: f32) -> vec3f {
     return mix(near, far, part.y);
 }
 
+// Colour of skin with the oxygen saturation of its site.
+fn skin_colour(melanin: f32, blood: f32) -> vec3f {
+    let oxygen = clamp(paint.oxygen + zone_of(ZONE_OXYGEN), paint.low_oxygen, paint.high_oxygen);
+    let part = (oxygen - paint.low_oxygen) / (paint.high_oxygen - paint.low_oxygen);
+    return mix(colour_of(0u, melanin, blood), colour_of(1u, melanin, blood), part);
+}
+
 fn entry(table: u32, at: vec2u) -> vec3f {
     return textureLoad(colour_tables, at, table, 0).rgb;
 }
@@ -70,7 +79,7 @@ fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
     brown += FRECKLE * smoothstep(0.02, 0.3, dotted[DOT_FRECKLES] + 0.7 * dotted[DOT_SMALL_FRECKLES]);
     brown += AGE_SPOT * smoothstep(0.05, 0.4, dotted[DOT_AGE_SPOTS]) + MOLE * smoothstep(0.1, 0.6, dotted[DOT_MOLES]);
     let clothed = smoothstep(-165.0, -205.0, spot.body.y + 6.0 * noise[NOISE_WANDER_Y]);
-    brown += TAN * paint.tan * (0.35 * saturate(zone_of(ZONE_SUN)) - 0.5 * clothed);
+    brown += TAN * (0.35 * (paint.tan - TYPICAL_TAN) * saturate(zone_of(ZONE_SUN)) - 0.5 * paint.tan * clothed);
     var red = 2.0 * paint.redness * zone_of(ZONE_BLOOD) * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
     let slit = RED_SLIT * (1.0 - smoothstep(0.0, 2.2, spot.fields.y));
     red += lip * (LIP_BLOOD + 0.3 * noise[NOISE_LIP_STREAKS] + slit) + mucosa * (MUCOSA_BLOOD - lip * (LIP_BLOOD + RED_SLIT));
@@ -116,7 +125,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (owner == 0u) {
         let shine = vec2f(STRENGTH + OILY_STRENGTH * paint.oil, ROUGHNESS + OILY_ROUGHNESS * paint.oil);
         store_deltas(id.xy, 0.0, 0.0, 0.0);
-        store_texel(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
+        for (var k = 0u; k < AMOUNT_ROWS; k++) {
+            zone[k] = vec4f(0.0);
+        }
+        store_texel(id.xy, skin_colour(paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
         return;
     }
     let spot = spot_of(owner, id.xy);
@@ -127,7 +139,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     scatter_dots(spot, scalp, lip);
     let inner = inner_lid(spot);
     let p = pigments(spot, lip, mucosa);
-    var rgb = mix(colour_of(0u, p.x, p.y), colour_of(1u, p.x, p.y), lip);
+    var rgb = mix(skin_colour(p.x, p.y), colour_of(LIPS, p.x, p.y), lip);
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
     let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
     let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
@@ -138,7 +150,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
     let fade = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // to 0 outside the charts
     let height = relief(spot, lip) * fade * (1.0 - inner);
-    store_deltas(id.xy, fade, saturate(zone_of(ZONE_BLOOD)) * (1.0 - lip), lip);
+    store_deltas(id.xy, fade, saturate(zone_of(ZONE_FLUSH)) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
     let pores = saturate(0.45 + zone_of(ZONE_PORES)) * bare;
     let furrows = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
