@@ -17,9 +17,9 @@ from dermis.frame.features.surface.painting import paint as given
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
+from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.face import MOVEMENTS, movement_weights
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.painted import PaintedMaps, mean_colour
 from dermis.human.skin.surface import BORDER_FIELDS, PaintedSurface, painted_surface
 from dermis.mesh.head import Head

@@ -47,6 +47,8 @@ def head(
     age: float | None = None,
     weight: float | None = None,
     muscle: float | None = None,
+    skin_ancestry: str | None = None,
+    ita: float | None = None,
     target: Annotated[list[str] | None, _WeightsParameter] = None,
     expression: Annotated[list[str] | None, _WeightsParameter] = None,
     skin: Annotated[list[str] | None, _WeightsParameter] = None,
@@ -79,6 +81,8 @@ def head(
 
         dermis head --seed 7 --skin freckles=0.8 -o person.json && dermis render person.json
 
+        dermis head --seed 7 --ita -30 -o person.json && dermis render person.json
+
         dermis head --sex 1 --hair style=cropped,length_mm=5,beard_mm=4 -o man.json && dermis render man.json
 
         dermis render other.glb --pose jawOpen=0.6 --bone head=0,20,0 -o other.png
@@ -103,14 +107,21 @@ def head(
         Body weight, -1 (lowest) to 1 (highest). [default: 0]
     muscle:
         Muscle mass, -1 (lowest) to 1 (highest). [default: 0]
+    skin_ancestry:
+        Measured group whose skin, eyes and hair colour the person has, whatever the shape: african, arabian,
+        asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or southeast asian. [default:
+        that of the shape]
+    ita:
+        Individual typology angle of the cheek, -70 (darkest) to 70 (lightest); all else is as measured people
+        of this angle have it [degrees]. [default: from the person]
     target:
         Weights of MakeHuman shape targets, such as nose/nose-hump-incr=0.5; repeatable.
     expression:
         Weights of morph targets in the rest pose of the file, such as jawOpen=0.2; repeatable.
     skin:
         Pigments and texture, such as melanin=0.1,freckles=0.4: melanin, eumelanin, blood, oxygen, redness,
-        freckles, moles, spots, tan, veins, stubble, recession, beard, oil and age from 0 to 1, and seed.
-        [default: from the person]
+        freckles, moles, spots, tan, veins, stubble, recession, beard, oil and age from 0 to 1, epidermis_mm,
+        and seed. [default: from the person]
     eye:
         Eye appearance, such as eumelanin=0.2: eumelanin from 0 (blue) to 1 (dark brown), pupil_mm, redness,
         seed. [default: from the person]
@@ -149,7 +160,8 @@ def head(
     ancestry = drop_none(african=african, asian=asian, caucasian=caucasian)
     numbers = ancestry | drop_none(sex=sex, age=age, weight=weight, muscle=muscle)
     rest_weights = parse_weights(expression or [], EXPRESSION)
-    person = _build_person(seed, numbers, parse_weights(target or [], TARGET))
+    tone = drop_none(skin_ancestry=skin_ancestry, ita=ita)
+    person = _build_person(seed, numbers, tone, parse_weights(target or [], TARGET))
     person = replace(
         person,
         skin=_with_values(person.look, skin, "--skin"),
@@ -174,14 +186,15 @@ def head(
     return 0
 
 
-def _build_person(seed: int | None, numbers: Options, targets: dict[str, float]) -> Human:
+def _build_person(seed: int | None, numbers: Options, tone: Options, targets: dict[str, float]) -> Human:
     """Return the average person, or a random one for a seed, with given parameters and shape targets.
 
     numbers : fields of `Human` by name
+    tone : skin ancestry and ITA, for which the skin of a random person is sampled
     """
     from dermis.human.person import Human
 
-    base = Human() if seed is None else Human.drawn(seed)
+    base = Human(**tone) if seed is None else Human.drawn(seed, **tone)
     return replace(base, **numbers, targets={**base.targets, **targets})
 
 
@@ -190,8 +203,10 @@ def _with_values(look: Look, option_values: list[str] | None, option: str) -> Lo
 
     option_values : texts "NAME=NUMBER,..." of the option, such as --skin
     """
+    from dermis.human.skin.look import SITES_FIELD
+
     values = parse_weights(option_values or [], option)
-    field_names = [field.name for field in fields(look)]
+    field_names = [field.name for field in fields(look) if field.name != SITES_FIELD]
     for name in values:
         if name not in field_names:
             refuse(option, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")

@@ -76,9 +76,9 @@ _FIELD_RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _OPTIONAL_FIELDS = "ita", "skin_ancestry"
-_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes whose skin is South Asian or Middle Eastern, if none is given
+_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes, if no ancestry is given
 _OTHER_SKINS = ("south asian", "iraqi", "arabian")
-_SHAPE_OF_SKIN = {  # weights of the Dirichlet distribution of shapes: African, Asian, Caucasian; artist's values
+_SHAPE_OF_SKIN = {  # Dirichlet distributions of African, Asian, Caucasian shape; artist's values
     "african": (3.0, 0.05, 0.05),
     "caucasian": (0.05, 0.05, 3.0),
     "chinese": (0.05, 3.0, 0.05),
@@ -174,12 +174,8 @@ def _sample_ancestry(
 
 def _pick(weights: Mapping[str, float], chance: float) -> str:
     """Return the name at a cumulative probability."""
-    total = 0.0
-    for name, weight in weights.items():
-        total += weight
-        if chance < total:
-            break
-    return name
+    ends = np.cumsum(list(weights.values()))
+    return list(weights)[min(int(np.searchsorted(ends, chance, "right")), len(weights) - 1)]
 
 
 def _sample_hair_and_skin(
@@ -290,11 +286,11 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     skin_ancestry : str
-        Measured group whose skin, eyes and hair colour the person has, such as "south asian", so that skin and
-        shape vary apart; "" for those of the shape's ancestries.
+        Measured group whose skin, eyes and hair colour the person has, such as "south asian", so that skin
+        and shape vary apart; "" for those of the shape's ancestries.
     ita : float, optional
-        Individual typology angle of the cheek of skin that is not set by `skin`, -70 (darkest) to 70 (lightest)
-        [degrees]; all else is as measured people of this angle have it.
+        Individual typology angle of the cheek of skin that is not set by `skin`, -70 (darkest) to 70
+        (lightest) [degrees]; all else is as measured people of this angle have it.
 
     Raises
     ------

@@ -65,7 +65,7 @@ def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Colou
 
 
 def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Floats:
-    """Return the diffuse reflectance (n, n, 31) at `WAVELENGTHS_NM` over melanin and blood, per incident light.
+    """Return the diffuse reflectance (n, n, 31) over melanin and blood at `WAVELENGTHS_NM` [-].
 
     parameters, nodes : as in `colour_table`, whose fractions it has
     """

@@ -12,11 +12,11 @@ from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
 from dermis.apps.batch.shards import Shard, is_intact, list_shards, remove_unfinished, shard_exists
-from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.spec import GENERATOR, Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
-from dermis.base.reading import read_text
+from dermis.base.reading import read_text, read_toml
 
 SPEC_FILE = "spec.toml"
 """Name of the spec in the folder of its data set: another one is refused there."""
@@ -108,8 +108,18 @@ def claim_folder(out: Path, spec: Spec) -> None:
     if not exists:
         atomic_write(path, lambda temporary: temporary.write_text(spec.to_toml(), encoding="utf-8"))
     elif read_text(path, "the spec of a data set") != spec.to_toml():
+        number = _generator_number(path)
+        if number != GENERATOR:
+            expected = f"a data set whose people are drawn by generator {GENERATOR}"
+            advice = "Choose another folder, or continue it with the version that began it"
+            refuse(out, expected, f"those of its {SPEC_FILE} are by generator {number}", advice)
         advice = "Choose another folder, or use the spec that the folder was created with"
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
+
+
+def _generator_number(path: Path) -> object:
+    """Return the generator number of a written spec; those without one are of the first."""
+    return read_toml(path, "the spec of a data set").get("generator", 1)
 
 
 def _render_missing(

@@ -28,6 +28,11 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
+GENERATOR = 2
+"""Number of the rules by which seeds become people and pictures: other numbers give other people.
+
+1 has the people of version 0.1, 2 the skin of measured people.
+"""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
 _BACKGROUND_TABLE = "[background]"
@@ -53,6 +58,10 @@ class Spec(FrozenModel):
     """Number of images."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
     """Seed of all random numbers."""
+    generator: Annotated[
+        int, Field(ge=GENERATOR, le=GENERATOR), Reason("this version draws people by no other rules")
+    ] = GENERATOR
+    """Number of the rules by which seeds become people; data sets of another number cannot be continued."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()

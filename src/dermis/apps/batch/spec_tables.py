@@ -180,7 +180,7 @@ class PersonTable(FrozenModel):
     caucasian: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of Caucasian ancestry."""
     skin_ancestry: Annotated[Distribution | None, NameField(lambda: SKIN_ANCESTRIES)] = None
-    """Measured group whose skin, eyes and hair colour people have, whatever their shape; omitted: from the shape."""
+    """Measured group whose skin, eyes and hair colour people have, whatever their shape."""
     ita: Annotated[Distribution | None, _ITA_FIELD] = None
     """Individual typology angle of the cheek, from -70 (darkest) to 70 (lightest) [degrees]; all else is as
     measured people of this angle have it."""

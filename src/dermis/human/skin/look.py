@@ -37,8 +37,8 @@ _MAX_AGE_FOLDS = 1.0  # `age` of the look at an age of 90
 class SkinLook:
     """Pigments and texture of the skin.
 
-    Pigments are those of the cheek; `sites` has the differences elsewhere. The defaults of `Human` are medians
-    of measured people.
+    Pigments are those of the cheek; `sites` has the differences elsewhere. Those of `Human` are medians of
+    measured people.
 
     Parameters
     ----------

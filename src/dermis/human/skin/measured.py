@@ -1,7 +1,7 @@
 """Pigments of measured people by ancestry, sex, age, site and skin tone, from a table of an archive.
 
-The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of the
-International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
+The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of
+the International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ SKIN_ANCESTRIES: Final = (*GROUPS.values(), *UNIONS)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-70.0, 70.0)
 """Range of the individual typology angle that a person can be asked for [degrees]."""
-_EUROPEAN: Mapping[str, float] = MappingProxyType({"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1})
+_EUROPEAN: Mapping[str, float] = MappingProxyType(
+    {"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1}
+)
 """Probability-like weight of fair hair and light eyes by group; an artist's choice but for the first."""
 _MAX_DOUBLINGS = 6.0
 _MAX_DEVIATION = 3.0  # of the cheek from its median to which differences of sites respond [doublings]
@@ -122,7 +124,13 @@ class SiteDifferences:
 
 
 class _Group(NamedTuple):
-    """Distribution of one group: quantiles (4, k), quantiles of the ITA (k,), correlation (5, 5), sites (12, 3)."""
+    """Distribution of one group.
+
+    quantiles : (4, k) quantiles of the four variables
+    ita : (k,) quantiles of the ITA [degrees]
+    correlation : (5, 5) correlation of the normal scores of the four variables and of the ITA
+    sites : (12, 3) differences of melanin, blood [doublings] and oxygen from the cheek
+    """
 
     quantiles: Doubles
     ita: Doubles
@@ -133,14 +141,14 @@ class _Group(NamedTuple):
 class MeasuredTable(NamedTuple):
     """Distributions of the pigments of measured people.
 
-    The four variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] at the cheek.
+    The four variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] of the cheek.
 
     probabilities : (k,) probabilities of the quantiles
     groups : distribution by name of the group
     sex, age : (4,) difference between male and female, and between old and young
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope, site_spread : (12, 2) slope of a site's difference of melanin and blood over the deviation of the
-        cheek from its median, and standard deviation around it [doublings]
+    site_slope, site_spread : (12, 2) slope of a site's difference of melanin and blood over the deviation of
+        the cheek from its median, and standard deviation around it [doublings]
     """
 
     probabilities: Doubles
@@ -211,7 +219,9 @@ def age_term(age: ArrayLike) -> Doubles:
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def group_weights(african: float, asian: float, caucasian: float, skin_ancestry: str = "") -> dict[str, float]:
+def group_weights(
+    african: float, asian: float, caucasian: float, skin_ancestry: str = ""
+) -> dict[str, float]:
     """Return the weights of the measured groups for ancestry fractions, or for a named skin ancestry."""
     if skin_ancestry:
         return _spread_union(skin_ancestry, 1.0)

@@ -29,7 +29,9 @@ def mean_colour(look: SkinLook) -> NDArray[np.float64]:
 def oxygen_range(look: SkinLook) -> tuple[float, float]:
     """Return the lowest and the highest oxygen saturation of the skin of a head [-]."""
     differences = look.sites.array()[:, 2]
-    low, high = (look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0)))
+    low, high = (
+        look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0))
+    )
     low = min(max(low, 0.0), 1.0 - _MIN_OXYGEN_RANGE)
     return low, max(min(high, 1.0), low + _MIN_OXYGEN_RANGE)
 

@@ -10,6 +10,8 @@ from dermis.base.command_line import run_script
 HERE = "dermis.apps.validation.people"
 COMMANDS = {
     f"{HERE}.table:table": "Write the table of measured people in the package.",
+    f"{HERE}.drawn:people": "Print drawn people against the archive.",
+    f"{HERE}.drawn:page": "Write the tables of docs/measured.md about the variation of people.",
 }
 """Functions that run as commands, with their descriptions."""
 

@@ -7,7 +7,7 @@ import gzip
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,8 @@ class Archive(NamedTuple):
 
     def rows(self, selected: NDArray[np.bool_]) -> Archive:
         """Return the selected measurements."""
-        return Archive(*(column[selected] for column in self))
+        columns: Any = (column[selected] for column in self)
+        return Archive(*columns)
 
 
 @cache

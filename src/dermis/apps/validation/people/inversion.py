@@ -125,4 +125,4 @@ def from_variables(variables: Doubles) -> Doubles:
     """Return the unknowns of `model_spectra` for variables as in `to_variables`."""
     melanin, blood, oxygen, mm = variables.T
     unknowns = np.column_stack([np.exp2(0.5 * melanin), np.exp2(0.5 * blood), oxygen, mm * np.log(2.0)])
-    return np.clip(unknowns, _LOW, _HIGH)
+    return np.asarray(np.clip(unknowns, _LOW, _HIGH))

@@ -37,16 +37,18 @@ _POPULATION = 2000
 _SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Scale of the corrections of the four variables that make medians of colours agree."""
 _COLOUR_SD = 0.05
+_SOURCE = "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
 _MAX_STEP = 1.0  # of a correction, in `_SHIFT_SD`
 _CALIBRATION_STEPS = 6
 _WINSOR_PERCENT = 5.0
 _HEADER = """\
-# quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular reflection,
-#   melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of log2 melanin, log2
-#   blood, oxygen, log2 thickness as upper triangles by row; people 0: empty cell, filled from the pooled model
+# quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular
+#   reflection, melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of
+#   log2 melanin, log2 blood, oxygen, log2 thickness as upper triangles by row; people 0: empty cell, filled
+#   from the pooled model
 # unit: - for fractions, mm for thickness
-# source: python -m dermis.apps.validation.people table, from Lu et al., International Skin Spectra Archive (2025),
-#   doi 10.6084/m9.figshare.28228571.v4
+# source: python -m dermis.apps.validation.people table, from Lu et al., International Skin Spectra Archive
+#   (2025), doi 10.6084/m9.figshare.28228571.v4
 # licence: CC BY 4.0
 """
 
@@ -75,7 +77,7 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
     sex, age = _effects(cheek, y)
     ages, sexes = _population()
     document: dict[str, Any] = {
-        "source": "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4",
+        "source": _SOURCE,
         "probabilities": list(_PROBABILITIES),
         "sex": _rounded(sex),
         "age": _rounded(age),
@@ -182,23 +184,18 @@ def _population() -> tuple[Doubles, Doubles]:
 
 
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
-    """Correct quantiles and differences of sites, so that medians of drawn colours are those of the archive."""
+    """Correct quantiles and differences of sites until median colours of drawn people are the archive's."""
     rng = np.random.default_rng(1)
     normals = rng.standard_normal((_POPULATION, 4))
     site_normals = rng.standard_normal((_POPULATION, len(SITES), 2))
     for code, rows in _by_group(archive):
         group, own = document["groups"][GROUPS[code]], archive.rows(rows)
 
-        def cheek(weights: dict[str, float] = {GROUPS[code]: 1.0}) -> tuple[MeasuredTable, Doubles]:  # noqa: B006
-            found = parse_table(document)
-            scores = normals @ square_root(found.mixture("correlation", weights)[:4, :4])
-            return found, found.variables(weights, sexes, ages, scores)
-
         target = np.median(own.cielab[own.site == _CHEEK], axis=0)
-        y = cheek()[1]
+        y = _drawn_cheeks(document, GROUPS[code], ages, sexes, normals)[1]
         shift = _matching_shift(y, target, 4)
         group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
-        found, y = cheek()
+        found, y = _drawn_cheeks(document, GROUPS[code], ages, sexes, normals)
         differences = found.site_variables({GROUPS[code]: 1.0}, y, site_normals)
         sites = np.array(group["sites"])
         for site in range(len(SITES)):
@@ -208,6 +205,15 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
                 z[:, :3] += differences[:, site]
                 sites[site] += _matching_shift(z, np.median(own.cielab[measured], axis=0), 3)[:3]
         group["sites"] = _rounded(sites)
+
+
+def _drawn_cheeks(
+    document: dict[str, Any], group: str, ages: Doubles, sexes: Doubles, normals: Doubles
+) -> tuple[MeasuredTable, Doubles]:
+    """Return the table so far, and the variables (n, 4) of the cheeks of drawn people of a group."""
+    found, weights = parse_table(document), {group: 1.0}
+    scores = normals @ square_root(found.mixture("correlation", weights)[:4, :4])
+    return found, found.variables(weights, sexes, ages, scores)
 
 
 def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
@@ -224,7 +230,12 @@ def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
     for _ in range(_CALIBRATION_STEPS):
         error = target - median(shift)
         steps = 0.1 * np.diag(_SHIFT_SD)
-        J = np.column_stack([(median(shift + one) - median(shift - one)) / (0.2 * sd) for one, sd in zip(steps, _SHIFT_SD, strict=True)])
+        J = np.column_stack(
+            [
+                (median(shift + one) - median(shift - one)) / (0.2 * sd)
+                for one, sd in zip(steps, _SHIFT_SD, strict=True)
+            ]
+        )
         J[:, ~used] = 0.0
         scaled = J * _SHIFT_SD / _COLOUR_SD
         normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
@@ -238,13 +249,16 @@ def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> st
     out = StringIO()
     out.write(_HEADER)
     writer = csv.writer(out, lineterminator="\n")
-    names = "group site sex age people measurements L a b melanin blood oxygen thickness_mm lab_covariance covariance"
+    names = "group site sex age people measurements L a b melanin blood oxygen thickness_mm"
+    names += " lab_covariance covariance"
     writer.writerow(names.split())
     for code, rows in _by_group(archive):
         for site, name in enumerate(SITES):
             here = rows & (archive.site == site)
             if not here.any():
-                writer.writerow([GROUPS[code], name, "", "", 0, 0, *_pooled_cell(found, GROUPS[code], site), "", ""])
+                writer.writerow(
+                    [GROUPS[code], name, "", "", 0, 0, *_pooled_cell(found, GROUPS[code], site), "", ""]
+                )
                 continue
             writer.writerow(_cell(archive, variables, here, (GROUPS[code], name, "", ""), True))
             for sex, value in (("F", 0.0), ("M", 1.0)):
@@ -257,13 +271,22 @@ def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> st
 
 
 def _cell(
-    archive: Archive, variables: Doubles, rows: NDArray[np.bool_], names: tuple[object, ...], full: bool = False
+    archive: Archive,
+    variables: Doubles,
+    rows: NDArray[np.bool_],
+    names: tuple[object, ...],
+    full: bool = False,
 ) -> list[object]:
     colours, y = archive.cielab[rows], variables[rows]
     people = len(np.unique(archive.person[rows]))
     melanin, blood, oxygen, thickness = np.median(y, axis=0)
     values = [f"{one:.2f}" for one in np.median(colours, axis=0)]
-    values += [f"{np.exp2(melanin):.4f}", f"{np.exp2(blood):.5f}", f"{oxygen:.3f}", f"{np.exp2(thickness):.4f}"]
+    values += [
+        f"{np.exp2(melanin):.4f}",
+        f"{np.exp2(blood):.5f}",
+        f"{oxygen:.3f}",
+        f"{np.exp2(thickness):.4f}",
+    ]
     covariances = [_triangle(colours, 2), _triangle(y, 4)] if full and people > 2 else ["", ""]
     return [*names, people, int(rows.sum()), *values, *covariances]
 
@@ -273,7 +296,12 @@ def _pooled_cell(found: MeasuredTable, group: str, site: int) -> list[str]:
     y = found.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += found.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site]
     colour, (melanin, blood, oxygen, thickness) = model_lab(from_variables(y))[0], y[0]
-    pigments = [f"{np.exp2(melanin):.4f}", f"{np.exp2(blood):.5f}", f"{oxygen:.3f}", f"{np.exp2(thickness):.4f}"]
+    pigments = [
+        f"{np.exp2(melanin):.4f}",
+        f"{np.exp2(blood):.5f}",
+        f"{oxygen:.3f}",
+        f"{np.exp2(thickness):.4f}",
+    ]
     return [f"{one:.2f}" for one in colour] + pigments
 
 

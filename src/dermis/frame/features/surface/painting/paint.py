@@ -140,7 +140,13 @@ def _face_tables(recession: float, sites: SiteDifferences) -> bytes:
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), _PADDING)
     hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _PADDING)
-    tables = textures.noise_table(), textures.dot_table(), face.zone_table(recession, sites), curves, folds.knots
+    tables = (
+        textures.noise_table(),
+        textures.dot_table(),
+        face.zone_table(recession, sites),
+        curves,
+        folds.knots,
+    )
     return b"".join(table.tobytes() for table in (*tables, hairline))
 
 

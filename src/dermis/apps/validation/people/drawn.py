@@ -1,0 +1,214 @@
+"""Drawn people against the archive: distributions of the cheek's colour by group, and medians by site."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.stats import energy_distance
+
+from dermis.apps.validation.pages import DOCS, in_checkout, print_tables, write_page
+from dermis.apps.validation.people.archive import Archive, load_archive
+from dermis.base.arrays import Doubles
+from dermis.base.progress import logged_step
+from dermis.human.person import Human
+from dermis.human.skin.colours import skin_colour_table
+from dermis.human.skin.look import SkinLook
+from dermis.human.skin.measured import FACE_SITES, GROUPS, SITES
+from dermis.images.colour import lab
+from dermis.images.skin_tone import ita_degrees
+
+PAGE = DOCS / "measured.md"
+HEAD_SITES: Final = ("cheek", *(name.replace("_", " ") for name in FACE_SITES))
+"""Sites of the archive that are painted on a head."""
+_SEEDS = 2000
+_PERMUTATIONS = 200
+_SAME_PEOPLE, _TOLERANCE = 50, 1.0
+_QUANTITIES = "L*", "a*", "b*", "ITA"
+_OLD = 55.0
+
+
+class DrawnPeople(NamedTuple):
+    """Colours of n people of one group at the sites of `HEAD_SITES`.
+
+    cielab : (n, 7, 3) colours under D65
+    age, sex : (n,) age [years] and sex
+    """
+
+    cielab: Doubles
+    age: Doubles
+    sex: Doubles
+
+
+def site_colours(look: SkinLook) -> Doubles:
+    """Return the colours (7, 3) of the pigments of a look at `HEAD_SITES`, linear Rec. 709 [-]."""
+    colours = []
+    for melanin, blood, oxygen in np.vstack([np.zeros(3), look.sites.array()]):
+        saturation = min(max(look.oxygen + oxygen, 0.0), 1.0)
+        table = skin_colour_table(look.eumelanin, saturation, look.epidermis_mm)
+        fractions = (np.array([look.melanin * 2.0**melanin]), np.array([look.blood * 2.0**blood]))
+        colours.append(table.lookup(*fractions)[0])
+    return np.array(colours)
+
+
+@logged_step("drawing people")
+def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
+    """Return the colours of people of a measured group, without rendering."""
+    people = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
+    colours = lab(np.array([site_colours(one.look) for one in people]))
+    return DrawnPeople(colours, np.array([one.age for one in people]), np.array([one.sex for one in people]))
+
+
+def draw_all(seeds: int = _SEEDS) -> dict[str, DrawnPeople]:
+    """Return people of all groups, who share a number of seeds."""
+    each = seeds // len(GROUPS)
+    return {
+        group: draw_people(group, range(k * each, (k + 1) * each)) for k, group in enumerate(GROUPS.values())
+    }
+
+
+def people(seeds: int = _SEEDS) -> None:
+    """Print drawn people against the archive.
+
+    Parameters
+    ----------
+    seeds
+        Number of drawn people of all groups.
+    """
+    print_tables(_tables(seeds))
+
+
+def page(seeds: int = _SEEDS) -> None:
+    """Write the tables of docs/measured.md about the variation of people.
+
+    Parameters
+    ----------
+    seeds
+        Number of drawn people of all groups.
+    """
+    text = in_checkout(PAGE).read_text("utf-8")
+    for name, table in _tables(seeds).items():
+        before, rest = text.split(f"<!-- {name} -->\n")
+        text = f"{before}<!-- {name} -->\n{table}\n<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
+    write_page(PAGE, text)
+
+
+def _tables(seeds: int) -> dict[str, str]:
+    archive, drawn = load_archive(), draw_all(seeds)
+    return {
+        "people-cheek": cheek_table(archive, drawn),
+        "people-sites": sites_table(archive, drawn),
+        "people-sex-age": sex_age_table(archive, drawn),
+        "people-empty": empty_cells(archive),
+    }
+
+
+def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table of the cheek's colour by group: medians and energy distances."""
+    lines = [
+        "| group | quantity | archive: median | 5 to 95 % | drawn: median | 5 to 95 % | distance | expected "
+        "| 95 % |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for code, group in GROUPS.items():
+        measured = _measured(archive, code, "cheek")
+        both = [_with_ita(one) for one in (measured.cielab, drawn[group].cielab[:, 0])]
+        for k, name in enumerate(_QUANTITIES):
+            a, b = both[0][:, k], both[1][:, k]
+            distance, expected, limit = two_sample_distance(a, b)
+            cells = [
+                f"{np.median(a):.1f}", _span(a), f"{np.median(b):.1f}", _span(b),
+                f"{distance:.2f}", f"{expected:.2f}", f"{limit:.2f}",
+            ]  # fmt: skip
+            lines.append(f"| {group if k == 0 else ''} | {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def two_sample_distance(a: Doubles, b: Doubles) -> tuple[float, float, float]:
+    """Return the energy distance of two samples, and mean and 95 % quantile for samples of one population.
+
+    The last two are found by permutation.
+    """
+    rng, both = np.random.default_rng(0), np.concatenate([a, b])
+    permuted = []
+    for _ in range(_PERMUTATIONS):
+        shuffled = rng.permutation(both)
+        permuted.append(energy_distance(shuffled[: len(a)], shuffled[len(a) :]))
+    return float(energy_distance(a, b)), float(np.mean(permuted)), float(np.quantile(permuted, 0.95))
+
+
+def site_differences(
+    archive: Archive, drawn: Mapping[str, DrawnPeople]
+) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
+    """Yield group, site, people, median colour (3,) of the archive, and the difference (3,) of that drawn."""
+    for code, group in GROUPS.items():
+        for k, site in enumerate(HEAD_SITES):
+            measured = _measured(archive, code, site)
+            if len(measured.person):
+                median = np.median(measured.cielab, axis=0)
+                difference = np.median(drawn[group].cielab[:, k], axis=0) - median
+                yield group, site, len(np.unique(measured.person)), median, difference
+
+
+def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table of medians by group and site, and of the differences of drawn people."""
+    lines = [
+        "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
+        "|---|---|---|---|---|---|",
+    ]
+    for group, site, count, median, difference in site_differences(archive, drawn):
+        outside = count >= _SAME_PEOPLE and np.abs(difference).max() > _TOLERANCE
+        texts = (
+            ", ".join(f"{one:{form}}" for one in values)
+            for values, form in ((median, ".1f"), (difference, "+.1f"))
+        )
+        lines.append(
+            f"| {group} | {site} | {count} | {' | '.join(texts)} | {'beyond 1' if outside else ''} |"
+        )
+    return "\n".join(lines)
+
+
+def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table of differences of the cheek between sexes and ages, mean over the groups."""
+    lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
+    for name in ("men minus women", "from 55 years minus below 45"):
+        both = []
+        for is_drawn in (False, True):
+            differences, counts = [], []
+            for code, group in GROUPS.items():
+                measured, own = _measured(archive, code, "cheek"), drawn[group]
+                colours = own.cielab[:, 0] if is_drawn else measured.cielab
+                sex, age = (own.sex, own.age) if is_drawn else (measured.sex, measured.age)
+                first, second = (sex > 0.5, sex < 0.5) if "men" in name else (age >= _OLD, age < 45.0)
+                if min(first.sum(), second.sum()) >= 5:
+                    differences.append(np.median(colours[first], axis=0) - np.median(colours[second], axis=0))
+                    counts.append(1.0 / (1.0 / first.sum() + 1.0 / second.sum()))
+            both.append(", ".join(f"{one:+.1f}" for one in np.average(differences, axis=0, weights=counts)))
+        lines.append(f"| {name} | {' | '.join(both)} |")
+    return "\n".join(lines)
+
+
+def empty_cells(archive: Archive) -> str:
+    """Return the cells without measurements as text, which have pooled differences from the cheek."""
+    parts = []
+    for k, group in enumerate(GROUPS.values()):
+        empty = [
+            site for j, site in enumerate(SITES) if not ((archive.group == k) & (archive.site == j)).any()
+        ]
+        if empty:
+            parts.append(f"{group}: {', '.join(empty)}")
+    return "; ".join(parts)
+
+
+def _measured(archive: Archive, code: str, site: str) -> Archive:
+    return archive.rows((archive.group == list(GROUPS).index(code)) & (archive.site == SITES.index(site)))
+
+
+def _with_ita(cielab: Doubles) -> Doubles:
+    return np.column_stack([cielab, ita_degrees(cielab)])
+
+
+def _span(values: Doubles) -> str:
+    low, high = np.percentile(values, (5.0, 95.0))
+    return f"{low:.1f} to {high:.1f}"
