@@ -81,6 +81,14 @@ def lab(linear: ArrayLike) -> Doubles:
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
 
 
+def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
+    """Return linear Rec. 709 colours (..., 3) of X, Y and Z over those of white (..., 3), under any light.
+
+    The colours have the same L*a*b* under D65 as the given ones have under their light.
+    """
+    return np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ @ np.linalg.inv(_XYZ_OF_REC709).T
+
+
 def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
     """Return the CIEDE2000 colour difference (...) of two arrays of linear Rec. 709 colours (..., 3).
 
