@@ -62,10 +62,10 @@ def spectral_medium(
     wavelengths = visible_wavelengths(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
-    notes = (note, _UNIFORM_INDEX_NOTE)
+    notes: tuple[str, ...] = (note, _UNIFORM_INDEX_NOTE)
     if parameters.baseline != 1.0:
         notes += (f"tissue without blood and melanin absorbs {parameters.baseline:g} of {_BASELINE_NOTE}",)
-        sources += ("Lu2025",)
+        sources = (*sources, "Lu2025")
     return Medium(structure, stack, SKIN_ETA, notes, sources)
 
 

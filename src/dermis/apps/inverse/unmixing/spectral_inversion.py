@@ -42,11 +42,11 @@ class SpectralUnknown:
     start: float
     scale: Literal["root", "log", "linear"] = "linear"
 
-    def coordinates(self, values: Floats) -> Floats:
+    def coordinates(self, values: Floats | np.float64) -> Floats:
         """Return the coordinates of values."""
         if self.scale == "log":
-            return np.log(values)
-        return np.sqrt(values) if self.scale == "root" else values
+            return np.asarray(np.log(values))
+        return np.asarray(np.sqrt(values) if self.scale == "root" else values)
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a value."""
@@ -96,7 +96,7 @@ class SpectralFit:
     @property
     def rms(self) -> Floats:
         """Return the root mean square of the residual over wavelengths (n,) [-]."""
-        return np.sqrt((self.residual**2).mean(axis=1))
+        return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
 
     def weighted_residual(self, criterion: Criterion) -> Floats:
         """Return what a fit minimises the sum of squares of, (n, 31) for spectra and (n, 1) for colours."""
@@ -150,7 +150,7 @@ def invert_spectra(
     steps : largest number of steps
     """
     first = {} if start is None else start
-    columns = (one.coordinates(first.get(one.name, np.float64(one.start))) for one in unknowns)
+    columns = (one.coordinates(first.get(one.name, np.array(one.start))) for one in unknowns)
     x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
     low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
 
@@ -159,13 +159,13 @@ def invert_spectra(
 
     weights = rgb_weights()
     target = lab(spectra @ weights.T)
-    metric = _local_metric(target)
+    metric = colour_metric(target)
 
     def residual(point: Floats) -> Floats:
         reflectance = model(values(point))
         if criterion == "spectrum":
             return np.asarray(reflectance - spectra)
-        return np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target)
+        return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
 
     found = values(least_squares(residual, x, low, high, steps))
     return SpectralFit(found, spectra, model(found))
@@ -233,7 +233,7 @@ def _derivatives(residual: Callable[[Floats], Floats], x: Floats, r: Floats, hig
     return np.stack(columns, axis=-1)
 
 
-def _local_metric(colours: Floats) -> Floats:
+def colour_metric(colours: Floats) -> Floats:
     """Return matrices (n, 3, 3) from small differences in L*a*b* to ones whose length is CIEDE2000.
 
     The rotation term, which only blue colours have, is left out.

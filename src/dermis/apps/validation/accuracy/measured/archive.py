@@ -55,6 +55,7 @@ class Archive:
     """Spectra of n measurements, with the person, group and site of each.
 
     spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without the surface's reflection [-]
+    person : (n,) number of the person
     fold : (n,) index of the fold of the person, 0 to `FOLDS` - 1
     group : (n,) key of `GROUPS`
     site : (n,) index in `SITES`
@@ -63,6 +64,7 @@ class Archive:
     """
 
     spectra: Floats
+    person: NDArray[np.int64]
     fold: NDArray[np.int64]
     group: NDArray[np.str_]
     site: NDArray[np.int64]
@@ -73,7 +75,8 @@ class Archive:
 
     def where(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
         """Return selected measurements, by a mask or by indices."""
-        return Archive(self.spectra[chosen], self.fold[chosen], self.group[chosen], self.site[chosen])
+        columns = (self.spectra, self.person, self.fold, self.group, self.site)
+        return Archive(*(column[chosen] for column in columns))
 
     def sample(self, count: int, seed: int = 0) -> Archive:
         """Return at most `count` measurements, chosen at random."""
@@ -89,10 +92,9 @@ def read_archive() -> Archive:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     spectra = float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM)) - SPECULAR_INCLUDED
     # A person is a subject of an origin. The hash spreads people over folds independently of their order.
-    people = [f"{row['origin']}/{row['subject']}".encode() for row in rows]
-    fold = np.array([crc32(person) % FOLDS for person in people])
+    person = np.array([crc32(f"{row['origin']}/{row['subject']}".encode()) for row in rows])
     group = np.array([row["group"] for row in rows])
-    return Archive(spectra, fold, group, np.array([int(row["site"]) - 1 for row in rows]))
+    return Archive(spectra, person, person % FOLDS, group, np.array([int(row["site"]) - 1 for row in rows]))
 
 
 @cache

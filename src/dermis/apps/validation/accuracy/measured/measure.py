@@ -16,6 +16,7 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
     SpectralFit,
     SpectralModel,
     Values,
+    colour_metric,
     fit_skin,
     invert_spectra,
 )
@@ -33,8 +34,9 @@ from dermis.apps.validation.accuracy.measured.bioskin import BIOSKIN_SETS, BIOSK
 from dermis.apps.validation.accuracy.measured.constants import ExtendedModel, fit_constants
 from dermis.apps.validation.accuracy.measured.page import write_measured_page
 from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM, edge_loss
-from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
+from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, write_results
 from dermis.base.console import print_lines
+from dermis.images.colour import delta_e_2000, lab, linear_of_lab
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import (
@@ -43,6 +45,7 @@ from dermis.optics.pigments.spectra import (
     blood,
     jacques_1998,
     melanosome,
+    rgb_weights,
 )
 from dermis.optics.skin_spectra import two_layer_reflectance
 
@@ -50,6 +53,7 @@ RESULT_FILE = RESULTS / "measured.json"
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SAMPLE, _CONSTANTS_SAMPLE = 1500, 600
+_NEIGHBOURS = 80  # of other people, for the local regression of colours
 _PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
 _EDGE_MELANIN = 0.01, 0.03, 0.1, 0.3
@@ -68,11 +72,14 @@ _ADDITIONS: dict[str, tuple[str, ...]] = {
 }
 
 
-def measured(bioskin: Path | None = None) -> None:
-    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md.
+def measured(bioskin: Path | None = None, only: str | None = None) -> None:
+    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md; takes ten minutes.
 
     Parameters
     ----------
+    only:
+        Part to measure again (models, surface, folds, alternatives, additions, sites or edge); the other
+        parts keep their last results.
     bioskin:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
     """
@@ -80,15 +87,16 @@ def measured(bioskin: Path | None = None) -> None:
     parts: dict[str, Callable[[], object]] = {
         "counts": lambda: {"spectra": len(archive), "folds": FOLDS},
         "models": lambda: _models(archive),
+        "surface": lambda: _surface(archive),
         "folds": lambda: _folds(archive),
         "alternatives": lambda: _alternatives(archive.sample(_SAMPLE, 2), bioskin),
         "additions": lambda: _additions(archive.sample(_CONSTANTS_SAMPLE, 3)),
         "sites": lambda: _sites(archive),
         "edge": lambda: _edge(archive.sample(_CONSTANTS_SAMPLE, 3)),
     }
-    results: JsonObject = {}
-    for name, measure in parts.items():
-        results[name] = measure()
+    results: JsonObject = {} if only is None else read_results(RESULT_FILE)
+    for name in parts if only is None else [only]:
+        results[name] = parts[name]()
         print_lines(f"{name} measured")
     write_results(RESULT_FILE, results, digits=4)
     write_measured_page()
@@ -141,6 +149,33 @@ def _models(archive: Archive) -> JsonObject:
                 one: _percentiles(values, (5.0, 50.0, 95.0)) for one, values in five.values.items()
             }
     return _lists(results)
+
+
+def _surface(archive: Archive) -> JsonObject:
+    """Return differences of colours from a smooth surface through those of other people.
+
+    It is the limit of models with two unknowns that are the same for all: the third coordinate of the colours
+    is predicted from the first two by local linear regression.
+    """
+    from scipy.spatial import cKDTree
+
+    face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
+    results: JsonObject = {}
+    for label, chosen in (("all", np.ones(len(archive), bool)), ("cheek and forehead", face)):
+        part = archive.where(chosen)
+        colours = lab(part.spectra @ rgb_weights().T)
+        mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
+        axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
+        point = (colours - mean) @ scale.T @ axes.T
+        nearest = cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1]
+        on_surface = point.copy()
+        for k, neighbours in enumerate(nearest):
+            others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
+            A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
+            on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
+        nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
+        results[label] = _percentiles(delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours)))
+    return results
 
 
 def _by_cell(

@@ -12,14 +12,14 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 PAGE = DOCS / "measured.md"
 RESULT_FILE = RESULTS / "measured.json"
 _SKIN_NAMES = {
-    "former": "before",
-    "half": "half of the absorption of bloodless tissue",
+    "former": "absorption of [Jacques1998]",
+    "half": "half of it",
     "quarter": "a quarter of it",
-    "present": "now",
+    "present": "default skin",
 }
 _MODEL_NAMES = {
-    "present": "this package",
-    "former": "this package, before",
+    "present": "default skin",
+    "former": "absorption of [Jacques1998], 0.05 mm",
     "donner": "Donner and Jensen 2006",
     "jacques": "Jacques 1998",
     "bioskin": "BioSkin 2023",
@@ -55,6 +55,8 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
             f"{DEFAULT_SKIN.baseline:g} of that absorption"
         ),
         "models": _models(results["models"]),
+        "surface_all": f"{results['surface']['all'][0]:.2f}",
+        "surface_face": f"{results['surface']['cheek and forehead'][0]:.2f}",
         "folds": _folds(results["folds"]),
         **_confounded(results),
         "additions": _additions(results["additions"]),
@@ -70,12 +72,13 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
         "alternatives": _alternatives(results["alternatives"]),
         "edge": _edge(results["edge"]),
         "corrected": _corrected(results["edge"]),
+        "red_loss": f"{100 * results['edge']['8 mm of 11 mm']['loss'][1][5]:.0f} %",
     }
 
 
 def _models(models: JsonObject) -> str:
-    heads = ("skin", "spectra", "two, by colour", "above 2", "three, by colour")
-    heads += ("two, RMS", "three, RMS", "five, RMS")
+    heads = ["skin", "spectra", "two, by colour", "above 2", "three, by colour"]
+    heads += ["two, RMS", "three, RMS", "five, RMS"]
     rows = []
     for name, label in _SKIN_NAMES.items():
         for subset in ("all", "cheek and forehead"):
@@ -94,8 +97,8 @@ def _models(models: JsonObject) -> str:
 
 
 def _folds(folds: Sequence[JsonObject]) -> str:
-    heads = ("part", "spectra", "bloodless tissue", "epidermis [mm]", "oxygen", "constants")
-    heads += ("two", "two, cheek and forehead", "three", "five, RMS")
+    heads = ["part", "spectra", "bloodless tissue", "epidermis [mm]", "oxygen", "constants"]
+    heads += ["two", "two, cheek and forehead", "three", "five, RMS"]
     rows = []
     for number, fold in enumerate(folds, 1):
         constants = fold["constants"]
