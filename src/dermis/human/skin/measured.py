@@ -141,7 +141,7 @@ class _Group(NamedTuple):
 class MeasuredTable(NamedTuple):
     """Distributions of the pigments of measured people.
 
-    The four variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] of the cheek.
+    The variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] at the cheek.
 
     probabilities : (k,) probabilities of the quantiles
     groups : distribution by name of the group
@@ -245,7 +245,7 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
 
 
 def likely_groups(ita: float) -> dict[str, float]:
-    """Return the probability of each group among measured people of an ITA, with equal prior of the groups."""
+    """Return the probability of each group among measured people of an ITA, with an equal prior."""
     table = measured_table()
     width = 6.0  # of the window in which people are counted [degrees]
     ends = np.array([ita - width, ita + width])
