@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Iterator
 from io import StringIO
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,15 @@ from dermis.apps.validation.people.inversion import (
 from dermis.base.arrays import Doubles
 from dermis.base.atomic_write import atomic_file
 from dermis.base.console import print_lines
-from dermis.human.skin.measured import GROUPS, SITES, MeasuredTable, age_term, parse_table, square_root
+from dermis.human.skin.measured import (
+    FACE_SITES,
+    GROUPS,
+    SITES,
+    MeasuredTable,
+    age_term,
+    parse_table,
+    square_root,
+)
 from dermis.images.skin_tone import ita_degrees
 
 DATA = CHECKOUT / "src" / "dermis" / "human" / "data"
@@ -38,6 +46,8 @@ _SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Scale of the corrections of the four variables that make medians of colours agree."""
 _COLOUR_SD = 0.05
 _SOURCE = "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
+_THICKNESS_TRIALS = (-0.6, -0.4, -0.2, 0.0, 0.2)
+"""Changes of the thickness of the epidermis that are tried [doublings]."""
 _MAX_STEP = 1.0  # of a correction, in `_SHIFT_SD`
 _CALIBRATION_STEPS = 6
 _WINSOR_PERCENT = 5.0
@@ -184,40 +194,68 @@ def _population() -> tuple[Doubles, Doubles]:
 
 
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
-    """Correct quantiles and differences of sites until median colours of drawn people are the archive's."""
+    """Correct quantiles and differences of sites until median colours of drawn people are the archive's.
+
+    The thickness of the epidermis, which spectra leave open, is that with which the sites of the head agree best.
+    """
     rng = np.random.default_rng(1)
-    normals = rng.standard_normal((_POPULATION, 4))
-    site_normals = rng.standard_normal((_POPULATION, len(SITES), 2))
+    population = _Population(
+        ages,
+        sexes,
+        rng.standard_normal((_POPULATION, 4)),
+        rng.standard_normal((_POPULATION, len(SITES), 2)),
+    )
     for code, rows in _by_group(archive):
-        group, own = document["groups"][GROUPS[code]], archive.rows(rows)
-
-        target = np.median(own.cielab[own.site == _CHEEK], axis=0)
-        y = _drawn_cheeks(document, GROUPS[code], ages, sexes, normals)[1]
-        shift = _matching_shift(y, target, 4)
-        group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
-        found, y = _drawn_cheeks(document, GROUPS[code], ages, sexes, normals)
-        differences = found.site_variables({GROUPS[code]: 1.0}, y, site_normals)
-        sites = np.array(group["sites"])
-        for site in range(len(SITES)):
-            measured = own.site == site
-            if site != _CHEEK and len(np.unique(own.person[measured])) >= _MIN_PEOPLE:
-                z = y.copy()
-                z[:, :3] += differences[:, site]
-                sites[site] += _matching_shift(z, np.median(own.cielab[measured], axis=0), 3)[:3]
-        group["sites"] = _rounded(sites)
+        name, own = GROUPS[code], archive.rows(rows)
+        trials = []
+        for thickness in _THICKNESS_TRIALS:
+            group = dict(document["groups"][name])
+            quantiles = np.array(group["quantiles"]) + np.array([0.0, 0.0, 0.0, thickness])[:, None]
+            trial = {**document, "groups": {name: group | {"quantiles": quantiles.tolist()}}}
+            trials.append((_calibrate_group(trial, name, own, population), thickness, trial["groups"][name]))
+        document["groups"][name] = min(trials, key=lambda one: one[0])[2]
 
 
-def _drawn_cheeks(
-    document: dict[str, Any], group: str, ages: Doubles, sexes: Doubles, normals: Doubles
-) -> tuple[MeasuredTable, Doubles]:
+class _Population(NamedTuple):
+    """Ages, sexes (n,) and random scores (n, 4), (n, 12, 2) of the people for whom medians are calibrated."""
+
+    ages: Doubles
+    sexes: Doubles
+    normals: Doubles
+    site_normals: Doubles
+
+
+def _calibrate_group(document: dict[str, Any], name: str, own: Archive, people: _Population) -> float:
+    """Calibrate one group in place, and return the sum of squared errors of medians of the head [CIELAB]."""
+    group = document["groups"][name]
+    target, loss = np.median(own.cielab[own.site == _CHEEK], axis=0), 0.0
+    shift, error = _matching_shift(_drawn_cheeks(document, name, people)[1], target, 3)
+    loss += float(error @ error)
+    group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
+    found, y = _drawn_cheeks(document, name, people)
+    differences = found.site_variables({name: 1.0}, y, people.site_normals)
+    sites = np.array(group["sites"])
+    for site in range(len(SITES)):
+        measured = own.site == site
+        if site != _CHEEK and len(np.unique(own.person[measured])) >= _MIN_PEOPLE:
+            z = y.copy()
+            z[:, :3] += differences[:, site]
+            shift, error = _matching_shift(z, np.median(own.cielab[measured], axis=0), 3)
+            sites[site] += shift[:3]
+            loss += float(error @ error) * (SITES[site].replace(" ", "_") in FACE_SITES)
+    group["sites"] = _rounded(sites)
+    return loss
+
+
+def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
     """Return the table so far, and the variables (n, 4) of the cheeks of drawn people of a group."""
     found, weights = parse_table(document), {group: 1.0}
-    scores = normals @ square_root(found.mixture("correlation", weights)[:4, :4])
-    return found, found.variables(weights, sexes, ages, scores)
+    scores = people.normals @ square_root(found.mixture("correlation", weights)[:4, :4])
+    return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
-def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
-    """Return the shift (4,) of the first variables by which the median colour of people becomes a target.
+def _matching_shift(y: Doubles, target: Doubles, count: int) -> tuple[Doubles, Doubles]:
+    """Return the shift (4,) of variables by which a median colour becomes a target, and the error (3,) left.
 
     y : (n, 4) variables of people
     count : number of variables that may be shifted
@@ -241,7 +279,7 @@ def _matching_shift(y: Doubles, target: Doubles, count: int) -> Doubles:
         normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
         step = np.linalg.solve(normal, scaled.T @ error / _COLOUR_SD - shift / _SHIFT_SD)
         shift += _SHIFT_SD * np.clip(step, -_MAX_STEP, _MAX_STEP)
-    return shift
+    return shift, target - median(shift)
 
 
 def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> str:
