@@ -112,7 +112,7 @@ def head(
         asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or southeast asian. [default:
         that of the shape]
     ita:
-        Individual typology angle of the cheek, -70 (darkest) to 70 (lightest); all else is as measured people
+        Individual typology angle of the cheek, -65 (darkest) to 70 (lightest); all else is as measured people
         of this angle have it [degrees]. [default: from the person]
     target:
         Weights of MakeHuman shape targets, such as nose/nose-hump-incr=0.5; repeatable.

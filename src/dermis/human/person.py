@@ -289,7 +289,7 @@ class Human:
         Measured group whose skin, eyes and hair colour the person has, such as "south asian", so that skin
         and shape vary apart; "" for those of the shape's ancestries.
     ita : float, optional
-        Individual typology angle of the cheek of skin that is not set by `skin`, -70 (darkest) to 70
+        Individual typology angle of the cheek of skin that is not set by `skin`, -65 (darkest) to 70
         (lightest) [degrees]; all else is as measured people of this angle have it.
 
     Raises

@@ -182,7 +182,7 @@ class PersonTable(FrozenModel):
     skin_ancestry: Annotated[Distribution | None, NameField(lambda: SKIN_ANCESTRIES)] = None
     """Measured group whose skin, eyes and hair colour people have, whatever their shape."""
     ita: Annotated[Distribution | None, _ITA_FIELD] = None
-    """Individual typology angle of the cheek, from -70 (darkest) to 70 (lightest) [degrees]; all else is as
+    """Individual typology angle of the cheek, from -65 (darkest) to 70 (lightest) [degrees]; all else is as
     measured people of this angle have it."""
     weight: Annotated[Distribution | None, _SIGNED_FIELD] = None
     """Body weight, from -1 (lowest) to 1 (highest)."""

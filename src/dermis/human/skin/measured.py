@@ -51,7 +51,7 @@ UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 """Groups that a name stands for together, with equal weights."""
 SKIN_ANCESTRIES: Final = (*GROUPS.values(), *UNIONS)
 """Names of skin ancestries."""
-ITA_RANGE: Final = (-70.0, 70.0)
+ITA_RANGE: Final = (-65.0, 70.0)
 """Range of the individual typology angle that a person can be asked for [degrees]."""
 _EUROPEAN: Mapping[str, float] = MappingProxyType(
     {"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1}
@@ -61,6 +61,7 @@ _MAX_DOUBLINGS = 6.0
 _MAX_DEVIATION = 3.0  # of the cheek from its median to which differences of sites respond [doublings]
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
+_ITA_STEP, _MAX_SCORE = 1.0, 2.9
 _ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
@@ -247,12 +248,10 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
 def likely_groups(ita: float) -> dict[str, float]:
     """Return the probability of each group among measured people of an ITA, with an equal prior."""
     table = measured_table()
-    width = 6.0  # of the window in which people are counted [degrees]
-    ends = np.array([ita - width, ita + width])
-    density = {
-        name: float(np.diff(_probability(ends, group.ita, table.probabilities))[0]) + 1e-6
-        for name, group in table.groups.items()
-    }
+    density = {}
+    for name, group in table.groups.items():
+        low, high = _ita_scores(np.array([ita - _ITA_STEP, ita + _ITA_STEP]), group.ita)
+        density[name] = float(np.exp(-0.125 * (low + high) ** 2) * (high - low))  # of the normal score
     total = sum(density.values())
     return {name: value / total for name, value in density.items()}
 
@@ -298,6 +297,8 @@ def _person(
     normals_or_zeros = np.zeros((1, len(SITES), 2)) if site_normals is None else site_normals[None]
     middle = variables if not typical or ita is not None else np.tile(_median(weights), (1, 1))
     sites = table.site_variables(weights, middle, normals_or_zeros)[0]
+    oxygen = variables[0, 2] + sites[:, 2]  # may be beyond 1, where skin is redder than the model's
+    sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
     rows = {name: tuple(np.round(sites[names.index(name)], 4).tolist()) for name in FACE_SITES}
     return pigments, SiteDifferences(**rows)
@@ -344,21 +345,19 @@ def with_ita(
 
 
 def _ita_score(ita: float, weights: Weights) -> float:
-    """Return the standard normal score of an ITA among people of a mixture of groups."""
+    """Return the standard normal score of an ITA among people of a mixture of groups, at most 2.9."""
+    quantiles = measured_table().mixture("ita", weights)
+    return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_SCORE, _MAX_SCORE))
+
+
+def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
+    """Return standard normal scores of ITAs by interpolation of quantiles, beyond them in proportion."""
     from scipy.special import ndtri
 
-    table = measured_table()
-    quantiles = sum(weight * table.groups[name].ita for name, weight in weights.items())
-    assert isinstance(quantiles, np.ndarray)
-    probability = _probability(np.array([ita]), quantiles, table.probabilities)[0]
-    return float(ndtri(np.clip(probability, 0.002, 0.998)))
-
-
-def _probability(values: Doubles, quantiles: Doubles, at: Doubles) -> Doubles:
-    from scipy.special import ndtr, ndtri
-
-    nodes = ndtri(at)
-    return np.asarray(ndtr(np.interp(values, quantiles, nodes, left=nodes[0] - 1.0, right=nodes[-1] + 1.0)))
+    nodes = ndtri(measured_table().probabilities)
+    slope = (nodes[-1] - nodes[0]) / (quantiles[-1] - quantiles[0])
+    beyond = ita - np.clip(ita, quantiles[0], quantiles[-1])
+    return np.asarray(np.interp(ita, quantiles, nodes) + slope * beyond)
 
 
 def square_root(covariance: Doubles) -> Doubles:

@@ -11,7 +11,7 @@ HERE = "dermis.apps.validation.people"
 COMMANDS = {
     f"{HERE}.table:table": "Write the table of measured people in the package.",
     f"{HERE}.drawn:people": "Print drawn people against the archive.",
-    f"{HERE}.drawn:page": "Write the tables of docs/measured.md about the variation of people.",
+    f"{HERE}.drawn:page": "Measure the variation of people and write docs/measured.md.",
 }
 """Functions that run as commands, with their descriptions."""
 

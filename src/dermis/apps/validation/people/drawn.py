@@ -8,18 +8,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.stats import energy_distance
 
-from dermis.apps.validation.pages import DOCS, in_checkout, print_tables, write_page
+from dermis.apps.validation.accuracy.measured.page import PEOPLE_FILE, write_measured_page
+from dermis.apps.validation.pages import print_tables, write_results
 from dermis.apps.validation.people.archive import Archive, load_archive
+from dermis.apps.validation.people.inversion import model_lab
 from dermis.base.arrays import Doubles
 from dermis.base.progress import logged_step
 from dermis.human.person import Human
-from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.measured import FACE_SITES, GROUPS, SITES
-from dermis.images.colour import lab
 from dermis.images.skin_tone import ita_degrees
 
-PAGE = DOCS / "measured.md"
 HEAD_SITES: Final = ("cheek", *(name.replace("_", " ") for name in FACE_SITES))
 """Sites of the archive that are painted on a head."""
 _SEEDS = 2000
@@ -41,31 +40,27 @@ class DrawnPeople(NamedTuple):
     sex: Doubles
 
 
-def site_colours(look: SkinLook) -> Doubles:
-    """Return the colours (7, 3) of the pigments of a look at `HEAD_SITES`, linear Rec. 709 [-]."""
-    colours = []
-    for melanin, blood, oxygen in np.vstack([np.zeros(3), look.sites.array()]):
-        saturation = min(max(look.oxygen + oxygen, 0.0), 1.0)
-        table = skin_colour_table(look.eumelanin, saturation, look.epidermis_mm)
-        fractions = (np.array([look.melanin * 2.0**melanin]), np.array([look.blood * 2.0**blood]))
-        colours.append(table.lookup(*fractions)[0])
-    return np.array(colours)
+def site_unknowns(look: SkinLook) -> Doubles:
+    """Return the unknowns (7, 4) of `model_spectra` for a look at `HEAD_SITES`."""
+    differences = np.vstack([np.zeros(3), look.sites.array()])
+    fractions = np.array([look.melanin, look.blood]) * np.exp2(differences[:, :2])
+    oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)
+    thickness = np.full(len(differences), np.log(look.epidermis_mm))
+    return np.column_stack([np.sqrt(np.minimum(fractions, 1.0)), oxygen, thickness])
 
 
 @logged_step("drawing people")
 def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
     """Return the colours of people of a measured group, without rendering."""
-    people = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
-    colours = lab(np.array([site_colours(one.look) for one in people]))
-    return DrawnPeople(colours, np.array([one.age for one in people]), np.array([one.sex for one in people]))
+    drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
+    unknowns = np.concatenate([site_unknowns(one.look) for one in drawn])
+    colours = model_lab(unknowns).reshape(len(drawn), len(HEAD_SITES), 3)
+    return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
 def draw_all(seeds: int = _SEEDS) -> dict[str, DrawnPeople]:
-    """Return people of all groups, who share a number of seeds."""
-    each = seeds // len(GROUPS)
-    return {
-        group: draw_people(group, range(k * each, (k + 1) * each)) for k, group in enumerate(GROUPS.values())
-    }
+    """Return people of all groups, drawn with the same seeds."""
+    return {group: draw_people(group, range(seeds)) for group in GROUPS.values()}
 
 
 def people(seeds: int = _SEEDS) -> None:
@@ -74,33 +69,31 @@ def people(seeds: int = _SEEDS) -> None:
     Parameters
     ----------
     seeds
-        Number of drawn people of all groups.
+        Number of drawn people of each group.
     """
     print_tables(_tables(seeds))
 
 
 def page(seeds: int = _SEEDS) -> None:
-    """Write the tables of docs/measured.md about the variation of people.
+    """Measure the variation of people and write docs/measured.md.
 
     Parameters
     ----------
     seeds
-        Number of drawn people of all groups.
+        Number of drawn people of each group.
     """
-    text = in_checkout(PAGE).read_text("utf-8")
-    for name, table in _tables(seeds).items():
-        before, rest = text.split(f"<!-- {name} -->\n")
-        text = f"{before}<!-- {name} -->\n{table}\n<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
-    write_page(PAGE, text)
+    write_results(PEOPLE_FILE, _tables(seeds))
+    write_measured_page()
 
 
 def _tables(seeds: int) -> dict[str, str]:
     archive, drawn = load_archive(), draw_all(seeds)
     return {
-        "people-cheek": cheek_table(archive, drawn),
-        "people-sites": sites_table(archive, drawn),
-        "people-sex-age": sex_age_table(archive, drawn),
-        "people-empty": empty_cells(archive),
+        "people_cheek": cheek_table(archive, drawn),
+        "people_sites": sites_table(archive, drawn),
+        "people_sex_age": sex_age_table(archive, drawn),
+        "people_empty": empty_cells(archive),
+        "people_seeds": f"{seeds:,}",
     }
 
 

@@ -41,6 +41,7 @@ _PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
 _CHEEK = SITES.index("cheek")
 _POOLING_PEOPLE = 30.0  # number of people of a group that weigh as much as the pooled correlation
 _MIN_PEOPLE = 20  # of a cell that is not filled from the pooled model
+_SMALL_CELL_PEOPLE = 10.0  # number of people of a small cell that weigh as much as the pooled difference
 _POPULATION = 2000
 _SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Scale of the corrections of the four variables that make medians of colours agree."""
@@ -157,7 +158,7 @@ def _scores(y: Doubles, rows: Archive) -> Doubles:
 def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return differences of sites from the cheek: medians (g, 12, 3), slopes and spreads (12, 2).
 
-    Cells with too few people have the mean of the other groups, weighted by people.
+    Cells with too few people are mixed with the mean of the other groups, weighted by people.
     """
     shifts, counts = np.zeros((len(GROUPS), len(SITES), 3)), np.zeros((len(GROUPS), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
@@ -169,7 +170,7 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
         for k in range(len(GROUPS)):
             rows = cheek.group[here] == k
             counts[k, site] = rows.sum()
-            if counts[k, site] >= _MIN_PEOPLE:
+            if counts[k, site] > 0:
                 shifts[k, site] = np.median(difference[rows], axis=0)
                 deviation[rows] -= np.median(deviation[rows], axis=0)
                 difference[rows] -= shifts[k, site]
@@ -178,7 +179,9 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
         slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
         spread[site] = np.std(d - slope[site] * x, axis=0)
         filled = counts[:, site] >= _MIN_PEOPLE
-        shifts[~filled, site] = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
+        pooled = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
+        own = (counts[:, site] / (counts[:, site] + _SMALL_CELL_PEOPLE))[~filled, None]
+        shifts[~filled, site] = own * shifts[~filled, site] + (1.0 - own) * pooled
     return shifts, slope, spread
 
 
@@ -196,7 +199,7 @@ def _population() -> tuple[Doubles, Doubles]:
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
     """Correct quantiles and differences of sites until median colours of drawn people are the archive's.
 
-    The thickness of the epidermis, which spectra leave open, is that with which the sites of the head agree best.
+    The thickness of the epidermis, which spectra leave open, is that with which sites of the head agree best.
     """
     rng = np.random.default_rng(1)
     population = _Population(

@@ -11,6 +11,8 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
 PAGE = DOCS / "measured.md"
 RESULT_FILE = RESULTS / "measured.json"
+PEOPLE_FILE = RESULTS / "people.json"
+"""Tables about drawn people, by `python -m dermis.apps.validation.people page`."""
 _SKIN_NAMES = {
     "former": "absorption of [Jacques1998]",
     "half": "half of it",
@@ -42,7 +44,7 @@ _CONSTANT_NAMES = {
 
 def write_measured_page() -> None:
     """Write docs/measured.md from docs/templates/measured.md and the results of the last measurement."""
-    fill_page(PAGE, **measured_parts(read_results(RESULT_FILE)))
+    fill_page(PAGE, **measured_parts(read_results(RESULT_FILE)), **read_results(PEOPLE_FILE))
 
 
 def measured_parts(results: JsonObject) -> dict[str, str]:
