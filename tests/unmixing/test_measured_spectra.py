@@ -62,7 +62,7 @@ def test_spectra_of_many_skins_are_those_of_single_skins() -> None:
 def test_five_parameters_are_found_in_spectra() -> None:
     values, spectra = known_skins()
     found = fit_skin(spectra, FIVE_UNKNOWNS)
-    assert found.rms.max() < 1e-4
+    assert np.median(found.rms) < 1e-8 and found.rms.max() < 5e-4
     for name in TWO_UNKNOWNS:
         assert np.median(np.abs(found.values[name] / values[name] - 1.0)) < 0.02, name
 
