@@ -142,8 +142,8 @@ class UnmixResult:
         """Return medians of the pigments, colour differences, and the fraction of texels that are skin.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
-        skin. "sd" is due to noise, "skin_sd" to oxygen and epidermal thickness of the person, which are assumed
-        and vary as those of measured people.
+        skin. "sd" is due to noise, "skin_sd" to oxygen and epidermal thickness, which are assumed and vary as
+        among measured people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
