@@ -160,9 +160,10 @@ class UnmixResult:
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
                 result[name] = _percentiles(fraction[skin]) | sd
             median = {name: result[name]["median"] for name in ("melanin", "blood")}
-            spread = unknown_skin_sd(**median, skin=self.skin, oxygen_found=self.third is not None)
-            for name, relative in spread.items():
-                result[name]["skin_sd"] = relative * median[name]
+            found = self.third is not None
+            spread = unknown_skin_sd(**median, skin=self.skin, oxygen_found=found)
+            for pigment, relative in spread.items():
+                result[pigment]["skin_sd"] = relative * median[pigment]
         return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
