@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -77,8 +78,9 @@ def unmix(
     eumelanin:
         Recolour: new fraction of the melanin that is eumelanin, 0 to 1.
     find:
-        oxygen: estimate the oxygen saturation too, with a prior of standard deviation 0.1 around
-        --model-oxygen; all: also the level of scattering and the thickness of the epidermis, of spectra only.
+        oxygen: estimate the oxygen saturation too, with a prior around --model-oxygen as wide as the
+        distribution of measured people; all: also the level of scattering and the thickness of the epidermis,
+        of spectra only.
     model_oxygen:
         Oxygen saturation of the skin in the colour map, 0 to 1.
     model_eumelanin:
@@ -182,7 +184,8 @@ def _print_report(result: UnmixResult, written: list[Path], seconds: float, as_j
             values = summary[name]
             lines.append(
                 f"  {name:8} median {values['median']:.4f}, 5 to 95 %: {values['p5']:.4f} to "
-                f"{values['p95']:.4f}, standard deviation {values['sd']:.4f}"
+                f"{values['p95']:.4f}, standard deviation {values['sd']:.4f}, with unknown oxygen and "
+                f"thickness of the epidermis {hypot(values['sd'], values['skin_sd']):.4f}"
             )
         error = summary["delta_e"]
         lines.append(f"  colour error CIEDE2000 {error['median']:.2f} (median), {error['p95']:.2f} (95 %)")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import gzip
+import math
 import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,8 +34,9 @@ SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNK
 """Unknowns of each spectrum by what is found besides melanin and blood."""
 _EXPECTED = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
-_MAX_BYTES = 256 << 20
+_MAX_BYTES = 32 << 20
 _MIN_BANDS, _MAX_STEP_NM, _MAX_END_NM = 16, 21.0, 5.0
+_BATCH = 10_000  # spectra that are fitted together
 _PERCENT_FROM = 1.5  # largest reflectance above which a table is in percent
 _MAX_REFLECTANCE = 1.5
 
@@ -88,10 +91,10 @@ def _read_cells(path: str | Path) -> list[list[str]]:
     with open_regular_file(path, _EXPECTED) as file:
         packed = file.read(2) == b"\x1f\x8b"
         file.seek(0)
-        with parsing(path, _EXPECTED, OSError, EOFError, UnicodeDecodeError):
+        with parsing(path, _EXPECTED, OSError, EOFError, UnicodeDecodeError, zlib.error):
             data = (gzip.GzipFile(fileobj=file) if packed else file).read(_MAX_BYTES + 1)
             if len(data) > _MAX_BYTES:
-                refuse(path, "at most 256 MB", "it has more", "Split the table")
+                refuse(path, "at most 32 MB of text", "it has more", "Split the table")
             text = data.decode("utf-8-sig")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
@@ -116,9 +119,10 @@ def _wavelength(cell: str) -> float | None:
 
 def _number(cell: str) -> float:
     try:
-        return float(cell)
+        value = float(cell)
     except ValueError:
-        return float("nan")
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def _check_grid(path: str | Path, grid: Floats) -> None:
@@ -199,5 +203,13 @@ def unmix_spectra(
     if not len(complete):
         refuse(path, "a complete spectrum", "all have missing values", "Fill the missing cells")
     names: Sequence[str] = SPECTRAL_SETS[find]
-    fit = fit_skin(table.reflectance[complete] - surface, names, "spectrum", skin)
+    spectra = table.reflectance[complete] - surface
+    parts = [fit_skin(part, names, "spectrum", skin) for part in _batches(spectra)]
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}
+    fit = SpectralFit(values, spectra, np.concatenate([part.model for part in parts]))
     return UnmixedSpectra(table.labels, tuple(names), fit, complete.tolist())
+
+
+def _batches(spectra: Floats) -> list[Floats]:
+    """Return spectra in batches whose fits need little memory."""
+    return np.array_split(spectra, -(-len(spectra) // _BATCH))

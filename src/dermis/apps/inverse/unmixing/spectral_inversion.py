@@ -23,7 +23,7 @@ SPECULAR_INCLUDED = 0.0278
 """Reflectance of the smooth surface of skin, which spectrophotometers include [-]."""
 _STEP = 1e-4  # of finite differences
 _MAX_STEPS = 30
-_MIN_GAIN = 1e-6
+_MIN_GAIN, _NEGLIGIBLE = 1e-3, 1e-10  # of the sum of squares, relative and absolute
 _MIN_CURVATURE = 1e-10
 
 
@@ -213,11 +213,11 @@ def least_squares(
         trial_r = residual(trial)
         trial_cost = (trial_r**2).sum(axis=1)
         better = trial_cost <= cost
-        gain = float((cost - trial_cost)[better].sum() / max(cost.sum(), 1e-300))
+        gain = np.where(better, cost - trial_cost, 0.0)
         x, r = np.where(better[:, None], trial, x), np.where(better[:, None], trial_r, r)
         cost = np.where(better, trial_cost, cost)
         damping = np.clip(np.where(better, 0.2 * damping, 6.0 * damping), 1e-7, 1e6)
-        if step_number > 4 and gain < _MIN_GAIN:
+        if step_number > 4 and (gain <= _MIN_GAIN * cost + _NEGLIGIBLE).all():
             break
     return x
 

@@ -75,8 +75,10 @@ class Archive:
 
     def where(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
         """Return selected measurements, by a mask or by indices."""
-        columns = (self.spectra, self.person, self.fold, self.group, self.site)
-        return Archive(*(column[chosen] for column in columns))
+        rows = np.arange(len(self))[chosen]
+        return Archive(
+            self.spectra[rows], self.person[rows], self.fold[rows], self.group[rows], self.site[rows]
+        )
 
     def sample(self, count: int, seed: int = 0) -> Archive:
         """Return at most `count` measurements, chosen at random."""

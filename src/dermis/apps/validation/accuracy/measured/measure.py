@@ -167,7 +167,7 @@ def _surface(archive: Archive) -> JsonObject:
         mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
         axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
         point = (colours - mean) @ scale.T @ axes.T
-        nearest = cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1]
+        nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1])
         on_surface = point.copy()
         for k, neighbours in enumerate(nearest):
             others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
