@@ -150,3 +150,12 @@ PRINTED = 1e-6
 
 UNMIXED = 0.03
 """Melanin and blood found in a colour of known skin, relative: the table is linear between its nodes."""
+
+SITE_MEDIAN = 1.0
+"""Median L*, a*, b* of drawn people at a site against the archive's: the noise of 50 people is as large."""
+
+SITE_PAINTED = 1.5
+"""Painted colour around a measured site against that of its pigments, CIELAB: zones fall off around it."""
+
+TONE_PARITY = 0.01
+"""Difference between skin tones of the relative error of light after exposure and tone curve."""

@@ -60,6 +60,17 @@ def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files,
     assert contents(tmp_path) == undisturbed
 
 
+def test_sets_of_another_generator_are_not_continued(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    put(undisturbed, tmp_path)
+    assert "generator = 2" in small_spec.to_toml()
+    (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 2\n", ""))
+    with pytest.raises(DermisError, match=r"drawn by generator 2, but .* are by generator 1"):
+        drawn(small_spec, tmp_path)
+    assert b"generator" not in contents(tmp_path)["spec.toml"], "the folder is as it was"
+
+
 def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     put(undisturbed, tmp_path)
     (tmp_path / "index.parquet").unlink()

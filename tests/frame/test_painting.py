@@ -8,20 +8,25 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from setups import settings_of
+from tolerances import SITE_PAINTED
 
 from dermis import Human
 from dermis.atlas.raster import rasterise
 from dermis.base.errors import DermisError
+from dermis.base.tables import read_rows
 from dermis.frame.features.surface.painting import paint
 from dermis.frame.features.surface.painting import paint as given
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
+from dermis.human.regions.average import average_positions
 from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.face import MOVEMENTS, movement_weights
 from dermis.human.skin.look import SkinLook
+from dermis.human.skin.measured import SiteDifferences
 from dermis.human.skin.painted import PaintedMaps, mean_colour
 from dermis.human.skin.surface import BORDER_FIELDS, PaintedSurface, painted_surface
+from dermis.images.colour import lab
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
@@ -100,6 +105,32 @@ def test_its_mean_is_that_of_the_look(device: Device, surface: PaintedSurface, h
         assert maps.colour is not None
         mean = maps.colour[covered(head)].mean(axis=0)
         np.testing.assert_allclose(mean, mean_colour(look), rtol=0.16)
+
+
+def test_sites_have_their_measured_pigments(device: Device, surface: PaintedSurface, head: Head) -> None:
+    """Compare medians around each place of sites.csv with the colour of its pigments, in two patterns."""
+    kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
+    texel, triangle = rasterise(head.mesh, 512, np.flatnonzero(kinds))
+    corners = head.mesh.triangles[triangle]
+    points = np.abs(average_positions(head)[corners].mean(axis=1) * (1, 0, 0)) + average_positions(head)[
+        corners
+    ].mean(axis=1) * (0, 1, 1)
+    plain = SiteDifferences()
+    patterned = SiteDifferences(
+        forehead=(0.8, 0.4, -0.2), nose_tip=(0.3, 0.8, 0.0), neck=(0.5, -1.2, 0.1), ear_lobe=(0.2, 0.7, -0.3)
+    )
+    for sites in (plain, patterned):
+        look = replace(BARE, melanin=0.05, oxygen=0.8, tan=0.3, sites=sites)
+        colour = painted(device, surface, look, 512).colour
+        assert colour is not None
+        for row in read_rows("dermis.human.skin", "sites"):
+            difference = (0.0, 0.0, 0.0) if row["site"] == "cheek" else getattr(sites, row["site"])
+            table = skin_colour_table(look.eumelanin, look.oxygen + difference[2], look.epidermis_mm)
+            pigments = look.melanin * 2.0 ** difference[0], look.blood * 2.0 ** difference[1]
+            expected = lab(table.lookup(*(np.array([one]) for one in pigments))[0])
+            near = np.linalg.norm(points - [float(row[axis]) for axis in "xyz"], axis=1) < 9.0
+            found = np.median(lab(colour.reshape(-1, 3)[texel[near]]), axis=0)
+            np.testing.assert_allclose(found, expected, atol=SITE_PAINTED, err_msg=row["site"])
 
 
 def test_lips_are_redder_than_what_is_around(device: Device, surface: PaintedSurface, head: Head) -> None:

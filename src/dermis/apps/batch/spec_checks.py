@@ -29,6 +29,7 @@ _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  
 _SEED_FIELD = "seed"  # an integer that follows from the person
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
+_ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
 HEAD_NAME = "person.head"
 _MAX_NAME_LENGTH = 100  # characters
 
@@ -71,6 +72,9 @@ def _check_person(sampled: Mapping[str, Distribution]) -> None:
     person_keys = [name for name in sampled if name.startswith("person.") and name != HEAD_NAME]
     if HEAD_NAME in sampled and person_keys:
         refuse(person_keys[0], "sampled people", f"{HEAD_NAME} names heads", "Remove one of the two keys")
+    if _ITA_PARAMETER in sampled and _MELANIN_PARAMETER in sampled:
+        advice = "Remove one of the two keys"
+        refuse("person: ita", "an ITA or the melanin of the skin", "the spec has both", advice)
     ancestries = [sampled[name] for name in _ANCESTRY_PARAMETERS if name in sampled]
     if ancestries and not any(min(one.support) > 0 for one in ancestries):  # type: ignore[operator]
         actual = "all of them can be 0 at once"

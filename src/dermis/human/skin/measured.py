@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from dermis.base.arrays import Doubles
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_number
+from dermis.base.tables import float_columns, read_rows
 from dermis.human.skin.colours import skin_colour_table
 from dermis.images.colour import lab
 from dermis.images.skin_tone import ita_degrees
@@ -364,6 +365,44 @@ def square_root(covariance: Doubles) -> Doubles:
     """Return the symmetric square root of a covariance matrix, whose negative eigenvalues are taken as 0."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+class MeasuredCell(NamedTuple):
+    """Medians of one group, site, sex and age group of the archive.
+
+    group, site : as in `GROUPS` and `SITES`
+    sex : "F" or "M", "" for both
+    age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), "" for all
+    people : number of people; 0 for a cell that is filled from the pooled model
+    cielab : (3,) colour under D65, without surface reflection
+    pigments : pigments by the package's model
+    """
+
+    group: str
+    site: str
+    sex: str
+    age_group: str
+    people: int
+    cielab: tuple[float, float, float]
+    pigments: MeasuredPigments
+
+
+@cache
+def measured_cells() -> tuple[MeasuredCell, ...]:
+    """Return the medians of measured skin by group and site, also for each sex and age group.
+
+    Source: [Lu2025].
+    """
+    rows = read_rows("dermis.human", "data/measured_cells")
+    colours = float_columns(rows, "L a b").tolist()
+    pigments = float_columns(rows, "melanin blood oxygen thickness_mm").tolist()
+    return tuple(
+        MeasuredCell(
+            row["group"], row["site"], row["sex"], row["age"], int(row["people"]),
+            (colour[0], colour[1], colour[2]), MeasuredPigments(*values),
+        )
+        for row, colour, values in zip(rows, colours, pigments, strict=True)
+    )  # fmt: skip
 
 
 @cache
