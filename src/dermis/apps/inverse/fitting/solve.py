@@ -203,7 +203,7 @@ def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
 
 _BLOCKS_PER_SIDE = 16
 """Number of blocks along the longer side of the picture; residuals are correlated within a block."""
-SYSTEMATIC_SD = {"melanin": 0.1, "blood": 0.09}
+SYSTEMATIC_SD = {"melanin": 0.11, "blood": 0.1}
 """Standard deviations of the logarithms of pigments due to errors of the renderer, so that 68 % of the errors
 of path-traced faces are within one stated standard deviation, see docs/fit.md."""
 _LIMIT_TOLERANCE = 1e-6
