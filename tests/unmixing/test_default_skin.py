@@ -15,7 +15,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.tissue import load_tissue
 from dermis.scene.people import skin_of
 
-PIGMENTS = "melanin", "eumelanin", "blood", "oxygen"
+PIGMENTS = "melanin", "eumelanin", "blood", "oxygen", "epidermis_mm"
 
 
 @pytest.mark.parametrize(("melanin", "blood"), [(0.02, 0.01), (0.1, 0.02)])
@@ -32,10 +32,17 @@ def test_tissue_people_and_fits_start_from_the_same_skin() -> None:
     assert {name: getattr(look, name) for name in PIGMENTS} == {
         name: getattr(DEFAULT_SKIN, name) for name in PIGMENTS
     }
-    own = skin_of(dermis.Human()).pigments
+    person = dermis.Human(skin=look)
+    own = skin_of(person).pigments
     assert own is not None and own.epidermis_mm == DEFAULT_SKIN.epidermis_mm
-    fixed = fit_subject(dermis.Scene(dermis.Human().head())).scene.skin.pigments
+    fixed = fit_subject(dermis.Scene(person.head())).scene.skin.pigments
     assert fixed is not None and fixed.epidermis_mm == DEFAULT_SKIN.epidermis_mm
+
+
+def test_fits_keep_the_thickness_of_the_person() -> None:
+    person = dermis.Human(skin=SkinLook(epidermis_mm=0.08, oxygen=0.6))
+    fixed = fit_subject(dermis.Scene(person.head())).scene.skin.pigments
+    assert fixed is not None and (fixed.epidermis_mm, fixed.oxygen) == (0.08, 0.6)
 
 
 def test_the_published_skins_keep_their_thickness() -> None:
