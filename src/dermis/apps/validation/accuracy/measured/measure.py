@@ -79,8 +79,8 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     Parameters
     ----------
     only:
-        Part to measure again (models, surface, limits, folds, alternatives, additions, sites or edge); the other
-        parts keep their last results.
+        Part to measure again (models, surface, limits, folds, alternatives, additions, sites or edge); the
+        other parts keep their last results.
     bioskin:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
     """
