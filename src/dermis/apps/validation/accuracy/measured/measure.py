@@ -53,6 +53,7 @@ RESULT_FILE = RESULTS / "measured.json"
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SAMPLE, _CONSTANTS_SAMPLE = 1500, 600
+_AT_LIMIT, _MATCHED = 1e-6, 0.25
 _NEIGHBOURS = 80  # of other people, for the local regression of colours
 _PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
@@ -78,8 +79,8 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     Parameters
     ----------
     only:
-        Part to measure again (models, surface, folds, alternatives, additions, sites or edge); the other
-        parts keep their last results.
+        Part to measure again (models, surface, limits, folds, alternatives, additions, sites or edge); the
+        other parts keep their last results.
     bioskin:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
     """
@@ -88,6 +89,7 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "counts": lambda: {"spectra": len(archive), "folds": FOLDS},
         "models": lambda: _models(archive),
         "surface": lambda: _surface(archive),
+        "limits": lambda: _limits(archive),
         "folds": lambda: _folds(archive),
         "alternatives": lambda: _alternatives(archive.sample(_SAMPLE, 2), bioskin),
         "additions": lambda: _additions(archive.sample(_CONSTANTS_SAMPLE, 3)),
@@ -176,6 +178,17 @@ def _surface(archive: Archive) -> JsonObject:
         nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
         results[label] = _percentiles(delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours)))
     return results
+
+
+def _limits(archive: Archive) -> JsonObject:
+    """Return how many fits by colour with three unknowns end at the limits of oxygen, and do not match."""
+    fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
+    oxygen = fit.values["oxygen"]
+    return {
+        "none": float((oxygen <= _AT_LIMIT).mean()),
+        "all": float((oxygen >= 1.0 - _AT_LIMIT).mean()),
+        "unmatched": float((fit.delta_e() > _MATCHED).mean()),
+    }
 
 
 def _by_cell(

@@ -57,6 +57,7 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
             f"{DEFAULT_SKIN.baseline:g} of that absorption"
         ),
         "models": _models(results["models"]),
+        **{f"oxygen_{name}": f"{100 * one:.0f} %" for name, one in results["limits"].items()},
         "surface_all": f"{results['surface']['all'][0]:.2f}",
         "surface_face": f"{results['surface']['cheek and forehead'][0]:.2f}",
         "folds": _folds(results["folds"]),

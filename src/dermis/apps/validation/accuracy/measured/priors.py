@@ -18,7 +18,8 @@ _COMPONENTS = 3
 _ITERATIONS = 300
 _CALLOUS = ("palm", "ring finger")
 """Sites with a thick stratum corneum, which is not part of the model."""
-_HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and log epidermis_mm
+_HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and
+#   log epidermis_mm
 # unit: fractions [-], mm; weight, mean and lower triangle of the covariance
 # source: [Lu2025], all sites but palm and fingers, inverted by spectrum with the package's model
 # licence: CC BY 4.0
