@@ -59,7 +59,7 @@ _EUROPEAN: Mapping[str, float] = MappingProxyType(
 )
 """Probability-like weight of fair hair and light eyes by group; an artist's choice but for the first."""
 _MAX_DOUBLINGS = 6.0
-_MAX_DEVIATION = 3.0  # of the cheek from its median to which differences of sites respond [doublings]
+_MAX_DEVIATION = 0.7  # of the cheek from its median to which differences of sites respond [doublings]
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
 _ITA_STEP, _MAX_SCORE = 1.0, 2.9
