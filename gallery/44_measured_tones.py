@@ -18,36 +18,21 @@ from dermis.frame.features.post.meter import METER_KEY
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8, linear_of_lab
 
-GROUPS = (  # group and sex in the archive
-    ("japanese", "F"),
-    ("caucasian", ""),
-    ("chinese", ""),
-    ("iraqi", ""),
-    ("southeast asian", ""),
-    ("southeast asian", "M"),
-    ("south asian", "M"),
-    ("african", "F"),
-    ("african", ""),
-    ("african", "M"),
-)
+TEN = "japanese F,caucasian,arabian,chinese,southeast asian,iraqi,south asian M,african F,african,african M"
 PERSON = dermis.Human(age=32)
 
 
 def draw(studio):
-    cells = {
-        (one.group, one.sex): one for one in measured_cells() if one.site == "cheek" and not one.age_group
-    }
-    head, panels = PERSON.head(), {}
-    for group, sex in GROUPS:
-        cell = cells[group, sex]
-        sites = dermis.Human(skin_ancestry=group).look.sites
-        look = replace(PERSON.look, **cell.pigments._asdict(), sites=sites)
-        own = replace(PERSON, skin=look).on(head)
-        face = studio.render(dermis.Scene(own, camera=dermis.portrait(head)), 0.6, exposure="auto")
-        patch = encode_srgb8(METER_KEY * np.clip(linear_of_lab(cell.cielab), 0.0, 1.0))
-        beside = np.broadcast_to(patch, (len(face), len(face) // 4, 3))
-        people = {"F": " women", "M": " men", "": ""}[sex]
-        panels[f"{group}{people}, L* {cell.cielab[0]:.0f}"] = np.hstack([face, beside])
+    cheeks = [one for one in measured_cells() if one.site == "cheek" and not one.age_group]
+    cells, head, panels = {f"{one.group} {one.sex}".strip(): one for one in cheeks}, PERSON.head(), {}
+    for name in TEN.split(","):
+        cell = cells[name]
+        sites = dermis.Human(skin_ancestry=cell.group).look.sites
+        person = replace(PERSON, skin=replace(PERSON.look, **cell.pigments._asdict(), sites=sites))
+        scene = dermis.Scene(person.on(head), camera=dermis.portrait(head))
+        face = studio.render(scene, 0.6, exposure="auto")
+        patch = encode_srgb8(METER_KEY * np.maximum(linear_of_lab(cell.cielab), 0.0))
+        panels[name] = np.hstack([face, np.broadcast_to(patch, (len(face), len(face) // 4, 3))])
     return panels
 
 
