@@ -69,7 +69,7 @@ def load_rigged(
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
-    """Load mesh and rig of a file of one of `MESH_READERS`, in millimetres, with Y up and v down.
+    """Load mesh and rig of a file of one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
     Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; others are opaque.
     The mesh is checked by `check_mesh`; its size is not checked.

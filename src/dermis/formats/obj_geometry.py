@@ -15,6 +15,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Mask
 from dermis.base.errors import refuse
+from dermis.base.file_properties import FileProperty, in_code, keys_of
 from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
     Polygons,
@@ -36,17 +37,48 @@ _VERTEX_KINDS = ("v", "vt", "vn")
 _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
 _USED_NUMBERS, _MOST_NUMBERS = 6, 16  # position and colour; in a statement
 _POLYPAINT = "#MRGB"
-READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAINT)
-STATEMENTS_WITHOUT_MEANING = ("s", "mg")
-"""Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
-_USED_STATEMENTS = frozenset(READ_STATEMENTS) | {"s"}
-LEFT_OUT = {
-    **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con", "vp"), "curves"),
-    **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
-    "l": "lines",
-    "p": "points",
-}
-"""What some statements describe that are left out with a note, as all unknown ones are."""
+_CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
+_LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
+OBJ_PROPERTIES = (
+    FileProperty("`v x y z`", "drawn", "position", ("v",)),
+    FileProperty("`v x y z w`", "drawn with a note", "position divided by w (no note if w is 1)"),
+    FileProperty("`v x y z r g b`", "drawn", "sRGB colour from 0 to 1; vertices without one are white"),
+    FileProperty("`v x y z r g b` above 1", "drawn with a note", "sRGB colour from 0 to 255"),
+    FileProperty("further numbers in `v`", "noted"),
+    FileProperty(
+        f"`{_POLYPAINT}` (polypaint of ZBrush)", "drawn", "sRGB colours of the vertices", (_POLYPAINT,)
+    ),
+    FileProperty(f"`{_POLYPAINT}` beside colours in `v`, or of other vertices", "noted"),
+    FileProperty("`vt u v`", "drawn", "uv", ("vt",)),
+    FileProperty("`vt u v w`", "noted", "u and v are drawn, w is left out (no note if it is 0)"),
+    FileProperty("`vn`", "drawn", "normals; missing ones are computed", ("vn",)),
+    FileProperty(
+        "`f` with `v`, `v/vt`, `v//vn`, `v/vt/vn`",
+        "drawn",
+        "polygons, divided into fans; indices count from 1, or backwards from the last vertex",
+        ("f",),
+    ),
+    FileProperty("`f` without `vt` beside others with it", "drawn with a note", "skin without uv"),
+    FileProperty("`f` of one or two corners", "noted"),
+    FileProperty("`f` with an index of 0 or beyond the file", "refused", "the error names the line"),
+    FileProperty(
+        "`usemtl`, `g`", "drawn with a note", "groups; the note lists those of skin", ("usemtl", "g")
+    ),
+    FileProperty("`o`", "drawn", "groups where neither `usemtl` nor `g` has a name", ("o",)),
+    FileProperty("`mtllib`", "drawn", "[materials](#materials-and-parts)", ("mtllib",)),
+    FileProperty("`mtllib` of a missing file", "noted"),
+    FileProperty(
+        "`s` in a file without normals", "noted", "smooth everywhere (no note if all faces are in one group)"
+    ),
+    FileProperty("`s` in a file with normals", "no effect", "normals state the same"),
+    FileProperty("`mg`", "no effect", "for curves only", ("mg",)),
+    *(FileProperty(f"{kind}: {in_code(keys)}", "noted", "", keys) for kind, keys in _LEFT_OUT.items()),
+    FileProperty("other statements", "noted"),
+)
+"""Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
+_USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}
+_WITHOUT_EFFECT = keys_of(OBJ_PROPERTIES, "no effect")
+_KINDS_LEFT_OUT = {key: kind for kind, keys in _LEFT_OUT.items() for key in keys}
 
 
 @dataclass(frozen=True)
@@ -303,8 +335,8 @@ def _unread(keys: Collection[str], statements: Sequence[_Statement], has_normals
 
     keys : first words of unknown statements
     """
-    keys = [key for key in keys if key not in STATEMENTS_WITHOUT_MEANING]
-    names = [f"{key} ({LEFT_OUT[key]})" if key in LEFT_OUT else key for key in keys]
+    kinds = {key: _KINDS_LEFT_OUT.get(key) for key in keys if key not in _WITHOUT_EFFECT}
+    names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
     notes = [f"statements are left out: {listed(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}
     if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dermis.base.file_properties import FileProperty, keys_of
 from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import IDENTITY, FileMaterial, Role, Texture, UvTransform, Wrap
@@ -29,7 +30,43 @@ TEXTURE_ROLES = {
 }
 """Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
 _NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
-_WITHOUT_MEANING = ("newmtl", "ka", "map_ka", "illum", "sharpness", "map_aat")
+MTL_PROPERTIES = (
+    FileProperty("`newmtl`", "drawn with a note", "name, which decides what is skin", ("newmtl",)),
+    FileProperty("`Kd`", "drawn", "linear colour; 0.8 of grey counts as none", ("Kd",)),
+    FileProperty("`Kd` beside `map_Kd`", "noted", "no note for the greys that programs write there"),
+    FileProperty("`map_Kd`", "drawn", "colour", ("map_Kd",)),
+    FileProperty("UDIM tiles: `face.<UDIM>.png`", "drawn", "a picture for each tile"),
+    FileProperty("`Ke`, `map_Ke`", "noted", "emission", ("Ke", "map_Ke"), "drawn"),
+    FileProperty("`d`, `Tr`, `map_d`", "noted", "opacity, cut at one half", ("d", "Tr", "map_d"), "drawn"),
+    FileProperty("`Pr`, `Ns`", "noted", "roughness; skin has a measured one", ("Pr", "Ns"), "drawn"),
+    FileProperty("`map_Pr`", "drawn", "roughness, squared for skin", ("map_Pr",)),
+    FileProperty("`Pm`, `map_Pm`", "noted", "metalness", ("Pm", "map_Pm"), "drawn"),
+    FileProperty("`map_Ks`", "drawn", "specular strength, of a single skin material", ("map_Ks",), "noted"),
+    FileProperty("`norm`", "drawn", "normal map", ("norm",)),
+    FileProperty(
+        "`bump`, `map_Bump` with normals", "drawn", "of a single skin material", ("bump", "map_Bump"), "noted"
+    ),
+    FileProperty("`bump`, `map_Bump` with heights", "noted", "drawn for skin with `--height-mm`"),
+    FileProperty("options `-s`, `-o`, `-clamp`", "drawn", "placement of a picture"),
+    FileProperty("option `-bm`", "drawn", "factor of normals and heights"),
+    FileProperty(
+        "options `-mm`, `-cc`, `-boost`, `-imfchan`, `-blendu`, `-blendv`, `-t`",
+        "noted",
+        "no note for values that change nothing, such as `-mm 0 1`",
+    ),
+    FileProperty("options `-texres`, `-type`", "no effect", "pictures keep their size; for reflections only"),
+    FileProperty("a picture that is missing", "noted"),
+    FileProperty("`Ka`, `map_Ka`", "no effect", "ambient light, as part of the lights", ("Ka", "map_Ka")),
+    FileProperty(
+        "`illum`, `sharpness`, `map_aat`",
+        "no effect",
+        "settings of old renderers",
+        ("illum", "sharpness", "map_aat"),
+    ),
+    FileProperty("other statements, such as `Ks`, `Ni`, `disp`", "noted"),
+)
+"""Statements of .mtl files."""
+_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
 _PART_ROLES: Mapping[str, Role] = {
     "colour": "colour",
     "roughness": "roughness",
@@ -43,10 +80,11 @@ _OPTION = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|clamp\s+(?P<clamp>\S+)"
-    r"|mm\s+\S+\s+\S+"
-    r"|(?:blendu|blendv|boost|cc|imfchan|texres|type)\s+\S+)\s+",
+    r"|(?P<unused>mm\s+\S+\s+\S+|(?:blendu|blendv|boost|cc|imfchan)\s+\S+)"
+    r"|(?:texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
+_NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER)
 _UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
@@ -65,7 +103,7 @@ class MtlTexture:
     factor : option -bm, by which the map is multiplied [-]
     scale, offset : options -s and -o of u and v, with v up
     wrap : continuation beyond the picture, by option -clamp
-    has_turbulence : whether the picture is distorted (-t)
+    unused : options without effect, such as the turbulence -t
     """
 
     key: str
@@ -74,7 +112,7 @@ class MtlTexture:
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     wrap: Wrap = "repeat"
-    has_turbulence: bool = False
+    unused: tuple[str, ...] = ()
 
     @property
     def transform(self) -> UvTransform:
@@ -154,7 +192,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
         elif key in _NUMBERS and len(numbers := _numbers(value)) >= _NUMBERS[key]:
             current.numbers[key] = numbers
-        elif key not in _WITHOUT_MEANING:
+        elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
     return materials
 
@@ -186,10 +224,12 @@ def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
     if option["clamp"]:
         return replace(texture, wrap="clamp" if option["clamp"].lower() == "on" else "repeat")
     if not option["transform"]:
-        return texture
+        words = " ".join((option["unused"] or "").lower().split())
+        unused = (f"-{words}",) if words and words not in _NEUTRAL_OPTIONS else ()
+        return replace(texture, unused=texture.unused + unused)
     which, numbers = option["transform"].lower(), [float(number) for number in option["numbers"].split()]
     if which == "t":
-        return replace(texture, has_turbulence=any(numbers))
+        return replace(texture, unused=(*texture.unused, *["-t"] * any(numbers)))
     u, v = (*numbers, 1.0 if which == "s" else 0.0)[:2]
     return replace(texture, scale=(u, v)) if which == "s" else replace(texture, offset=(u, v))
 
@@ -256,8 +296,7 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
             if written != texture.name:
                 c, f = c - column, f + row
             textures[_PART_ROLES[role]] = Texture(file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap))
-        if texture.has_turbulence:
-            unused.append(f"turbulence (-t) of {written}")
+        unused += [f"option {option} of {written}" for option in texture.unused]
     numbers = {key: values[0] for key, values in own.numbers.items()}
     alpha = numbers.get("d", 1.0 - numbers.get("tr", 0.0))
     roughness = numbers.get("pr")
@@ -276,6 +315,7 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
         roughness=roughness,
         stated_metalness=numbers.get("pm", 1.0 if "metalness" in textures else 0.0),
         emission=parse_colour(own.numbers.get("ke", [float("emission" in textures)] * 3)),
+        normal_scale=own.textures["normal"].factor if "normal" in own.textures else 1.0,
         skin_only=tuple(skin_only),
         missing=missing,
         unused=tuple(dict.fromkeys(unused)),

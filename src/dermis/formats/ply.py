@@ -13,6 +13,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Numbers
 from dermis.base.errors import refuse
+from dermis.base.file_properties import FileProperty, in_code, keys_of
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import FileMaterial, Texture
@@ -50,14 +51,46 @@ _TYPES = {
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 _FACE_NAMES = ("vertex_indices", "vertex_index")
-PROPERTIES_WITHOUT_MEANING = {
+_SCALAR_PREFIX = "scalar_"  # of the values of scanners in CloudCompare
+_ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
+_SCANNER_VALUES = (
     *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
     *("time", "timestamp", "id", "index", "original_index", "scan_index"),
     *("label", "class", "classification", "segment"),
-}
-"""Properties that scanners and point tools write and that say nothing about the look of a surface."""
-_SCALAR_PREFIX = "scalar_"  # of such properties in CloudCompare
-_ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
+)
+PLY_PROPERTIES = (
+    FileProperty("vertex: `x`, `y`, `z`", "drawn", "positions"),
+    FileProperty("vertex: `nx`, `ny`, `nz`", "drawn", "normals; missing ones are computed"),
+    FileProperty(f"vertex: {'; '.join(map(in_code, UV_NAMES))}", "drawn", "uv"),
+    FileProperty(
+        f"vertex: {'; '.join(map(in_code, COLOUR_NAMES))}",
+        "drawn",
+        "sRGB colours; integers of any size, or floats from 0 to 1",
+    ),
+    FileProperty("the same as floats above 1", "drawn with a note", "sRGB colours from 0 to 255"),
+    FileProperty(
+        f"vertex: {' or '.join(map(in_code, _ALPHA_NAMES))}", "noted", "no note if all are the same"
+    ),
+    FileProperty(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "drawn", "polygons"),
+    FileProperty("faces of one or two corners", "noted"),
+    FileProperty("face: `texcoord`", "drawn", "uv of the corners of a face"),
+    FileProperty("face: an empty `texcoord`", "drawn with a note", "skin without uv"),
+    FileProperty("face: `texnumber`", "drawn with a note", "the picture of most faces is used for all"),
+    FileProperty("tristrips: `vertex_indices`", "drawn", "strips of triangles, with -1 between them"),
+    FileProperty("`comment TextureFile NAME`", "drawn", "colour picture in the folder of the file"),
+    FileProperty("`comment TextureFile NAME` of a missing file", "noted"),
+    FileProperty(
+        f"values of scanners: {in_code(_SCANNER_VALUES)}, `{_SCALAR_PREFIX}...`",
+        "no effect",
+        "they do not describe the look of a surface",
+        _SCANNER_VALUES,
+    ),
+    FileProperty("other comments", "no effect"),
+    FileProperty("other elements and properties", "noted"),
+    FileProperty("a file without faces", "refused", "a cloud of points"),
+)
+"""Elements and properties of PLY files."""
+_WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
 _HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
 _STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=True))
 
@@ -463,7 +496,7 @@ def _unread(tables: Mapping[str, _Columns]) -> list[str]:
         for element, columns in tables.items()
         for name in columns
         if columns.used
-        and name not in columns.used | PROPERTIES_WITHOUT_MEANING
+        and name not in (*columns.used, *_WITHOUT_EFFECT)
         and not name.startswith(_SCALAR_PREFIX)
     ]
     return [f"these are left out: {listed(ignored)}"] if ignored else []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -14,30 +13,15 @@ from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file, parsing
 from dermis.formats import size_limits as limits
-from dermis.formats.gltf.triangles import read_gltf
 from dermis.formats.mesh_checks import check_arrays, check_counts
-from dermis.formats.obj import read_obj
+from dermis.formats.mesh_formats import find_format, mesh_suffixes
 from dermis.formats.parts import MeshFile, MeshPart
-from dermis.formats.ply import read_ply
-from dermis.formats.stl import read_stl
-from dermis.formats.usd.read import USD_SUFFIXES, read_usd
 from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
-
-
-MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".vrm": read_gltf,
-    ".obj": read_obj,
-    ".ply": read_ply,
-    ".stl": read_stl,
-    **dict.fromkeys(USD_SUFFIXES, read_usd),
-}
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
 _OTHER_PROGRAMS = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
 _SUFFIX_ADVICE = {
@@ -157,16 +141,16 @@ def read_mesh_file(source: Path) -> MeshFile:
 
     Raises DermisError for every fault of the file.
     """
-    reader = MESH_READERS.get(source.suffix.lower())
-    if reader is None:
+    mesh_format = find_format(source)
+    if mesh_format is None:
         actual = f"the suffix is {source.suffix!r}"
         advice = _SUFFIX_ADVICE.get(source.suffix.lower(), "Export it as one of these")
-        refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, advice)
+        refuse(source, f"a mesh file ({', '.join(mesh_suffixes())})", actual, advice)
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     # readers may raise any exception for damaged files
     with parsing(source, f"a valid {source.suffix} mesh", Exception):
-        mesh_file = reader(source)
+        mesh_file = mesh_format.read(source)
         parts = [_without_unused_vertices(part) for part in mesh_file.parts if len(part.triangles)]
     if not parts:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")

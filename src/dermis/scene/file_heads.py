@@ -150,4 +150,4 @@ def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tup
     )
     loaded = options.load({})
     given: dict[str, Any] = {role: getattr(loaded, role) for role in options.given}
-    return with_factors(replace(own, **given), material, {*options.given, "roughness"}), faults
+    return with_factors(replace(own, **given), material, {*options.given, "normal", "roughness"}), faults

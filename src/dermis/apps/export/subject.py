@@ -14,7 +14,7 @@ import numpy as np
 from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
-from dermis.formats.read import MESH_READERS
+from dermis.formats.mesh_formats import find_format
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyeTextures
@@ -152,7 +152,7 @@ def load_subject(
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
-    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in MESH_READERS):
+    if not (is_person_name(name) or name in SAMPLES or find_format(path)):
         return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(source, **head)
     if profile is not None:

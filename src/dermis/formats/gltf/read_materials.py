@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dermis.base.errors import refuse
+from dermis.base.file_properties import FileProperty, in_code, keys_of
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
 from dermis.formats.parts import Colour, parse_colour
@@ -47,15 +48,41 @@ _NOT_DRAWN = {
     "KHR_materials_volume": "absorbing volume",
     "VRMC_materials_mtoon": "cartoon shading (shade colour, outline, rim light)",
 }
-KNOWN_EXTENSIONS = (
-    *_SOURCE_EXTENSIONS,
-    *_SCATTERING,
-    *_NOT_DRAWN,
-    _GLOSS,
-    _UNLIT,
-    _STRENGTH,
-    "KHR_texture_transform",
+_BASISU = "KHR_texture_basisu"
+GLTF_MATERIALS = (
+    FileProperty("`baseColorFactor`, `baseColorTexture`", "drawn"),
+    FileProperty("`normalTexture` with `scale`", "drawn"),
+    FileProperty(
+        "`metallicRoughnessTexture`", "drawn", "roughness, squared for skin; metalness not for skin"
+    ),
+    FileProperty("`roughnessFactor`", "noted", "skin has a measured roughness", (), "drawn"),
+    FileProperty("`metallicFactor`", "noted", "", (), "drawn"),
+    FileProperty("`emissiveFactor`, `emissiveTexture`", "noted", "", (), "drawn"),
+    FileProperty(f"`{_STRENGTH}`", "noted", "factor of the emission", (_STRENGTH,), "drawn"),
+    FileProperty(
+        "emission without a base colour", "drawn with a note", "taken for the reflectance, as in scans"
+    ),
+    FileProperty(f"`{_UNLIT}`", "noted", "the colour is taken for the reflectance", (_UNLIT,)),
+    FileProperty(
+        "`alphaMode`, `alphaCutoff`", "noted", "cut out, also in shadows; `BLEND` at 0.5", (), "drawn"
+    ),
+    FileProperty("`occlusionTexture`", "noted", "computed from the shape"),
+    FileProperty("`doubleSided`", "no effect", "back faces are always drawn"),
+    FileProperty("`texCoord`, `KHR_texture_transform`", "drawn", "", ("KHR_texture_transform",)),
+    FileProperty("`wrapS`, `wrapT`", "drawn", "repeated, mirrored or clamped"),
+    FileProperty("`magFilter`", "noted", "always interpolated (no note if it is linear)"),
+    FileProperty("`minFilter`", "no effect", "maps always have mip levels"),
+    FileProperty(
+        "pictures in PNG, JPEG, WebP, AVIF", "drawn", in_code(_SOURCE_EXTENSIONS), _SOURCE_EXTENSIONS
+    ),
+    FileProperty(f"`{_BASISU}` without another picture", "refused", "KTX2"),
+    FileProperty(in_code(_SCATTERING), "drawn with a note", "the material is skin", _SCATTERING),
+    FileProperty(f"`{_GLOSS}`", "drawn with a note", "without the specular colour", (_GLOSS,)),
+    *(FileProperty(f"`{name}`", "noted", text, (name,)) for name, text in _NOT_DRAWN.items()),
+    FileProperty("other extensions of materials", "noted"),
 )
+"""Properties of glTF materials and textures."""
+KNOWN_EXTENSIONS = keys_of(GLTF_MATERIALS)
 """Extensions of materials and textures that are read or named in a note."""
 
 
@@ -176,8 +203,8 @@ class _Reader:
         sources.append(entry.get("source"))
         source = next((one for one in sources if one is not None), None)
         if source is None:
-            if "KHR_texture_basisu" in extensions:
-                actual = "a texture has only a KTX2 picture (KHR_texture_basisu)"
+            if _BASISU in extensions:
+                actual = f"a texture has only a KTX2 picture ({_BASISU})"
                 refuse(
                     self.document.path, "PNG, JPEG, WebP or AVIF", actual, "Export with one of these formats"
                 )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dermis.base.file_properties import FileProperty
 from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
@@ -16,12 +17,28 @@ from dermis.formats.text_files import listed
 
 OLD, NEW = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
-EXTENSIONS = (OLD, NEW, "VRMC_springBone", "VRMC_node_constraint", "VRMC_materials_mtoon")
+_TOON = "VRMC_materials_mtoon"
 _NOT_READ = {
     "springs of hair and cloth": ("secondaryAnimation", "VRMC_springBone"),
     "constraints of bones": ("VRMC_node_constraint",),
     "visibility in first person": ("firstPerson",),
 }
+VRM_PROPERTIES = (
+    FileProperty(
+        f"`{OLD}` (0.x)", "drawn", "the face looks along -Z and is turned, unless `--front` is given", (OLD,)
+    ),
+    FileProperty(f"`{NEW}` (1.0)", "no effect", "the face looks along +Z, as in other files", (NEW,)),
+    FileProperty(
+        "expressions, presets and own ones",
+        "drawn",
+        "morph targets beside those of the file (`happy`, `aa`, `blink`, in VRM 0 `joy`, `a`); "
+        "a target of the file keeps its name",
+    ),
+    FileProperty("changes of materials by expressions", "noted"),
+    FileProperty(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "noted", "the base colour is drawn", (_TOON,)),
+    *(FileProperty(text, "noted", "", keys) for text, keys in _NOT_READ.items()),
+)
+"""Properties of VRM files beside those of glTF."""
 _MATERIAL_BINDS = ("materialValues", "materialColorBinds", "textureTransformBinds")
 _UNNAMED = ("", "unknown")
 _PERCENT = 0.01

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.base.file_properties import FileProperty, in_code
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdShade
@@ -36,6 +37,27 @@ _WITHOUT_EFFECT = {
     "occlusion": ("picture of occlusion, which is computed from the shape", 1.0),
     "specularColor": ("specular colour", (0.0, 0.0, 0.0)),
 }
+USD_MATERIALS = (
+    FileProperty("`diffuseColor`, `normal`", "drawn", "values and pictures"),
+    FileProperty("picture of the `roughness`", "drawn", "squared for skin"),
+    FileProperty("value of the `roughness`", "noted", "skin has a measured roughness", (), "drawn"),
+    FileProperty("`metallic`, `emissiveColor`", "noted", "values and pictures", (), "drawn"),
+    FileProperty(
+        "`opacity`, `opacityThreshold`", "noted", "values, or the alpha of the colour's picture", (), "drawn"
+    ),
+    FileProperty("another picture of the `opacity`", "noted"),
+    FileProperty("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`", "drawn"),
+    FileProperty(
+        "`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "noted", "normals use their `bias`"
+    ),
+    FileProperty(in_code(_WITHOUT_EFFECT), "noted", "no note for values that change nothing"),
+    FileProperty(
+        "emission without a `diffuseColor`", "drawn with a note", "taken for the reflectance, as in scans"
+    ),
+    FileProperty("shaders other than `UsdPreviewSurface`", "noted", "drawn in the colour of the mesh"),
+    FileProperty("a picture that is missing", "noted"),
+)
+"""Inputs of UsdPreviewSurface and of its textures."""
 _WRAPS = {"repeat": "repeat", "mirror": "mirror"}
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 _BLACK = (0.0, 0.0, 0.0)

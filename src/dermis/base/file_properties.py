@@ -1,0 +1,47 @@
+"""Properties of other programs' files and their treatment, as readers declare them for docs/formats.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect"]
+
+
+@dataclass(frozen=True)
+class FileProperty:
+    """Property of a file and its treatment.
+
+    name : property as the documentation shows it, in Markdown
+    treatment : "drawn" if it changes the scene; "noted" if it does not and a note says so; "no effect" if it
+        does not and needs no note
+    detail : how it is drawn, or why it is not, in Markdown
+    keys : words by which the reader recognises it, such as statements or extensions
+    other_parts : treatment in materials of parts that are not skin, if it differs from that of skin
+    """
+
+    name: str
+    treatment: Treatment
+    detail: str = ""
+    keys: tuple[str, ...] = ()
+    other_parts: Treatment | None = None
+
+    def cells(self, is_material: bool) -> list[str]:
+        """Return the cells of its row in the documentation.
+
+        is_material : whether there are two columns of treatments, that of skin and that of other parts
+        """
+        others = [self.other_parts or self.treatment] if is_material else []
+        return [self.name, self.treatment, *others, self.detail]
+
+
+def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
+    """Return the keys of properties with one of some treatments; of all properties without any given."""
+    chosen = (one for one in properties if not treatments or one.treatment in treatments)
+    return tuple(dict.fromkeys(key for one in chosen for key in one.keys))
+
+
+def in_code(keys: Iterable[str]) -> str:
+    """Return words as code in Markdown, separated by commas."""
+    return ", ".join(f"`{key}`" for key in keys)
