@@ -14,7 +14,7 @@ from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
-from dermis.formats.obj_materials import MtlTexture, read_library, with_materials
+from dermis.formats.obj_materials import MtlTexture, picture_name, read_library, with_materials
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
@@ -88,7 +88,7 @@ def obj_maps(
     remaining = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in textures):
         texture = textures[role]
-        file = find_referenced_file(path, texture.name)
+        file = find_referenced_file(path, picture_name(texture))
         if file is None:
             continue
         try:

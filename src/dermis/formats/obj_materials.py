@@ -29,9 +29,9 @@ TEXTURE_ROLES = {
     "bump": "bump",
 }
 """Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
-_NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
+NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
 MTL_PROPERTIES = (
-    FileProperty("`newmtl`", "drawn with a note", "name, which decides what is skin", ("newmtl",)),
+    FileProperty("`newmtl`", "drawn", "begins a material", ("newmtl",)),
     FileProperty("`Kd`", "drawn", "linear colour; 0.8 of grey counts as none", ("Kd",)),
     FileProperty("`Kd` beside `map_Kd`", "noted", "no note for the greys that programs write there"),
     FileProperty("`map_Kd`", "drawn", "colour", ("map_Kd",)),
@@ -127,7 +127,7 @@ class MtlTexture:
 class MtlMaterial:
     """Material of an .mtl file.
 
-    numbers : values of the statements in `_NUMBERS`
+    numbers : values of the statements in `NUMBERS`
     textures : pictures by role, see `TEXTURE_ROLES`
     unread : other statements
     """
@@ -190,11 +190,16 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key in TEXTURE_ROLES and value.strip():
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
-        elif key in _NUMBERS and len(numbers := _numbers(value)) >= _NUMBERS[key]:
+        elif key in NUMBERS and len(numbers := _numbers(value)) >= NUMBERS[key]:
             current.numbers[key] = numbers
         elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
     return materials
+
+
+def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
+    """Return the name of the picture of a texture, that of one tile if it is a sequence of UDIM tiles."""
+    return _UDIM.sub(str(udim), texture.name)
 
 
 def _numbers(value: str) -> list[float]:
@@ -285,7 +290,7 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
     skin_only = list[str]()
     row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
     for role, texture in own.textures.items():
-        written = _UDIM.sub(str(udim), texture.name)
+        written = picture_name(texture, udim)
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
