@@ -58,7 +58,7 @@ OBJ_PROPERTIES = (
         "polygons, divided into fans; indices count from 1, or backwards from the last vertex",
         ("f",),
     ),
-    FileProperty("`f` without `vt` beside others with it", "drawn with a note", "skin without uv"),
+    FileProperty("`f` without `vt` beside others with it", "drawn with a note", "as skin without uv"),
     FileProperty("`f` of one or two corners", "noted"),
     FileProperty("`f` with an index of 0 or beyond the file", "refused", "the error names the line"),
     FileProperty(
@@ -68,9 +68,9 @@ OBJ_PROPERTIES = (
     FileProperty("`mtllib`", "drawn", "[materials](#materials-and-parts)", ("mtllib",)),
     FileProperty("`mtllib` of a missing file", "noted"),
     FileProperty(
-        "`s` in a file without normals", "noted", "smooth everywhere (no note if all faces are in one group)"
+        "`s` in a file without normals", "noted", "the surface is smooth everywhere (no note for one group)"
     ),
-    FileProperty("`s` in a file with normals", "no effect", "normals state the same"),
+    FileProperty("`s` in a file with normals", "no effect", "the normals decide"),
     FileProperty("`mg`", "no effect", "for curves only", ("mg",)),
     *(FileProperty(f"{kind}: {in_code(keys)}", "noted", "", keys) for kind, keys in _LEFT_OUT.items()),
     FileProperty("other statements", "noted"),

@@ -32,7 +32,7 @@ TEXTURE_ROLES = {
 NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
 MTL_PROPERTIES = (
     FileProperty("`newmtl`", "drawn", "begins a material", ("newmtl",)),
-    FileProperty("`Kd`", "drawn", "linear colour; 0.8 of grey counts as none", ("Kd",)),
+    FileProperty("`Kd`", "drawn", "linear colour; a grey of 0.8 counts as none", ("Kd",)),
     FileProperty("`Kd` beside `map_Kd`", "noted", "no note for the greys that programs write there"),
     FileProperty("`map_Kd`", "drawn", "colour", ("map_Kd",)),
     FileProperty("UDIM tiles: `face.<UDIM>.png`", "drawn", "a picture for each tile"),
@@ -56,7 +56,7 @@ MTL_PROPERTIES = (
     ),
     FileProperty("options `-texres`, `-type`", "no effect", "pictures keep their size; for reflections only"),
     FileProperty("a picture that is missing", "noted"),
-    FileProperty("`Ka`, `map_Ka`", "no effect", "ambient light, as part of the lights", ("Ka", "map_Ka")),
+    FileProperty("`Ka`, `map_Ka`", "no effect", "ambient light follows from the lights", ("Ka", "map_Ka")),
     FileProperty(
         "`illum`, `sharpness`, `map_aat`",
         "no effect",

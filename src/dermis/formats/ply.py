@@ -74,7 +74,7 @@ PLY_PROPERTIES = (
     FileProperty(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "drawn", "polygons"),
     FileProperty("faces of one or two corners", "noted"),
     FileProperty("face: `texcoord`", "drawn", "uv of the corners of a face"),
-    FileProperty("face: an empty `texcoord`", "drawn with a note", "skin without uv"),
+    FileProperty("face: an empty `texcoord`", "drawn with a note", "as skin without uv"),
     FileProperty("face: `texnumber`", "drawn with a note", "the picture of most faces is used for all"),
     FileProperty("tristrips: `vertex_indices`", "drawn", "strips of triangles, with -1 between them"),
     FileProperty("`comment TextureFile NAME`", "drawn", "colour picture in the folder of the file"),

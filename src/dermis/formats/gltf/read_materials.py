@@ -53,7 +53,11 @@ GLTF_MATERIALS = (
     FileProperty("`baseColorFactor`, `baseColorTexture`", "drawn"),
     FileProperty("`normalTexture` with `scale`", "drawn"),
     FileProperty(
-        "`metallicRoughnessTexture`", "drawn", "roughness, squared for skin; metalness not for skin"
+        "`metallicRoughnessTexture`",
+        "drawn with a note",
+        "roughness, squared for skin, which has no metalness (note)",
+        (),
+        "drawn",
     ),
     FileProperty("`roughnessFactor`", "noted", "skin has a measured roughness", (), "drawn"),
     FileProperty("`metallicFactor`", "noted", "", (), "drawn"),

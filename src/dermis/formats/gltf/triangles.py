@@ -75,7 +75,9 @@ GLTF_PROPERTIES = (
     FileProperty("several scenes", "noted", "the default scene is read"),
     FileProperty("buffers without data", "refused", "such as the fallback of a compressed one"),
     FileProperty(
-        "names of materials and meshes", "drawn with a note", "they decide what is skin; the note lists it"
+        "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
+        "drawn with a note",
+        "they decide [what is skin](#materials-and-parts)",
     ),
     FileProperty("`asset`, `extras`, other names", "no effect", "for programs and people"),
 )

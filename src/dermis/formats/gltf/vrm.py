@@ -35,7 +35,9 @@ VRM_PROPERTIES = (
         "a target of the file keeps its name",
     ),
     FileProperty("changes of materials by expressions", "noted"),
-    FileProperty(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "noted", "the base colour is drawn", (_TOON,)),
+    FileProperty(
+        f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "noted", "only the base colour is drawn", (_TOON,)
+    ),
     *(FileProperty(text, "noted", "", keys) for text, keys in _NOT_READ.items()),
 )
 """Properties of VRM files beside those of glTF."""

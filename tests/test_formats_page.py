@@ -1,0 +1,30 @@
+"""The page about files has the tables that the readers declare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dermis.formats.mesh_formats import MESH_FORMATS, find_format, mesh_suffixes
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_page_is_that_of_its_template_and_the_readers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Updated by python tools/formats_page.py."""
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    from formats_page import PAGE, page_text
+
+    assert PAGE.read_text(encoding="utf-8") == page_text()
+
+
+def test_formats_are_found_by_their_suffix() -> None:
+    assert find_format("HEAD.USDZ") is MESH_FORMATS["usd"] and find_format("head.fbx") is None
+    assert len(set(mesh_suffixes())) == len(mesh_suffixes()) == 10
+
+
+@pytest.mark.parametrize("name", MESH_FORMATS)
+def test_each_property_has_a_name_of_its_own(name: str) -> None:
+    for rows in (MESH_FORMATS[name].properties, MESH_FORMATS[name].materials):
+        assert len({row.name for row in rows}) == len(rows)
