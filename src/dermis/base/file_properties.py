@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect"]
@@ -13,16 +14,16 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 class FileProperty:
     """Property of a file and its treatment.
 
-    name : property as the documentation shows it, in Markdown
     treatment : "drawn" if it changes the scene; "noted" if it does not and a note says so; "no effect" if it
         does not and needs no note
+    name : property as the documentation shows it, in Markdown
     detail : how it is drawn, or why it is not, in Markdown
     keys : words by which the reader recognises it, such as statements or extensions
     other_parts : treatment in materials of parts that are not skin, if it differs from that of skin
     """
 
-    name: str
     treatment: Treatment
+    name: str
     detail: str = ""
     keys: tuple[str, ...] = ()
     other_parts: Treatment | None = None
@@ -34,6 +35,20 @@ class FileProperty:
         """
         others = [self.other_parts or self.treatment] if is_material else []
         return [self.name, self.treatment, *others, self.detail]
+
+
+def _property(
+    treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
+) -> FileProperty:
+    """Return a property; `drawn`, `noted` and others are this function with their treatment."""
+    return FileProperty(treatment, name, detail, keys, other_parts)
+
+
+drawn = partial(_property, "drawn")
+drawn_with_note = partial(_property, "drawn with a note")
+noted = partial(_property, "noted")
+refused = partial(_property, "refused")
+no_effect = partial(_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:

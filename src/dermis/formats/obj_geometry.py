@@ -15,7 +15,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Mask
 from dermis.base.errors import refuse
-from dermis.base.file_properties import FileProperty, in_code, keys_of
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
     Polygons,
@@ -40,40 +40,33 @@ _POLYPAINT = "#MRGB"
 _CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
 _LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
 OBJ_PROPERTIES = (
-    FileProperty("`v x y z`", "drawn", "position", ("v",)),
-    FileProperty("`v x y z w`", "drawn with a note", "position divided by w (no note if w is 1)"),
-    FileProperty("`v x y z r g b`", "drawn", "sRGB colour from 0 to 1; vertices without one are white"),
-    FileProperty("`v x y z r g b` above 1", "drawn with a note", "sRGB colour from 0 to 255"),
-    FileProperty("further numbers in `v`", "noted"),
-    FileProperty(
-        f"`{_POLYPAINT}` (polypaint of ZBrush)", "drawn", "sRGB colours of the vertices", (_POLYPAINT,)
-    ),
-    FileProperty(f"`{_POLYPAINT}` beside colours in `v`, or of other vertices", "noted"),
-    FileProperty("`vt u v`", "drawn", "uv", ("vt",)),
-    FileProperty("`vt u v w`", "noted", "u and v are drawn, w is left out (no note if it is 0)"),
-    FileProperty("`vn`", "drawn", "normals; missing ones are computed", ("vn",)),
-    FileProperty(
+    drawn("`v x y z`", "position", "v"),
+    drawn_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
+    drawn("`v x y z r g b`", "sRGB colour from 0 to 1; vertices without one are white"),
+    drawn_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
+    noted("further numbers in `v`"),
+    drawn(f"`{_POLYPAINT}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT),
+    noted(f"`{_POLYPAINT}` beside colours in `v`, or of other vertices"),
+    drawn("`vt u v`", "uv", "vt"),
+    noted("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
+    drawn("`vn`", "normals; missing ones are computed", "vn"),
+    drawn(
         "`f` with `v`, `v/vt`, `v//vn`, `v/vt/vn`",
-        "drawn",
         "polygons, divided into fans; indices count from 1, or backwards from the last vertex",
-        ("f",),
+        "f",
     ),
-    FileProperty("`f` without `vt` beside others with it", "drawn with a note", "as skin without uv"),
-    FileProperty("`f` of one or two corners", "noted"),
-    FileProperty("`f` with an index of 0 or beyond the file", "refused", "the error names the line"),
-    FileProperty(
-        "`usemtl`, `g`", "drawn with a note", "groups; the note lists those of skin", ("usemtl", "g")
-    ),
-    FileProperty("`o`", "drawn", "groups where neither `usemtl` nor `g` has a name", ("o",)),
-    FileProperty("`mtllib`", "drawn", "[materials](#materials-and-parts)", ("mtllib",)),
-    FileProperty("`mtllib` of a missing file", "noted"),
-    FileProperty(
-        "`s` in a file without normals", "noted", "the surface is smooth everywhere (no note for one group)"
-    ),
-    FileProperty("`s` in a file with normals", "no effect", "the normals decide"),
-    FileProperty("`mg`", "no effect", "for curves only", ("mg",)),
-    *(FileProperty(f"{kind}: {in_code(keys)}", "noted", "", keys) for kind, keys in _LEFT_OUT.items()),
-    FileProperty("other statements", "noted"),
+    drawn_with_note("`f` without `vt` beside others with it", "as skin without uv"),
+    noted("`f` of one or two corners"),
+    refused("`f` with an index of 0 or beyond the file", "the error names the line"),
+    drawn_with_note("`usemtl`, `g`", "groups; the note lists those of skin", "usemtl", "g"),
+    drawn("`o`", "groups where neither `usemtl` nor `g` has a name", "o"),
+    drawn("`mtllib`", "[materials](#materials-and-parts)", "mtllib"),
+    noted("`mtllib` of a missing file"),
+    noted("`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"),
+    no_effect("`s` in a file with normals", "the normals decide"),
+    no_effect("`mg`", "for curves only", "mg"),
+    *(noted(f"{kind}: {in_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT.items()),
+    noted("other statements"),
 )
 """Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
 _USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}

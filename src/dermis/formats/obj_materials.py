@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.base.file_properties import FileProperty, keys_of
+from dermis.base.file_properties import drawn, keys_of, no_effect, noted
 from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import IDENTITY, FileMaterial, Role, Texture, UvTransform, Wrap
@@ -31,39 +31,39 @@ TEXTURE_ROLES = {
 """Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
 NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
 MTL_PROPERTIES = (
-    FileProperty("`newmtl`", "drawn", "begins a material", ("newmtl",)),
-    FileProperty("`Kd`", "drawn", "linear colour; a grey of 0.8 counts as none", ("Kd",)),
-    FileProperty("`Kd` beside `map_Kd`", "noted", "no note for the greys that programs write there"),
-    FileProperty("`map_Kd`", "drawn", "colour", ("map_Kd",)),
-    FileProperty("UDIM tiles: `face.<UDIM>.png`", "drawn", "a picture for each tile"),
-    FileProperty("`Ke`, `map_Ke`", "noted", "emission", ("Ke", "map_Ke"), "drawn"),
-    FileProperty("`d`, `Tr`, `map_d`", "noted", "opacity, cut at one half", ("d", "Tr", "map_d"), "drawn"),
-    FileProperty("`Pr`, `Ns`", "noted", "roughness; skin has a measured one", ("Pr", "Ns"), "drawn"),
-    FileProperty("`map_Pr`", "drawn", "roughness, squared for skin", ("map_Pr",)),
-    FileProperty("`Pm`, `map_Pm`", "noted", "metalness", ("Pm", "map_Pm"), "drawn"),
-    FileProperty("`map_Ks`", "drawn", "specular strength, of a single skin material", ("map_Ks",), "noted"),
-    FileProperty("`norm`", "drawn", "normal map", ("norm",)),
-    FileProperty(
-        "`bump`, `map_Bump` with normals", "drawn", "of a single skin material", ("bump", "map_Bump"), "noted"
+    drawn("`newmtl`", "begins a material", "newmtl"),
+    drawn("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
+    noted("`Kd` beside `map_Kd`", "no note for the greys that programs write there"),
+    drawn("`map_Kd`", "colour", "map_Kd"),
+    drawn("UDIM tiles: `face.<UDIM>.png`", "a picture for each tile"),
+    noted("`Ke`, `map_Ke`", "emission", "Ke", "map_Ke", other_parts="drawn"),
+    noted("`d`, `Tr`, `map_d`", "opacity, cut at one half", "d", "Tr", "map_d", other_parts="drawn"),
+    noted("`Pr`, `Ns`", "roughness; skin has a measured one", "Pr", "Ns", other_parts="drawn"),
+    drawn("`map_Pr`", "roughness, squared for skin", "map_Pr"),
+    noted("`Pm`, `map_Pm`", "metalness", "Pm", "map_Pm", other_parts="drawn"),
+    drawn("`map_Ks`", "specular strength, of a single skin material", "map_Ks", other_parts="noted"),
+    drawn("`norm`", "normal map", "norm"),
+    drawn(
+        "`bump`, `map_Bump` with normals",
+        "of a single skin material",
+        "bump",
+        "map_Bump",
+        other_parts="noted",
     ),
-    FileProperty("`bump`, `map_Bump` with heights", "noted", "drawn for skin with `--height-mm`"),
-    FileProperty("options `-s`, `-o`, `-clamp`", "drawn", "placement of a picture"),
-    FileProperty("option `-bm`", "drawn", "factor of normals and heights"),
-    FileProperty(
+    noted("`bump`, `map_Bump` with heights", "drawn for skin with `--height-mm`"),
+    drawn("options `-s`, `-o`, `-clamp`", "placement of a picture"),
+    drawn("option `-bm`", "factor of normals and heights"),
+    noted(
         "options `-mm`, `-cc`, `-boost`, `-imfchan`, `-blendu`, `-blendv`, `-t`",
-        "noted",
         "no note for values that change nothing, such as `-mm 0 1`",
     ),
-    FileProperty("options `-texres`, `-type`", "no effect", "pictures keep their size; for reflections only"),
-    FileProperty("a picture that is missing", "noted"),
-    FileProperty("`Ka`, `map_Ka`", "no effect", "ambient light follows from the lights", ("Ka", "map_Ka")),
-    FileProperty(
-        "`illum`, `sharpness`, `map_aat`",
-        "no effect",
-        "settings of old renderers",
-        ("illum", "sharpness", "map_aat"),
+    no_effect("options `-texres`, `-type`", "pictures keep their size; for reflections only"),
+    noted("a picture that is missing"),
+    no_effect("`Ka`, `map_Ka`", "ambient light follows from the lights", "Ka", "map_Ka"),
+    no_effect(
+        "`illum`, `sharpness`, `map_aat`", "settings of old renderers", "illum", "sharpness", "map_aat"
     ),
-    FileProperty("other statements, such as `Ks`, `Ni`, `disp`", "noted"),
+    noted("other statements, such as `Ks`, `Ni`, `disp`"),
 )
 """Statements of .mtl files."""
 _WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))

@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Numbers
 from dermis.base.errors import refuse
-from dermis.base.file_properties import FileProperty, in_code, keys_of
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import FileMaterial, Texture
@@ -59,35 +59,31 @@ _SCANNER_VALUES = (
     *("label", "class", "classification", "segment"),
 )
 PLY_PROPERTIES = (
-    FileProperty("vertex: `x`, `y`, `z`", "drawn", "positions"),
-    FileProperty("vertex: `nx`, `ny`, `nz`", "drawn", "normals; missing ones are computed"),
-    FileProperty(f"vertex: {'; '.join(map(in_code, UV_NAMES))}", "drawn", "uv"),
-    FileProperty(
+    drawn("vertex: `x`, `y`, `z`", "positions"),
+    drawn("vertex: `nx`, `ny`, `nz`", "normals; missing ones are computed"),
+    drawn(f"vertex: {'; '.join(map(in_code, UV_NAMES))}", "uv"),
+    drawn(
         f"vertex: {'; '.join(map(in_code, COLOUR_NAMES))}",
-        "drawn",
         "sRGB colours; integers of any size, or floats from 0 to 1",
     ),
-    FileProperty("the same as floats above 1", "drawn with a note", "sRGB colours from 0 to 255"),
-    FileProperty(
-        f"vertex: {' or '.join(map(in_code, _ALPHA_NAMES))}", "noted", "no note if all are the same"
-    ),
-    FileProperty(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "drawn", "polygons"),
-    FileProperty("faces of one or two corners", "noted"),
-    FileProperty("face: `texcoord`", "drawn", "uv of the corners of a face"),
-    FileProperty("face: an empty `texcoord`", "drawn with a note", "as skin without uv"),
-    FileProperty("face: `texnumber`", "drawn with a note", "the picture of most faces is used for all"),
-    FileProperty("tristrips: `vertex_indices`", "drawn", "strips of triangles, with -1 between them"),
-    FileProperty("`comment TextureFile NAME`", "drawn", "colour picture in the folder of the file"),
-    FileProperty("`comment TextureFile NAME` of a missing file", "noted"),
-    FileProperty(
+    drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
+    noted(f"vertex: {' or '.join(map(in_code, _ALPHA_NAMES))}", "no note if all are the same"),
+    drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "polygons"),
+    noted("faces of one or two corners"),
+    drawn("face: `texcoord`", "uv of the corners of a face"),
+    drawn_with_note("face: an empty `texcoord`", "as skin without uv"),
+    drawn_with_note("face: `texnumber`", "the picture of most faces is used for all"),
+    drawn("tristrips: `vertex_indices`", "strips of triangles, with -1 between them"),
+    drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
+    noted("`comment TextureFile NAME` of a missing file"),
+    no_effect(
         f"values of scanners: {in_code(_SCANNER_VALUES)}, `{_SCALAR_PREFIX}...`",
-        "no effect",
         "they do not describe the look of a surface",
-        _SCANNER_VALUES,
+        *_SCANNER_VALUES,
     ),
-    FileProperty("other comments", "no effect"),
-    FileProperty("other elements and properties", "noted"),
-    FileProperty("a file without faces", "refused", "a cloud of points"),
+    no_effect("other comments"),
+    noted("other elements and properties"),
+    refused("a file without faces", "a cloud of points"),
 )
 """Elements and properties of PLY files."""
 _WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")

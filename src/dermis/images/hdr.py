@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Doubles, Floats, Index
 from dermis.base.errors import shorten
-from dermis.base.file_properties import FileProperty, in_code
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, no_effect, noted, refused
 from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_space
 from dermis.images.exr_layers import ExrLayer, choose_layer
 from dermis.images.header import PictureHeader, UnsupportedError
@@ -40,42 +40,34 @@ _RADIANCE_VALUES = {
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
 _UNUSED_VALUES = ("GAMMA", "PIXASPECT")
 EXR_PROPERTIES = (
-    FileProperty("half, float, 32-bit integers; all kinds of compression; scan lines, tiles", "drawn"),
-    FileProperty("deep pixels", "refused"),
-    FileProperty("layer or part with R, G and B, in any case or in words, and perhaps A; or with Y", "drawn"),
-    FileProperty(
+    drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
+    refused("deep pixels"),
+    drawn("layer or part with R, G and B, in any case or in words, and perhaps A; or with Y"),
+    noted(
         "several layers, such as `ViewLayer.Combined.R`, or parts",
-        "noted",
         "the one without a name is read, else one called beauty, combined, rgba and the like, else the first",
     ),
-    FileProperty("a single channel of any name", "drawn", "as grey"),
-    FileProperty(
-        "luminance with chroma (Y, RY, BY), subsampled channels, channels without a layer of colours",
-        "refused",
-    ),
-    FileProperty(
-        "`dataWindow` inside `displayWindow`", "drawn with a note", "placed there, the rest is black"
-    ),
-    FileProperty("`dataWindow` beyond `displayWindow`", "drawn with a note", "cut off"),
-    FileProperty("`chromaticities`, else `colorInteropID`", "drawn with a note", "converted to Rec. 709"),
-    FileProperty("unknown `colorInteropID`", "noted"),
-    FileProperty("`pixelAspectRatio`", "noted", "no note if it is 1"),
-    FileProperty("`envmap`", "no effect", "a cube is refused as a panorama by its shape"),
-    FileProperty("`screenWindow...`, `whiteLuminance`, cameras, dates, comments", "no effect"),
+    drawn("a single channel of any name", "as grey"),
+    refused("luminance with chroma (Y, RY, BY), subsampled channels, channels without a layer of colours"),
+    drawn_with_note("`dataWindow` inside `displayWindow`", "placed there, the rest is black"),
+    drawn_with_note("`dataWindow` beyond `displayWindow`", "cut off"),
+    drawn_with_note("`chromaticities`, else `colorInteropID`", "converted to Rec. 709"),
+    noted("unknown `colorInteropID`"),
+    noted("`pixelAspectRatio`", "no note if it is 1"),
+    no_effect("`envmap`", "a cube is refused as a panorama by its shape"),
+    no_effect("`screenWindow...`, `whiteLuminance`, cameras, dates, comments"),
 )
 """Properties of OpenEXR files."""
 RADIANCE_PROPERTIES = (
-    FileProperty("`FORMAT` 32-bit_rle_rgbe", "drawn"),
-    FileProperty("`FORMAT` 32-bit_rle_xyze", "drawn with a note", "converted to Rec. 709"),
-    FileProperty("other `FORMAT`", "refused"),
-    FileProperty("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "drawn", "upright"),
-    FileProperty("`EXPOSURE`, `COLORCORR`, also several", "drawn", "pixels are divided by them"),
-    FileProperty(
-        "`PRIMARIES`", "drawn with a note", "converted to Rec. 709; zeros, as Photoshop writes, are not used"
-    ),
-    FileProperty(in_code(_UNUSED_VALUES), "noted", "no note if they are 1"),
-    FileProperty("run-length coding of before 1991", "refused"),
-    FileProperty("`VIEW`, `SOFTWARE`, comments", "no effect"),
+    drawn("`FORMAT` 32-bit_rle_rgbe"),
+    drawn_with_note("`FORMAT` 32-bit_rle_xyze", "converted to Rec. 709"),
+    refused("other `FORMAT`"),
+    drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
+    drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
+    drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes, are not used"),
+    noted(in_code(_UNUSED_VALUES), "no note if they are 1"),
+    refused("run-length coding of before 1991"),
+    no_effect("`VIEW`, `SOFTWARE`, comments"),
 )
 """Properties of Radiance files (.hdr)."""
 _MAX_HEADER = 1 << 16

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dermis.base import atomic_write
 from dermis.base.arrays import Floats, Numbers
 from dermis.base.errors import DermisError, error_text, notify, refuse
-from dermis.base.file_properties import FileProperty
+from dermis.base.file_properties import drawn_with_note, refused
 from dermis.base.reading import read_file
 from dermis.images.codecs import Pixels, decode_with_pillow, encode_png
 from dermis.images.colour import encode_srgb8
@@ -50,14 +50,14 @@ _OTHER_FORMATS = {
     b"\0\0\0\x0cjP  ": "JPEG 2000",
 }
 """Formats that are not read, by their first bytes."""
-OTHER_PICTURES = (FileProperty(", ".join(dict.fromkeys(_OTHER_FORMATS.values())), "refused", "by name"),)
+OTHER_PICTURES = (refused(", ".join(dict.fromkeys(_OTHER_FORMATS.values())), "by name"),)
 """Picture formats that are not read."""
 ODD_PIXELS = (
-    FileProperty("infinite", "drawn with a note", "the largest finite value"),
-    FileProperty("NaN, negative", "drawn with a note", "0"),
-    FileProperty("more than half of the pixels not finite, or none above 0", "refused"),
-    FileProperty("radiance above 10¹² in panoramas", "refused"),
-    FileProperty("odd pixels in maps of heads", "refused"),
+    drawn_with_note("infinite", "the largest finite value"),
+    drawn_with_note("NaN, negative", "0"),
+    refused("more than half of the pixels not finite, or none above 0"),
+    refused("radiance above 10¹² in panoramas"),
+    refused("odd pixels in maps of heads"),
 )
 """Pixels of panoramas and linear photographs that are no radiance; the notes state their number."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.file_properties import FileProperty
+from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
 from dermis.base.native_decoding import run_decoder
 from dermis.base.reading import MALFORMED_DATA_ERRORS
 from dermis.images.colour_spaces import (
@@ -42,46 +42,39 @@ _BRANDS = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
 )
 """Formats by brand of the container that AVIF and HEIC share."""
 PICTURE_PROPERTIES = (
-    FileProperty(
+    drawn(
         ", ".join(dict.fromkeys((*_FORMATS.values(), "WebP", *_BRANDS.values()))),
-        "drawn",
         "AVIF and WebP need a Pillow that has them, as its wheels do; HEIC needs "
         '`pip install "dermis[formats]"`, 16-bit colour `"dermis[video]"`',
     ),
-    FileProperty("8 and 16 bits, palettes", "drawn"),
-    FileProperty("grey, with or without alpha", "drawn with a note", "repeated in all channels of colours"),
-    FileProperty("10 and 12 bits (AVIF, HEIC), CMYK of 16 bits", "drawn with a note", "reduced to 8"),
-    FileProperty("float TIFF", "drawn", "linear; only grey"),
-    FileProperty(
+    drawn("8 and 16 bits, palettes"),
+    drawn_with_note("grey, with or without alpha", "repeated in all channels of colours"),
+    drawn_with_note("10 and 12 bits (AVIF, HEIC), CMYK of 16 bits", "reduced to 8"),
+    drawn("float TIFF", "linear; only grey"),
+    drawn_with_note(
         "ICC profile of curves: Display P3, Adobe RGB, ProPhoto, linear, grey and others",
-        "drawn with a note",
         "colours are converted to linear Rec. 709 at full depth; no note for sRGB",
     ),
-    FileProperty(
+    drawn_with_note(
         "ICC profile of tables, in RGB",
-        "drawn with a note",
         "colours are converted by LittleCMS at 8 bits, relative to white, with compensation of black",
     ),
-    FileProperty("ICC profile that is damaged or for other pixels", "noted"),
-    FileProperty(
-        "CMYK", "drawn with a note", "converted by its profile likewise, or by subtraction of the inks"
-    ),
-    FileProperty("code points (`cICP` of PNG, `nclx` of AVIF and HEIC)", "drawn with a note", "converted"),
-    FileProperty("unknown code points", "noted"),
-    FileProperty("code points of PQ and HLG", "refused", "levels for HDR displays"),
-    FileProperty("`gAMA`, `cHRM`, `sRGB` of PNG", "drawn with a note", "converted; no note for sRGB"),
-    FileProperty("Adobe RGB stated in EXIF", "drawn with a note", "converted"),
-    FileProperty("colour profiles of maps of numbers", "no effect", "numbers are read as stored"),
-    FileProperty("colour profiles of pictures in .glb files", "noted", "not used, as glTF demands"),
-    FileProperty("EXIF orientation of photographs and of HEIC", "drawn with a note", "turned upright"),
-    FileProperty("EXIF orientation of maps", "noted"),
-    FileProperty("alpha of photographs", "drawn with a note", "transparent pixels are not fitted"),
-    FileProperty("alpha of maps", "drawn", "as the material states"),
-    FileProperty(
-        "several pictures in a file: pages, frames, gain maps of phones", "noted", "the first is read"
-    ),
-    FileProperty("raw files of cameras, CIELAB, 32-bit integers", "refused"),
-    FileProperty("resolution, dates, texts and other metadata", "no effect"),
+    noted("ICC profile that is damaged or for other pixels"),
+    drawn_with_note("CMYK", "converted by its profile likewise, or by subtraction of the inks"),
+    drawn_with_note("code points (`cICP` of PNG, `nclx` of AVIF and HEIC)", "converted"),
+    noted("unknown code points"),
+    refused("code points of PQ and HLG", "levels for HDR displays"),
+    drawn_with_note("`gAMA`, `cHRM`, `sRGB` of PNG", "converted; no note for sRGB"),
+    drawn_with_note("Adobe RGB stated in EXIF", "converted"),
+    no_effect("colour profiles of maps of numbers", "numbers are read as stored"),
+    noted("colour profiles of pictures in .glb files", "not used, as glTF demands"),
+    drawn_with_note("EXIF orientation of photographs and of HEIC", "turned upright"),
+    noted("EXIF orientation of maps"),
+    drawn_with_note("alpha of photographs", "transparent pixels are not fitted"),
+    drawn("alpha of maps", "as the material states"),
+    noted("several pictures in a file: pages, frames, gain maps of phones", "the first is read"),
+    refused("raw files of cameras, CIELAB, 32-bit integers"),
+    no_effect("resolution, dates, texts and other metadata"),
 )
 """Properties of picture files that Pillow opens."""
 _MAX_BRAND_BYTES = 64

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dermis.base.errors import refuse
-from dermis.base.file_properties import FileProperty, in_code, keys_of
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
 from dermis.formats.parts import Colour, parse_colour
@@ -50,40 +50,32 @@ _NOT_DRAWN = {
 }
 _BASISU = "KHR_texture_basisu"
 GLTF_MATERIALS = (
-    FileProperty("`baseColorFactor`, `baseColorTexture`", "drawn"),
-    FileProperty("`normalTexture` with `scale`", "drawn"),
-    FileProperty(
+    drawn("`baseColorFactor`, `baseColorTexture`"),
+    drawn("`normalTexture` with `scale`"),
+    drawn_with_note(
         "`metallicRoughnessTexture`",
-        "drawn with a note",
         "roughness, squared for skin, which has no metalness (note)",
-        (),
-        "drawn",
+        other_parts="drawn",
     ),
-    FileProperty("`roughnessFactor`", "noted", "skin has a measured roughness", (), "drawn"),
-    FileProperty("`metallicFactor`", "noted", "", (), "drawn"),
-    FileProperty("`emissiveFactor`, `emissiveTexture`", "noted", "", (), "drawn"),
-    FileProperty(f"`{_STRENGTH}`", "noted", "factor of the emission", (_STRENGTH,), "drawn"),
-    FileProperty(
-        "emission without a base colour", "drawn with a note", "taken for the reflectance, as in scans"
-    ),
-    FileProperty(f"`{_UNLIT}`", "noted", "the colour is taken for the reflectance", (_UNLIT,)),
-    FileProperty(
-        "`alphaMode`, `alphaCutoff`", "noted", "cut out, also in shadows; `BLEND` at 0.5", (), "drawn"
-    ),
-    FileProperty("`occlusionTexture`", "noted", "computed from the shape"),
-    FileProperty("`doubleSided`", "no effect", "back faces are always drawn"),
-    FileProperty("`texCoord`, `KHR_texture_transform`", "drawn", "", ("KHR_texture_transform",)),
-    FileProperty("`wrapS`, `wrapT`", "drawn", "repeated, mirrored or clamped"),
-    FileProperty("`magFilter`", "noted", "always interpolated (no note if it is linear)"),
-    FileProperty("`minFilter`", "no effect", "maps always have mip levels"),
-    FileProperty(
-        "pictures in PNG, JPEG, WebP, AVIF", "drawn", in_code(_SOURCE_EXTENSIONS), _SOURCE_EXTENSIONS
-    ),
-    FileProperty(f"`{_BASISU}` without another picture", "refused", "KTX2"),
-    FileProperty(in_code(_SCATTERING), "drawn with a note", "the material is skin", _SCATTERING),
-    FileProperty(f"`{_GLOSS}`", "drawn with a note", "without the specular colour", (_GLOSS,)),
-    *(FileProperty(f"`{name}`", "noted", text, (name,)) for name, text in _NOT_DRAWN.items()),
-    FileProperty("other extensions of materials", "noted"),
+    noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
+    noted("`metallicFactor`", other_parts="drawn"),
+    noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
+    noted(f"`{_STRENGTH}`", "factor of the emission", _STRENGTH, other_parts="drawn"),
+    drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
+    noted(f"`{_UNLIT}`", "the colour is taken for the reflectance", _UNLIT),
+    noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
+    noted("`occlusionTexture`", "computed from the shape"),
+    no_effect("`doubleSided`", "back faces are always drawn"),
+    drawn("`texCoord`, `KHR_texture_transform`", "", "KHR_texture_transform"),
+    drawn("`wrapS`, `wrapT`", "repeated, mirrored or clamped"),
+    noted("`magFilter`", "always interpolated (no note if it is linear)"),
+    no_effect("`minFilter`", "maps always have mip levels"),
+    drawn("pictures in PNG, JPEG, WebP, AVIF", in_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
+    refused(f"`{_BASISU}` without another picture", "KTX2"),
+    drawn_with_note(in_code(_SCATTERING), "the material is skin", *_SCATTERING),
+    drawn_with_note(f"`{_GLOSS}`", "without the specular colour", _GLOSS),
+    *(noted(f"`{name}`", text, name) for name, text in _NOT_DRAWN.items()),
+    noted("other extensions of materials"),
 )
 """Properties of glTF materials and textures."""
 KNOWN_EXTENSIONS = keys_of(GLTF_MATERIALS)

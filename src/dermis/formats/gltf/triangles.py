@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.base.file_properties import FileProperty, in_code, keys_of
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
@@ -42,44 +42,37 @@ _MAX_COUNTS = {
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _QUANTISED = "KHR_mesh_quantization"
 GLTF_PROPERTIES = (
-    FileProperty("triangles, strips, fans", "drawn"),
-    FileProperty("points and lines", "noted"),
-    FileProperty(
-        "`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "drawn", "missing normals are computed"
-    ),
-    FileProperty("`COLOR_0`", "drawn", "linear; multiplies the base colour"),
-    FileProperty("alpha of `COLOR_0`", "noted", "no note if it is 1"),
-    FileProperty(f"sparse accessors, normalised integers, `{_QUANTISED}`", "drawn", "", (_QUANTISED,)),
-    FileProperty(
+    drawn("triangles, strips, fans"),
+    noted("points and lines"),
+    drawn("`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "missing normals are computed"),
+    drawn("`COLOR_0`", "linear; multiplies the base colour"),
+    noted("alpha of `COLOR_0`", "no note if it is 1"),
+    drawn(f"sparse accessors, normalised integers, `{_QUANTISED}`", "", _QUANTISED),
+    drawn(
         f"`{draco.EXTENSION}`",
-        "drawn",
         'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
         "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
         "accessors state",
-        (draco.EXTENSION,),
+        draco.EXTENSION,
     ),
-    FileProperty(
+    refused(
         f"{in_code(_MESHOPT)}, if required",
-        "refused",
         "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
         "`gltf-transform copy`",
     ),
-    FileProperty("other extensions, if required", "refused", "the error names them"),
-    FileProperty("other extensions, if used only", "noted"),
-    FileProperty("transforms of nodes", "drawn"),
-    FileProperty(
-        "morph targets, default weights, skins", "drawn", "they move the head, see [motion](motion.md)"
-    ),
-    FileProperty("animations", "drawn", "by `--motion`, see [motion](motion.md)"),
-    FileProperty(f"`{LIGHTS}`, cameras", "noted", "`--lights` and `--camera` set others", (LIGHTS,)),
-    FileProperty("several scenes", "noted", "the default scene is read"),
-    FileProperty("buffers without data", "refused", "such as the fallback of a compressed one"),
-    FileProperty(
+    refused("other extensions, if required", "the error names them"),
+    noted("other extensions, if used only"),
+    drawn("transforms of nodes"),
+    drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
+    drawn("animations", "by `--motion`, see [motion](motion.md)"),
+    noted(f"`{LIGHTS}`, cameras", "`--lights` and `--camera` set others", LIGHTS),
+    noted("several scenes", "the default scene is read"),
+    refused("buffers without data", "such as the fallback of a compressed one"),
+    drawn_with_note(
         "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
-        "drawn with a note",
         "they decide [what is skin](#materials-and-parts)",
     ),
-    FileProperty("`asset`, `extras`, other names", "no effect", "for programs and people"),
+    no_effect("`asset`, `extras`, other names", "for programs and people"),
 )
 """Properties of glTF files besides their materials."""
 _READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}

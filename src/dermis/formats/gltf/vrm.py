@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base.file_properties import FileProperty
+from dermis.base.file_properties import drawn, no_effect, noted
 from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
@@ -24,21 +24,16 @@ _NOT_READ = {
     "visibility in first person": ("firstPerson",),
 }
 VRM_PROPERTIES = (
-    FileProperty(
-        f"`{OLD}` (0.x)", "drawn", "the face looks along -Z and is turned, unless `--front` is given", (OLD,)
-    ),
-    FileProperty(f"`{NEW}` (1.0)", "no effect", "the face looks along +Z, as in other files", (NEW,)),
-    FileProperty(
+    drawn(f"`{OLD}` (0.x)", "the face looks along -Z and is turned, unless `--front` is given", OLD),
+    no_effect(f"`{NEW}` (1.0)", "the face looks along +Z, as in other files", NEW),
+    drawn(
         "expressions, presets and own ones",
-        "drawn",
         "morph targets beside those of the file (`happy`, `aa`, `blink`, in VRM 0 `joy`, `a`); "
         "a target of the file keeps its name",
     ),
-    FileProperty("changes of materials by expressions", "noted"),
-    FileProperty(
-        f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "noted", "only the base colour is drawn", (_TOON,)
-    ),
-    *(FileProperty(text, "noted", "", keys) for text, keys in _NOT_READ.items()),
+    noted("changes of materials by expressions"),
+    noted(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON),
+    *(noted(text, "", *keys) for text, keys in _NOT_READ.items()),
 )
 """Properties of VRM files beside those of glTF."""
 _MATERIAL_BINDS = ("materialValues", "materialColorBinds", "textureTransformBinds")

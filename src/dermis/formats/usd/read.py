@@ -13,7 +13,7 @@ import numpy as np
 from dermis.base.arrays import Index, Mask
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
-from dermis.base.file_properties import FileProperty
+from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
 from dermis.base.native_decoding import as_text, from_text, run_decoder
 from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
@@ -31,41 +31,30 @@ _DECODER = "dermis.formats.usd.decoder"
 _PACKAGE = ".usdz"
 Tree = dict[str, Any]
 USD_PROPERTIES = (
-    FileProperty("`metersPerUnit`", "drawn", "unless `--unit-mm` is given"),
-    FileProperty("a file without `metersPerUnit`", "drawn with a note", "its unit is USD's default, 10 mm"),
-    FileProperty("`upAxis`", "drawn", "unless an `--up` other than `y` is given"),
-    FileProperty("meshes, with transforms, instances, `orientation`, holes", "drawn"),
-    FileProperty(
-        "meshes that are invisible or of purpose `guide` or `proxy`", "no effect", "hidden in all programs"
-    ),
-    FileProperty("time samples", "drawn", "the state at the first time"),
-    FileProperty(
-        "`subdivisionScheme`", "drawn", "normals are used if it is `none`; `--subdivide` subdivides"
-    ),
-    FileProperty(
+    drawn("`metersPerUnit`", "unless `--unit-mm` is given"),
+    drawn_with_note("a file without `metersPerUnit`", "its unit is USD's default, 10 mm"),
+    drawn("`upAxis`", "unless an `--up` other than `y` is given"),
+    drawn("meshes, with transforms, instances, `orientation`, holes"),
+    no_effect("meshes that are invisible or of purpose `guide` or `proxy`", "hidden in all programs"),
+    drawn("time samples", "the state at the first time"),
+    drawn("`subdivisionScheme`", "normals are used if it is `none`; `--subdivide` subdivides"),
+    drawn(
         "primvars of each interpolation, with indices",
-        "drawn",
         "uv (`st`, `UVMap` or the name in the material), normals, colours",
     ),
-    FileProperty("several sets of uv in one mesh", "drawn with a note", "that of the first material is used"),
-    FileProperty(
+    drawn_with_note("several sets of uv in one mesh", "that of the first material is used"),
+    drawn(
         "`displayColor` of a mesh without material, or read by its material",
-        "drawn",
         "linear colours of vertices; those of faces are averaged at vertices",
     ),
-    FileProperty("materials of meshes and of subsets of faces", "drawn"),
-    FileProperty(
+    drawn("materials of meshes and of subsets of faces"),
+    drawn(
         "pictures",
-        "drawn",
         "in the package, or in the folder of the file and below; of other paths only the last part is used",
     ),
-    FileProperty(
-        "sublayers, references, payloads",
-        "drawn",
-        "from the folder of the file and below, or from the package",
-    ),
-    FileProperty("layers elsewhere, value clips", "refused", "before any of them is opened"),
-    FileProperty("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims", "noted"),
+    drawn("sublayers, references, payloads", "from the folder of the file and below, or from the package"),
+    refused("layers elsewhere, value clips", "before any of them is opened"),
+    noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
 )
 """Properties of USD files besides their materials."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.file_properties import FileProperty, in_code
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, noted
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdShade
@@ -38,24 +38,20 @@ _WITHOUT_EFFECT = {
     "specularColor": ("specular colour", (0.0, 0.0, 0.0)),
 }
 USD_MATERIALS = (
-    FileProperty("`diffuseColor`, `normal`", "drawn", "values and pictures"),
-    FileProperty("picture of the `roughness`", "drawn", "squared for skin"),
-    FileProperty("value of the `roughness`", "noted", "skin has a measured roughness", (), "drawn"),
-    FileProperty("`metallic`, `emissiveColor`", "noted", "values and pictures", (), "drawn"),
-    FileProperty(
-        "`opacity`, `opacityThreshold`", "noted", "values, or the alpha of the colour's picture", (), "drawn"
+    drawn("`diffuseColor`, `normal`", "values and pictures"),
+    drawn("picture of the `roughness`", "squared for skin"),
+    noted("value of the `roughness`", "skin has a measured roughness", other_parts="drawn"),
+    noted("`metallic`, `emissiveColor`", "values and pictures", other_parts="drawn"),
+    noted(
+        "`opacity`, `opacityThreshold`", "values, or the alpha of the colour's picture", other_parts="drawn"
     ),
-    FileProperty("another picture of the `opacity`", "noted"),
-    FileProperty("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`", "drawn"),
-    FileProperty(
-        "`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "noted", "normals use their `bias`"
-    ),
-    FileProperty(in_code(_WITHOUT_EFFECT), "noted", "no note for values that change nothing"),
-    FileProperty(
-        "emission without a `diffuseColor`", "drawn with a note", "taken for the reflectance, as in scans"
-    ),
-    FileProperty("shaders other than `UsdPreviewSurface`", "noted", "drawn in the colour of the mesh"),
-    FileProperty("a picture that is missing", "noted"),
+    noted("another picture of the `opacity`"),
+    drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
+    noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
+    noted(in_code(_WITHOUT_EFFECT), "no note for values that change nothing"),
+    drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
+    noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
+    noted("a picture that is missing"),
 )
 """Inputs of UsdPreviewSurface and of its textures."""
 _WRAPS = {"repeat": "repeat", "mirror": "mirror"}
