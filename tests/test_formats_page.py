@@ -5,8 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from small_head import obj_text
 
-from dermis.formats.mesh_formats import MESH_FORMATS, find_format, mesh_suffixes
+from dermis.base.errors import DermisError
+from dermis.formats.load import load_rigged
+from dermis.formats.mesh_formats import MESH_FORMATS, MeshFormat, find_format, mesh_suffixes
+from dermis.formats.obj import read_obj
 
 ROOT = Path(__file__).parents[1]
 
@@ -22,6 +26,15 @@ def test_the_page_is_that_of_its_template_and_the_readers(monkeypatch: pytest.Mo
 def test_formats_are_found_by_their_suffix() -> None:
     assert find_format("HEAD.USDZ") is MESH_FORMATS["usd"] and find_format("head.fbx") is None
     assert len(set(mesh_suffixes())) == len(mesh_suffixes()) == 10
+
+
+def test_a_format_of_another_package_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.egg"
+    path.write_text(obj_text())
+    with MESH_FORMATS.including("egg", MeshFormat((".egg",), read_obj, ())):
+        assert len(load_rigged(path).mesh.triangles) > 0
+    with pytest.raises(DermisError, match=r"the suffix is '\.egg'"):
+        load_rigged(path)
 
 
 @pytest.mark.parametrize("name", MESH_FORMATS)

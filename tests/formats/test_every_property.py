@@ -197,8 +197,8 @@ CHANGES = [
     Changed("sparse accessors", quantised),
     Changed("sparse accessors", sparse_targets),
     *(Changed("`EXT_meshopt_compression`", required(f"{one}_meshopt_compression")) for one in ("EXT", "KHR")),
-    Changed("other extensions, if required", required("ACME_shape")),
-    Changed("other extensions, if used only", used("ACME_shape")),
+    Changed("other extensions that are required", required("ACME_shape")),
+    Changed("other extensions that are used but not required", used("ACME_shape")),
     Changed("transforms of nodes", in_node(1, translation=[0.0, 0.1, 0.0])),
     Changed("transforms of nodes", in_node(1, rotation=[0.0, 0.0, 0.6, 0.8])),
     Changed("transforms of nodes", in_node(1, scale=[1.1, 1.0, 1.0])),
@@ -211,6 +211,7 @@ CHANGES = [
     Changed("several scenes", lambda egg: egg.file.more_scenes.append({"nodes": [1]})),
     Changed("buffers without data", without_data),
     Changed("names of materials", in_material("skin", {"name": "shirt skin"})),
+    Changed("names of materials", lambda egg: egg.primitive(1).pop("material")),
     Changed("`asset`", lambda egg: egg.tree["asset"].update(generator="a program", copyright="somebody")),
     Changed("`asset`", in_node(0, extras={"a": 1}, name="a node")),
     Changed("`VRM`", used("VRM")),
@@ -255,6 +256,7 @@ def material_changes(which: str) -> list[Changed]:
     names = {"skin": {"name": "shirt"}, "cloth": {"name": "face"}}
     exchanged = both(*(in_material(one, entry) for one, entry in names.items()))
     scan = both(in_surface(which, {"baseColorFactor": [0, 0, 0, 1]}), popped_colour(which))
+    mask, cutoff = ({"alphaMode": "MASK"} | more for more in ({}, {"alphaCutoff": 0.9}))
     gloss = {"diffuseFactor": [0.5, 0.4, 0.3, 1.0]}
     listed = {row.name: row.keys for row in GLTF_MATERIALS if row.keys and row.treatment == "noted"}
     del listed["`KHR_materials_emissive_strength`"]
@@ -284,7 +286,10 @@ def material_changes(which: str) -> list[Changed]:
             both(texture(which, "emissiveTexture"), in_material(which, {"emissiveFactor": [1, 1, 1]})),
             scan,
         ),
-        Changed("`alphaMode`", in_material(which, {"alphaMode": "MASK"})),
+        Changed("`alphaMode`", in_material(which, mask)),
+        Changed(
+            "`alphaMode`", in_material(which, cutoff), in_material(which, mask if which == "cloth" else {})
+        ),
         Changed("`alphaMode`", in_material(which, {"alphaMode": "BLEND"})),
         Changed("`occlusionTexture`", texture(which, "occlusionTexture")),
         Changed("`doubleSided`", in_material(which, {"doubleSided": True})),

@@ -83,7 +83,7 @@ class Statement(NamedTuple):
 
 
 PAINT = "#MRGB " + "".join(f"ff{int(255 * red):02x}4080" for red in RAMP)
-OTHER_PAINT = "`#MRGB` beside colours in `v`, or of other vertices"
+OTHER_PAINT = "`#MRGB` beside colours in `v`, or for another number of vertices"
 STATEMENTS = [
     Statement("`v x y z`", replaced("120.000000", "121.000000")),
     Statement("`v x y z w`", replaced("\nvt", " 2\nvt")),

@@ -14,8 +14,8 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 class FileProperty:
     """Property of a file and its treatment.
 
-    treatment : "drawn" if it changes the scene; "noted" if it does not and a note says so; "no effect" if it
-        does not and needs no note
+    treatment : "drawn" if it changes the scene as the file states; "noted" if it does not and a note names
+        it; "no effect" if it does not and there is no note
     name : property as the documentation shows it, in Markdown
     detail : how it is drawn, or why it is not, in Markdown
     keys : words by which the reader recognises it, such as statements or extensions

@@ -46,7 +46,7 @@ OBJ_PROPERTIES = (
     drawn_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
     noted("further numbers in `v`"),
     drawn(f"`{_POLYPAINT}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT),
-    noted(f"`{_POLYPAINT}` beside colours in `v`, or of other vertices"),
+    noted(f"`{_POLYPAINT}` beside colours in `v`, or for another number of vertices"),
     drawn("`vt u v`", "uv", "vt"),
     noted("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
     drawn("`vn`", "normals; missing ones are computed", "vn"),

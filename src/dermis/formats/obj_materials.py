@@ -33,7 +33,7 @@ NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
 MTL_PROPERTIES = (
     drawn("`newmtl`", "begins a material", "newmtl"),
     drawn("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
-    noted("`Kd` beside `map_Kd`", "no note for the greys that programs write there"),
+    noted("`Kd` beside `map_Kd`", "no note for greys that programs usually write there"),
     drawn("`map_Kd`", "colour", "map_Kd"),
     drawn("UDIM tiles: `face.<UDIM>.png`", "a picture for each tile"),
     noted("`Ke`, `map_Ke`", "emission", "Ke", "map_Ke", other_parts="drawn"),
@@ -57,7 +57,7 @@ MTL_PROPERTIES = (
         "options `-mm`, `-cc`, `-boost`, `-imfchan`, `-blendu`, `-blendv`, `-t`",
         "no note for values that change nothing, such as `-mm 0 1`",
     ),
-    no_effect("options `-texres`, `-type`", "pictures keep their size; for reflections only"),
+    no_effect("options `-texres`, `-type`", "pictures keep their size; `-type` is for reflections"),
     noted("a picture that is missing"),
     no_effect("`Ka`, `map_Ka`", "ambient light follows from the lights", "Ka", "map_Ka"),
     no_effect(

@@ -67,7 +67,7 @@ PLY_PROPERTIES = (
         "sRGB colours; integers of any size, or floats from 0 to 1",
     ),
     drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
-    noted(f"vertex: {' or '.join(map(in_code, _ALPHA_NAMES))}", "no note if all are the same"),
+    noted(f"vertex: {in_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
     drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "polygons"),
     noted("faces of one or two corners"),
     drawn("face: `texcoord`", "uv of the corners of a face"),

@@ -64,7 +64,7 @@ RADIANCE_PROPERTIES = (
     refused("other `FORMAT`"),
     drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
     drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
-    drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes, are not used"),
+    drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
     noted(in_code(_UNUSED_VALUES), "no note if they are 1"),
     refused("run-length coding of before 1991"),
     no_effect("`VIEW`, `SOFTWARE`, comments"),

@@ -60,8 +60,8 @@ GLTF_PROPERTIES = (
         "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
         "`gltf-transform copy`",
     ),
-    refused("other extensions, if required", "the error names them"),
-    noted("other extensions, if used only"),
+    refused("other extensions that are required", "the error names them"),
+    noted("other extensions that are used but not required"),
     drawn("transforms of nodes"),
     drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
     drawn("animations", "by `--motion`, see [motion](motion.md)"),
@@ -72,7 +72,7 @@ GLTF_PROPERTIES = (
         "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
         "they decide [what is skin](#materials-and-parts)",
     ),
-    no_effect("`asset`, `extras`, other names", "for programs and people"),
+    no_effect("`asset`, `extras`, other names", "information for programs and people"),
 )
 """Properties of glTF files besides their materials."""
 _READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}

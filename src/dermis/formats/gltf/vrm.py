@@ -24,10 +24,14 @@ _NOT_READ = {
     "visibility in first person": ("firstPerson",),
 }
 VRM_PROPERTIES = (
-    drawn(f"`{OLD}` (0.x)", "the face looks along -Z and is turned, unless `--front` is given", OLD),
+    drawn(
+        f"`{OLD}` (0.x)",
+        "the face looks along -Z and is turned to the viewer, unless `--front` is given",
+        OLD,
+    ),
     no_effect(f"`{NEW}` (1.0)", "the face looks along +Z, as in other files", NEW),
     drawn(
-        "expressions, presets and own ones",
+        "expressions: presets and custom ones",
         "morph targets beside those of the file (`happy`, `aa`, `blink`, in VRM 0 `joy`, `a`); "
         "a target of the file keeps its name",
     ),

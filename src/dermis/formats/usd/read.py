@@ -53,7 +53,7 @@ USD_PROPERTIES = (
         "in the package, or in the folder of the file and below; of other paths only the last part is used",
     ),
     drawn("sublayers, references, payloads", "from the folder of the file and below, or from the package"),
-    refused("layers elsewhere, value clips", "before any of them is opened"),
+    refused("layers in other places, value clips", "before any of them is opened"),
     noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
 )
 """Properties of USD files besides their materials."""
