@@ -17,12 +17,18 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 class Axes(NamedTuple):
     """Axes of a file.
 
-    up : axis that points upwards
-    front : axis along which the face looks, across `up`; "auto" for -Y with Z up, as in Blender, else Z
+    up : axis that points upwards; None if it is not stated, for Y
+    front : axis along which the face looks, across `up`; "auto" if it is not stated, for -Y with Z up, as in
+        Blender, else Z
     """
 
-    up: Axis = "y"
+    up: Axis | None = None
     front: Front = "auto"
+
+    @property
+    def top(self) -> Axis:
+        """Return the axis that points upwards."""
+        return self.up or "y"
 
     @property
     def face(self) -> Axis:
@@ -32,13 +38,13 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, which a user chooses, with those that a file states in place of the defaults.
+        """Return these axes, which a user chooses, with those that a file states where they are left out.
 
         The front of the file applies only with its own up axis.
         """
-        if self.up != "y":
-            return self
-        return Axes(stated.up, stated.front if self.front == "auto" else self.front)
+        chosen = self._replace(up=self.up or stated.up)
+        same = chosen.front == "auto" and chosen.top == stated.top
+        return chosen._replace(front=stated.front) if same else chosen
 
 
 DEFAULT_AXES = Axes()
@@ -48,13 +54,23 @@ def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
     """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""
     import numpy as np
 
-    if (axes.up, axes.face) == ("y", "z"):
+    if (axes.top, axes.face) == ("y", "z"):
         return vectors
-    (up, up_sign), (front, front_sign) = _split(axes.up), _split(axes.face)
+    (up, up_sign), (front, front_sign) = _split(axes.top), _split(axes.face)
     side = 3 - up - front
     side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
     columns = (side, side_sign), (up, up_sign), (front, front_sign)
     return np.column_stack([vectors[:, k] if sign > 0 else -vectors[:, k] for k, sign in columns])
+
+
+def file_axis(direction: Axis, axes: Axes) -> Axis:
+    """Return the axis of a file that points along an axis of the head, after `to_y_up`."""
+    import numpy as np
+
+    index, sign = _split(direction)
+    along = sign * to_y_up(np.eye(3), axes)[:, index]
+    names: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
+    return names[int(np.concatenate((along, -along)).argmax())]
 
 
 def _split(axis: Axis) -> tuple[int, int]:

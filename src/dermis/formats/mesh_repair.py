@@ -61,6 +61,7 @@ class RawMesh:
     material : (f,) index of the material of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
     vertices : the same vertices in the file's space, with their morph targets and bones
+    file_vertex : (v,) index of each vertex among those that the triangles of the file use
     """
 
     positions: Floats
@@ -71,6 +72,7 @@ class RawMesh:
     material: Ints
     quads: Index
     vertices: MeshPart
+    file_vertex: Index
 
     def build(self, materials: tuple[Material, ...]) -> Mesh:
         """Return the mesh with points and normals of its own."""
@@ -118,10 +120,13 @@ class RawMesh:
             normals=self.normals[source],
             uv=self.uv[source],
             vertices=select_vertices(self.vertices, source),
+            file_vertex=self.file_vertex[source],
         )
 
 
-def mend(mesh: RawMesh, materials: Sequence[FileMaterial | None]) -> tuple[RawMesh, tuple[str, ...]]:
+def mend(
+    mesh: RawMesh, materials: Sequence[FileMaterial | None], is_skin: Mask
+) -> tuple[RawMesh, tuple[str, ...]]:
     """Return a mesh without the faults that can be mended, and a note on each fault.
 
     Triangles without area and repeated ones are dropped; sheets that meet at an edge of more than two
@@ -130,12 +135,13 @@ def mend(mesh: RawMesh, materials: Sequence[FileMaterial | None]) -> tuple[RawMe
     tiles. A mesh without faults is returned as it is.
 
     materials : of the file, for each material of the mesh; None for one that the file does not describe
+    is_skin : (m,) which materials of the mesh are skin
     """
     notes: list[str] = []
     flat = flat_triangles(mesh.positions, mesh.triangles)
     if flat.mean() > _MAX_FLAT:
         return mesh, ()
-    mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, notes), notes), notes)
+    mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
     return _move_uv(mended if mended is mesh else mended.compact(), materials, notes), tuple(notes)
 
 
@@ -143,10 +149,11 @@ def _counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
-def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
-    """Return the mesh without flat triangles (f,) and without repetitions within a material.
+def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) -> RawMesh:
+    """Return the mesh without flat triangles (f,) and without repetitions.
 
-    Of triangles of the same three points the first is kept.
+    Of triangles of the same three points in a material the first is kept. Of materials with exactly the same
+    triangles skin is kept, else the first.
     """
     if flat.any():
         notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
@@ -158,10 +165,26 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
         again = (key[order][1:] == key[order][:-1]) & (np.diff(mesh.material[order]) == 0)
         kept = np.ones(len(key), bool)
         kept[order[1:][again]] = False
-        if again.any():
-            notes.append(f"left out {_counted(int(again.sum()), 'triangle')} that repeat others")
+        kept &= ~_copies(key[kept], mesh.material[kept], is_skin)[mesh.material]
+        if not kept.all():
+            notes.append(f"left out {_counted(int((~kept).sum()), 'triangle')} that repeat others")
             mesh = mesh.with_triangles(kept)
     return mesh
+
+
+def _copies(key: Index, material: Ints, is_skin: Mask) -> Mask:
+    """Return which materials have exactly the same triangles as another one, which is kept, (m,).
+
+    key, material : (f,) number of each triangle, see `triangle_keys`, and index of its material
+    """
+    ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
+    triangles = np.split(key[np.lexsort((key, material))], ends[:-1])
+    copies, seen = np.zeros(len(is_skin), bool), {b""}
+    for index in np.argsort(~is_skin, kind="stable"):
+        own = triangles[index].tobytes()
+        copies[index] = own in seen
+        seen.add(own)
+    return copies
 
 
 class _Sides(NamedTuple):

@@ -109,7 +109,7 @@ class MeshFile:
     materials : materials of the file, to which the groups refer
     notes : sentences on what of the file is mended, replaced or left out, for users
     unit_mm : length unit that the file states [mm], or None
-    axes : axes that the file states, or the defaults
+    axes : axes that the file states
     """
 
     parts: list[MeshPart]

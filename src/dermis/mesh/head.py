@@ -10,6 +10,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
@@ -47,6 +48,8 @@ class Head:
         Levels of subdivision of the mesh.
     template : Head, optional
         Head of the same topology and uv layout whose atlas and tables serve this one too.
+    file_vertices : FileVertices, optional
+        Vertices of the mesh file from which the points come, for mesh sequences.
 
     Examples
     --------
@@ -68,6 +71,7 @@ class Head:
     note: str = ""
     levels: int = 0
     template: Head | None = None
+    file_vertices: FileVertices | None = None
 
     def __repr__(self) -> str:
         """Return name, size, maps and rig on two lines."""

@@ -94,7 +94,6 @@ class Rig(ShortRepr):
     positions_mm : (p, 3) control points at rest, in head space
     targets, skeleton : morph targets and bones; `skeleton` is None without bones
     stencils : subdivision from control points to mesh points; None without subdivision
-    vertex_point : (v,) control point of each vertex of the file's mesh; None if it is `Mesh.point`
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they come after its own
     contact : lids that must stay outside the eyeballs; None to let them intersect
@@ -106,7 +105,6 @@ class Rig(ShortRepr):
     targets: MorphTargets = field(default_factory=no_targets)
     skeleton: Skeleton | None = None
     stencils: Stencils | None = None
-    vertex_point: Ints | None = None
     bone_rotations: tuple[BoneRotation, ...] = ()
     rigid_followers: tuple[RigidFollowers, ...] = ()
     contact: LidContact | None = None

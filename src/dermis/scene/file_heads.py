@@ -98,7 +98,7 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     maps, tone_note = (maps, "") if "colour" in options.given else with_skin_tone(mesh, maps)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
         notify(f"{path}: {note}")
-    return Head(name, mesh, maps, "", rigged.rig), look
+    return Head(name, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
 
 
 def _load_mesh(path: Path, name: str, mesh_options: dict[str, Any]) -> RiggedMesh:
@@ -120,7 +120,8 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
         rigged = _load_mesh(files["mesh"], sample.name, own)
         maps = pending_maps.result()
     check_relief(options.height_mm, maps.height, f"{sample.name}: height_mm")
-    return Head(sample.name, rigged.mesh, maps, f"{sample.attribution}, {sample.licence}", rigged.rig)
+    credit = f"{sample.attribution}, {sample.licence}"
+    return Head(sample.name, rigged.mesh, maps, credit, rigged.rig, file_vertices=rigged.file_vertices)
 
 
 def _with_materials(

@@ -33,10 +33,9 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
         colours=None if surface.colours is None else surface.colours[vertex],
         other_uv={index: uv[vertex] for index, uv in surface.other_uv.items()},
     )
-    rig = rigged.rig and replace(rigged.rig, vertex_point=mesh.point)
     names = ", ".join(repr(own.name) for own, without in zip(mesh.materials, bare, strict=True) if without)
     note = f"{names} has no uv; the package lays it out"
-    return rigged._replace(mesh=laid_out, rig=rig, notes=(*rigged.notes, note), surface=changed)
+    return rigged._replace(mesh=laid_out, notes=(*rigged.notes, note), surface=changed)
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:

@@ -80,10 +80,11 @@ class HeadTable(FrozenModel):
     size."""
     v_origin: VOrigin = "auto"
     """Row of the maps at v = 0; "auto" follows the format."""
-    up: Axis = "y"
-    """Upward axis of the file; that stated by USD replaces the default."""
+    up: Axis | None = None
+    """Upward axis of the file; when left out that stated by USD, else y."""
     front: Front = "auto"
-    """Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z."""
+    """Axis of the file along which the face looks; "auto" for that stated by VRM, else the one that eyes or
+    the shape of the head show, else -y with z up, as in Blender, or z."""
     normal_y: NormalY = "up"
     """Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     skin_groups: tuple[str, ...] = ()
@@ -111,7 +112,7 @@ class HeadTable(FrozenModel):
     @field_validator("front")
     @classmethod
     def _check_axes(cls, front: Front, info: ValidationInfo) -> Front:
-        up = info.data.get("up", "")
+        up = info.data.get("up") or ""
         if front[-1] == up[-1:]:
             raise ValueError(f"an axis across up, which is {up}")
         return front

@@ -54,7 +54,7 @@ def load_head(
     roughness: MapFile = None,
     unit_mm: float | None = None,
     v_origin: VOrigin = "auto",
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
     normal_y: NormalY = "up",
     skin_groups: Sequence[str] | str = (),
@@ -85,11 +85,11 @@ def load_head(
         note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
-    up : {"y", "z", "x", "-y", "-z", "-x"}
-        Upward axis of the file; that stated by USD replaces the default.
+    up : {"y", "z", "x", "-y", "-z", "-x"}, optional
+        Upward axis of the file; by default that stated by USD, else y.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of the file along which the face looks; "auto" for -z in avatars of VRM 0, -y with z up, as in
-        Blender, else z.
+        Axis of the file along which the face looks; "auto" for that stated by VRM, else the one that eyes or
+        the shape of the head show, with a note, else -y with z up, as in Blender, or z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     skin_groups : str or sequence of str
@@ -160,7 +160,7 @@ def load_head(
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, relief)
-    coarse, loaded = loaded.mesh, _subdivide_with_points(loaded, levels)
+    coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
 
@@ -168,14 +168,6 @@ def load_head(
 def is_person_name(name: str) -> bool:
     """Return whether a name denotes a parametric human: "human", "human:SEED", or a person's .json file."""
     return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
-
-
-def _subdivide_with_points(head: Head, levels: SubdivisionLevels) -> Head:
-    """Return the subdivided head; its rig also keeps the vertices of the file, for mesh sequences."""
-    finer = subdivide_head(head, levels)
-    if finer.levels and finer.rig is not None:
-        return replace(finer, rig=replace(finer.rig, vertex_point=head.mesh.point))
-    return finer
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
@@ -221,8 +213,8 @@ def _load_human(
     mesh_options : options that apply only to mesh files; DermisError unless they have their defaults
     levels : subdivision levels, or a function of the head that returns them
     """
-    texts = {"v_origin": "auto", "up": "y", "front": "auto", "eyes": "fitted"}
-    defaults = {"unit_mm": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
+    texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
+    defaults = {"unit_mm": None, "up": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")

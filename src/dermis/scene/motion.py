@@ -30,7 +30,7 @@ def load_motion(
     clip: str | None = None,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
 ) -> Clip:
     r"""Load the motion of a head from a file.
@@ -50,10 +50,10 @@ def load_motion(
         without time.
     unit_mm : float, optional
         Length of the unit of a sequence's files [mm]; by default one that makes them as large as the head.
-    up : {"y", "z", "x", "-y", "-z", "-x"}
-        Upward axis of a sequence's files.
+    up : {"y", "z", "x", "-y", "-z", "-x"}, optional
+        Upward axis of a sequence's files; without `up` and `front`, they have the axes of the head's file.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of a sequence's files along which the face looks; see `load_head`.
+        Axis of a sequence's files along which the face looks; with `up`, "auto" is -y with z up, else z.
 
     Returns
     -------

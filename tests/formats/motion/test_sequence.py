@@ -11,6 +11,7 @@ from small_head import obj_text
 
 import dermis
 from dermis.base.errors import DermisError, DermisWarning
+from dermis.formats.axes import Axes, to_y_up
 from dermis.formats.motion.sequence import FrameReader, frame_files
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -104,11 +105,11 @@ def test_ply_frames(tmp_path: Path) -> None:
 
 
 def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:
-    reader = FrameReader(unit_mm=2.0, up="z")
+    reader = FrameReader(2.0, to_y_up(np.eye(3), Axes("z")).T)
     files = frame_files(folder)
     first = reader.read(files[0])
     for file in files:
-        whole, quick = FrameReader(unit_mm=2.0, up="z").read(file), reader.read(file)
+        whole, quick = FrameReader(2.0, to_y_up(np.eye(3), Axes("z")).T).read(file), reader.read(file)
         assert quick.triangles is first.triangles  # which were not parsed again
         for mine, other in zip(quick, whole, strict=True):
             assert mine.dtype == other.dtype

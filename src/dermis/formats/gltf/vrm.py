@@ -92,7 +92,7 @@ def read_avatar(document: Document) -> Avatar:
         expressions.setdefault(id(mesh), {}).setdefault(name, {})[target] = weight
         names.add(name)
         check_limit(document.path, len(names), MAX_TARGETS, "expressions", "Export it with fewer")
-    axes = Axes(front="-z") if old else DEFAULT_AXES
+    axes = Axes(front="-z" if old else "z")
     return Avatar(axes, expressions, tuple(_notes(extensions, version, old)))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.errors import notify, refuse
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing
-from dermis.formats.axes import Axes, Axis, Front, to_y_up
+from dermis.formats.axes import DEFAULT_AXES, Axes, Axis, Front, to_y_up
 from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import parse_obj, read_obj_text
 from dermis.formats.parts import default_unit_mm
@@ -24,6 +24,7 @@ from dermis.formats.read import join_parts, read_mesh_file
 from dermis.formats.rig_from_file import SPLIT_TOLERANCE_MM
 from dermis.formats.units import UNITS_MM
 from dermis.mesh.clip import Clip
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, triangle_keys
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -80,7 +81,7 @@ def load_sequence(
     head: Head,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
 ) -> Clip:
     """Load a sequence of mesh files, one per frame, as a clip for a head with the same topology.
@@ -89,15 +90,17 @@ def load_sequence(
 
     fps : frame rate, by default 30
     unit_mm : unit of the files [mm]; None for one that makes the first about as large as the head
-    up, front : axes of the files, see `load_head`
+    up, front : axes of the files, see `load_head`; without both those of the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
-    reader = FrameReader(unit_mm, up, front)
+    axes, source = Axes(up, front), head.file_vertices
+    to_head = to_y_up(np.eye(3), axes).T if source is None or axes != DEFAULT_AXES else source.to_head
+    reader = FrameReader(unit_mm, to_head)
     if unit_mm is None and (unit := _unit_of_head(files[0], head, reader)) != default_unit_mm(files[0]):
-        reader = FrameReader(unit, up, front)
+        reader = FrameReader(unit, to_head)
     frames = _FrameCache(tuple(files), head, reader)
     for index in {0, len(files) // 2, len(files) - 1}:
         frames.positions(index)
@@ -127,6 +130,9 @@ class _FrameCache:
     def __post_init__(self) -> None:
         """Create `positions`, the cached version of `_read_positions`."""
         self.positions = lru_cache(maxsize=3)(self._read_positions)
+        mesh, vertex = self.head.mesh, np.arange(len(self.head.mesh.point), dtype=np.int32)
+        own = FileVertices(len(vertex), vertex, mesh.point, mesh.triangles, np.eye(3))
+        self._source = self.head.file_vertices or own
 
     def _read_positions(self, index: int) -> Floats:
         """Return the positions of the head's control points in a frame, (n, 3) [mm]."""
@@ -134,11 +140,10 @@ class _FrameCache:
         vertices = self.reader.read(file)
         self._first = self._first or vertices
         self._check_topology(file, vertices)
-        control = self.head.control
-        point = self.head.mesh.point if control.vertex_point is None else control.vertex_point
-        positions = np.empty_like(self.head.positions_mm)
-        positions[point] = vertices.positions_mm
-        difference = np.abs(positions[point] - vertices.positions_mm).max(axis=1)
+        positions, point = np.empty_like(self.head.positions_mm), self._source.point
+        at_points = vertices.positions_mm[self._source.vertex]
+        positions[point] = at_points
+        difference = np.abs(positions[point] - at_points).max(axis=1)
         if difference.max() > SPLIT_TOLERANCE_MM:
             count = np.count_nonzero(difference > SPLIT_TOLERANCE_MM)
             actual = f"{count} separate by up to {difference.max():.3g} mm"
@@ -149,12 +154,11 @@ class _FrameCache:
 
     def _check_topology(self, file: Path, vertices: FrameVertices) -> None:
         assert self._first is not None
-        control, mesh = self.head.control, self.head.mesh
-        count = len(mesh.point if control.vertex_point is None else control.vertex_point)
+        source, count = self._source, self._source.count
         same_triangles = np.array_equal(vertices.triangles, self._first.triangles)
-        of_head, of_frame = (triangle_keys(one.triangles, count) for one in (mesh, vertices))
         # the head lacks the triangles that were left out when it was read
-        matches_head = control.vertex_point is not None or np.isin(of_head, of_frame).all()
+        of_head = triangle_keys(source.vertex[source.triangles], count)
+        matches_head = np.isin(of_head, triangle_keys(vertices.triangles, count)).all()
         if len(vertices.positions_mm) != count or not matches_head:
             actual = f"it has {len(vertices.positions_mm)} and {len(vertices.triangles)} triangles"
             expected = f"the topology of the head, {count} vertices connected as in its file"
@@ -238,12 +242,11 @@ class FrameReader:
     fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
-    up, front : axes of the files that point upwards and along which the face looks
+    to_head : (3, 3) rotation from the axes of the files to those of the head
     """
 
     unit_mm: float | None = None
-    up: Axis = "y"
-    front: Front = "auto"
+    to_head: Doubles = field(default_factory=lambda: np.eye(3))
     _first: FrameVertices | None = field(default=None, init=False)
     _pattern: _ObjPattern | None = field(default=None, init=False)
 
@@ -287,7 +290,7 @@ class FrameReader:
 
     def _to_head_axes(self, positions: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # infinite positions are refused later
-            return to_y_up(positions, Axes(self.up, self.front)).astype(np.float32)
+            return (positions @ self.to_head.T).astype(np.float32)
 
 
 def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:

@@ -72,8 +72,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     eyeballs = [
         FittedEyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs
     ]
-    vertex_point = mesh.point if control.vertex_point is None else control.vertex_point
-    rig = with_eyeballs(replace(control, vertex_point=vertex_point), eyeballs)
+    rig = with_eyeballs(control, eyeballs)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
         rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
