@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from egg import Egg
 from encoded_glb import encode_glb
+from icc_profiles import DISPLAY_P3, SRGB_CURVE, encoded, rgb_profile
 from loaded_mesh import load_mesh
 
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.formats.gltf.embedded import embedded_materials
 from dermis.images.codecs import encode_png
 from dermis.images.io import EmbeddedPicture, read_image
@@ -124,6 +126,35 @@ def test_pictures_by_uri(tmp_path: Path) -> None:
         (tmp_path / "a.gltf").write_text(json.dumps(tree))
         (material,) = embedded_materials(tmp_path / "a.gltf")
         assert read_image(material.textures["colour"].picture).shape == (32, 32, 3)
+
+
+def test_colour_profiles_are_not_used_wherever_the_picture_is(tmp_path: Path) -> None:
+    picture = encoded(ramp(255, 3), "PNG", icc_profile=rgb_profile("P3", DISPLAY_P3, SRGB_CURVE))
+    maps = []
+    for name, uri in (("a.glb", None), ("a.gltf", "face.png")):
+        egg = Egg()
+        for mesh in range(2):
+            egg.primitive(mesh)["material"] = egg.tree["materials"].index(egg.skin)
+        egg.skin["pbrMetallicRoughness"]["baseColorTexture"] = egg.texture(picture)
+        if uri is not None:
+            egg.tree["images"][-1] = {"uri": uri}
+        path = egg.write(tmp_path / name)
+        (tmp_path / "face.png").write_bytes(picture)
+        with pytest.warns(DermisWarning, match="its colour profile is not used, as glTF demands"):
+            maps.append(load_head(path, subdivide=0).maps.colour)
+    assert maps[0] is not None and maps[1] is not None
+    np.testing.assert_array_equal(maps[0], maps[1])
+
+
+def test_a_missing_external_picture_is_refused_unless_an_option_replaces_it(tmp_path: Path) -> None:
+    egg = Egg()
+    egg.tree["images"][0] = {"uri": "gone.png"}
+    egg.primitive(1)["material"] = 0
+    path = egg.write(tmp_path / "a.gltf")
+    with pytest.raises(DermisError, match=r"gone\.png: expected a picture"):
+        load_head(path, subdivide=0)
+    (tmp_path / "other.png").write_bytes(encode_png(ramp(255, 3)))
+    assert load_head(path, colour=tmp_path / "other.png", subdivide=0).maps.colour is not None
 
 
 @pytest.mark.parametrize(

@@ -207,6 +207,48 @@ def test_parts_of_different_materials_in_one_place_are_both_kept(tmp_path: Path)
     assert edges(loaded.mesh.point[loaded.mesh.triangles[skin]])[2].min() == 2
 
 
+def load_groups(folder: Path, *groups: tuple[str, NDArray[Any]]) -> RiggedMesh:
+    """Return a mesh of groups of triangles of a ball, as an OBJ file."""
+    rows = [f"v {x} {y} {z}" for x, y, z in 1000 * BALL.positions] + [f"vt {u} {1 - v}" for u, v in BALL.uv]
+    for name, triangles in groups:
+        rows += [f"usemtl {name}", *(f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in triangles + 1)]
+    (folder / "a.obj").write_text("\n".join(rows))
+    return load_rigged(folder / "a.obj", unit_mm=1.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "kept"),
+    [
+        (("skin", "paint"), "skin"),
+        (("paint", "skin"), "skin"),
+        (("skin_b", "skin_a"), "skin_b"),
+        (("skin", "b", "a"), "skin"),
+    ],
+)
+@pytest.mark.parametrize("inside_out", [False, True])
+def test_of_shells_in_one_place_skin_or_the_first_is_kept(
+    tmp_path: Path, names: tuple[str, ...], kept: str, inside_out: bool
+) -> None:
+    first, *others = names
+    copy = BALL.triangles[:, ::-1] if inside_out else BALL.triangles
+    loaded = load_groups(tmp_path, (first, BALL.triangles), *((name, copy) for name in others))
+    assert [one.name for one in loaded.mesh.materials] == [kept] and len(loaded.mesh.triangles) == TRIANGLES
+    assert loaded.surface.has_uv == (True,) and len(loaded.surface.in_file) == 1
+    assert f"left out {TRIANGLES * len(others)} triangles that repeat others" in loaded.notes
+    left_out = ", ".join(sorted(set(names) - {kept}, key=names.index))
+    assert f"nothing remains of these groups: {left_out}" in loaded.notes
+
+
+def test_a_group_of_flat_triangles_alone_is_left_out(tmp_path: Path) -> None:
+    flat = np.array([[0, 0, 1], [2, 2, 2]])
+    loaded = load_groups(tmp_path, ("skin_b", flat), ("skin", BALL.triangles), ("hair", BALL.triangles[:9]))
+    assert [one.name for one in loaded.mesh.materials] == ["skin", "hair"]
+    assert np.bincount(loaded.mesh.material).tolist() == [TRIANGLES, 9]
+    assert "nothing remains of these groups: skin_b" in loaded.notes
+    with pytest.raises(DermisError, match=r"has no triangles|no area|area"):
+        load_groups(tmp_path, ("skin", flat), ("hair", BALL.triangles[:1]))
+
+
 @pytest.mark.parametrize("of_file", ["none", "outwards", "inwards"])
 def test_a_closed_mesh_that_is_inside_out_is_reversed(tmp_path: Path, of_file: str) -> None:
     normals = {"none": None, "outwards": BALL.normals, "inwards": -BALL.normals}[of_file]

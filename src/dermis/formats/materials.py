@@ -113,9 +113,11 @@ def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
         pictures |= {(role, str(picture)): picture for role, picture in used.items()}
     texels = 0
     for picture in pictures.values():
-        if isinstance(picture, EmbeddedPicture) or (isinstance(picture, Path) and is_file(str(picture))):
-            width, height = read_size(picture)
-            texels += width * height
+        if isinstance(picture, EmbeddedPicture | Path):
+            source = picture.data if isinstance(picture, EmbeddedPicture) else picture
+            if isinstance(source, bytes) or is_file(str(source)):
+                width, height = read_size(picture)
+                texels += width * height
     if texels > MAX_TOTAL_PIXELS:
         advice = "Resize them, or set them by options (--colour, ...)"
         limit = f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"

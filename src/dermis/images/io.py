@@ -64,14 +64,14 @@ ODD_PIXELS = (
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
-    """Picture file that is part of another file, such as a .glb file.
+    """Picture file of a glTF file or of a USD package, whose colours are sRGB whatever profile it has.
 
     name : for error messages
-    data : bytes of the picture file, in any format but OpenEXR
+    data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
     """
 
     name: str
-    data: bytes = field(repr=False)
+    data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
         """Return the name, which stands in error messages instead of a path."""
@@ -97,8 +97,8 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
     """Return the pixels (H, W, C) of a picture of colours as `read_image`, and their colour space.
 
-    The colour space is that of the file's profile or primaries. Pictures inside other files are sRGB or
-    linear Rec. 709, as glTF demands.
+    The colour space is that of the file's profile or primaries. Pictures of glTF files are sRGB or linear
+    Rec. 709, as glTF demands.
 
     upright : turn the picture as its EXIF says, as for photographs
 
@@ -201,7 +201,8 @@ def _apply_codec(
     codec = pillow if picture_format(data) else None
     for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
         codec = other if data.startswith(start) else codec
-    if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
+    is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
+    if codec is None or (codec is exr and is_inside):
         known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
         actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
@@ -335,6 +336,5 @@ def read_bytes(path: str | Path | EmbeddedPicture) -> bytes:
 
     Raises DermisError when it cannot be read.
     """
-    if isinstance(path, EmbeddedPicture):
-        return path.data
-    return read_file(path, _EXPECTED_PICTURE, MAX_FILE_BYTES)
+    source = path.data if isinstance(path, EmbeddedPicture) else path
+    return source if isinstance(source, bytes) else read_file(source, _EXPECTED_PICTURE, MAX_FILE_BYTES)

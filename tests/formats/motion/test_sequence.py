@@ -205,6 +205,50 @@ def test_places_that_part_are_refused(tmp_path: Path) -> None:
         dermis.load_motion(folder, head)
 
 
+FAULTS = {
+    "flat triangles": "f 1/1 1/1 2/2\nf 30/30 31/31 30/30\n",
+    "repeated triangles": "f 30/30 31/31 56/56\nf 30/30 31/31 56/56\n",
+    "a fin": "v 0 20 120\nf 30/30 31/31 -1/1\n",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("has_uv", [True, False])
+@pytest.mark.parametrize("levels", [0, 1])
+def test_a_sequence_moves_a_head_that_was_mended(
+    tmp_path: Path, fault: str, has_uv: bool, levels: int
+) -> None:
+    folder = _frames(tmp_path / "take")
+    for file in folder.iterdir():
+        text = file.read_text() + FAULTS[fault]
+        file.write_text(text if has_uv else re.sub(r"(?m)^vt .*\n|/\d+", "", text))
+    head = dermis.load_head(folder / "face_8.obj", unit_mm=1.0, subdivide=levels)
+    assert head.file_vertices is not None
+    found = dermis.load_motion(folder, head, fps=1, unit_mm=1.0).pose_at(2.0).positions_mm
+    moved = 0.9 if fault != "a fin" else np.where(head.positions_mm[:, 2:] == 120, 1.0, 0.9)
+    np.testing.assert_allclose(found, moved * head.positions_mm, rtol=1e-4, atol=1e-3)
+
+
+def test_another_topology_of_the_same_size_is_refused(tmp_path: Path) -> None:
+    folder = _frames(tmp_path / "take")
+    head = dermis.load_head(folder / "face_8.obj", subdivide=1)
+    for file in folder.iterdir():
+        file.write_text(
+            _other_face(re.sub(r"(?m)^f 1/1 .*\n", "f 1/1 80/80 200/200\n", file.read_text(), count=1))
+        )
+    with pytest.raises(DermisError, match=r"face_8\.obj: expected the topology of the head"):
+        dermis.load_motion(folder, head)
+
+
+def test_a_sequence_has_the_axes_of_the_file_of_its_head(tmp_path: Path) -> None:
+    folder = _frames(tmp_path / "take")
+    head = dermis.load_head(folder / "face_8.obj", up="z", front="x", subdivide=0)
+    found = dermis.load_motion(folder, head, fps=1).pose_at(1.0).positions_mm
+    np.testing.assert_allclose(found, 1.1 * head.positions_mm, rtol=1e-5, atol=1e-3)
+    other = dermis.load_motion(folder, head, fps=1, up="z").pose_at(1.0).positions_mm
+    assert other is not None and np.abs(other - found).max() > 10
+
+
 def test_nothing_and_several_kinds(folder: Path) -> None:
     head = _head(folder)
     with pytest.raises(DermisError, match=r"no_%d\.obj: expected frames .* there are none"):

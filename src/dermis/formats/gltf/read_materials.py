@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from dermis.base.errors import refuse
@@ -193,7 +192,7 @@ class _Reader:
         wrap = _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
         return Texture(picture, uv_set, _transform(extension), wrap, channel)
 
-    def _picture(self, entry: Tree) -> EmbeddedPicture | Path | None:
+    def _picture(self, entry: Tree) -> EmbeddedPicture | None:
         extensions = entry.get("extensions") or {}
         sources = [extensions[name].get("source") for name in _SOURCE_EXTENSIONS if name in extensions]
         sources.append(entry.get("source"))
@@ -208,8 +207,8 @@ class _Reader:
         return read_picture(self.document, source)
 
 
-def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
-    """Return the bytes or the file of an image of a document; its content decides on its format.
+def read_picture(document: Document, source: Any) -> EmbeddedPicture:
+    """Return an image of a document; its content decides on its format.
 
     Raises DermisError for a file outside the folder.
     """
@@ -220,7 +219,8 @@ def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
     uri = image["uri"]
     if uri.startswith("data:"):
         return EmbeddedPicture(name, base64.b64decode(uri.partition(",")[2]))
-    return resolve_uri(document.path, uri)
+    file = resolve_uri(document.path, uri)
+    return EmbeddedPicture(str(file), file)
 
 
 def _checked_relief(height_mm: object) -> float | None:
