@@ -212,6 +212,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::dermis.DermisWarning")
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("has_uv", [True, False])
 @pytest.mark.parametrize("levels", [0, 1])
