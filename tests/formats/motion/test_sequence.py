@@ -212,7 +212,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::dermis.DermisWarning")
+@pytest.mark.filterwarnings("ignore::dermis.base.errors.DermisWarning")
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("has_uv", [True, False])
 @pytest.mark.parametrize("levels", [0, 1])
