@@ -149,12 +149,14 @@ def test_colour_profiles_are_not_used_wherever_the_picture_is(tmp_path: Path) ->
 def test_a_missing_external_picture_is_refused_unless_an_option_replaces_it(tmp_path: Path) -> None:
     egg = Egg()
     egg.tree["images"][0] = {"uri": "gone.png"}
-    egg.primitive(1)["material"] = 0
+    for mesh in range(2):
+        egg.primitive(mesh)["material"] = egg.tree["materials"].index(egg.skin)
     path = egg.write(tmp_path / "a.gltf")
     with pytest.raises(DermisError, match=r"gone\.png: expected a picture"):
         load_head(path, subdivide=0)
     (tmp_path / "other.png").write_bytes(encode_png(ramp(255, 3)))
-    assert load_head(path, colour=tmp_path / "other.png", subdivide=0).maps.colour is not None
+    options = {"colour": tmp_path / "other.png", "skin_groups": ("Head", "Collar"), "subdivide": 0}
+    assert load_head(path, **options).maps.colour is not None
 
 
 @pytest.mark.parametrize(

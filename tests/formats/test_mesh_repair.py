@@ -234,7 +234,7 @@ def test_of_shells_in_one_place_skin_or_the_first_is_kept(
     loaded = load_groups(tmp_path, (first, BALL.triangles), *((name, copy) for name in others))
     assert [one.name for one in loaded.mesh.materials] == [kept] and len(loaded.mesh.triangles) == TRIANGLES
     assert loaded.surface.has_uv == (True,) and len(loaded.surface.in_file) == 1
-    assert f"left out {TRIANGLES * len(others)} triangles that repeat others" in loaded.notes
+    assert f"left out {TRIANGLES * len(others):,} triangles that repeat others" in loaded.notes
     left_out = ", ".join(sorted(set(names) - {kept}, key=names.index))
     assert f"nothing remains of these groups: {left_out}" in loaded.notes
 
