@@ -17,10 +17,13 @@ from dermis.formats.gltf.materials import (
     eye_material,
     eye_pictures,
     hair_material,
+    part_material,
+    part_pictures,
     skin_pictures,
     surface_material,
 )
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
+from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
@@ -96,19 +99,27 @@ def _primitive_sources(
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
     """Return the geometry of each glTF primitive and the material of each, in the same order.
 
-    pictures : PNG files by name; those of eyes and hairs are added
+    pictures : PNG files by name; those of eyes, hairs and parts that are not skin are added
     roles : entries of the extras of skin, see `skin_pictures`
     """
     head = points.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
         pictures |= eye_pictures(eyes)
+    part_maps = PartPictures.of(head)
+    if part_maps is not None:
+        pictures |= part_pictures(part_maps)
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
         parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == index), eye))
         own = head.mesh.materials[index]
-        materials.append(surface_material(own, pictures, roles, roughness) if eye < 0 else eye_material(own))
+        if eye >= 0:
+            materials.append(eye_material(own))
+        elif part_maps is not None and own.has_maps:
+            materials.append(part_material(own, part_maps, pictures))
+        else:
+            materials.append(surface_material(own, pictures, roles, roughness))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
