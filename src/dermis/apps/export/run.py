@@ -211,8 +211,8 @@ def export_skin(
         subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
-    if to != "web" and subject.head is not None and subject.head.maps.parts is not None:
-        notify(f"{subject.name}: parts that are not skin are exported with their mean colours, not pictures")
+    if limitations := target.limitations_of_parts(subject):
+        notify(f"{subject.name}: {limitations}")
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
@@ -242,7 +242,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
         d_mm=fit_burley_width(subject.curve),
         error=errors[0],
         naive_error=errors[1],
-        limitations=target.limitations,
+        limitations=" ".join(filter(None, (target.limitations, target.limitations_of_parts(subject)))),
         untested=target.untested,
     )
 

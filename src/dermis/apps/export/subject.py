@@ -15,6 +15,7 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
 from dermis.formats.mesh_formats import find_format
+from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyeTextures
@@ -74,6 +75,11 @@ class Subject:
     def head_or_ball(self) -> Head:
         """Return the head, or a ball of diameter `BALL_MM` if there is none."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
+
+    @cached_property
+    def part_pictures(self) -> PartPictures | None:
+        """Return the pictures of the head's parts that are not skin, or None if there are none."""
+        return None if self.head is None else PartPictures.of(self.head)
 
     @property
     def identifier(self) -> str:

@@ -115,6 +115,10 @@ class Target(ABC):
     """Whether `write` needs the maps of a head as arrays, so that procedural maps are painted first."""
     limitations: ClassVar[str]
     """Differences from the reference that no parameters can remove, in one or two sentences."""
+    part_limitations: ClassVar[str] = (
+        "Only skin is exported; an export to gltf contains the other parts with their pictures."
+    )
+    """Sentences on what is not exported of parts that are not skin, for heads with pictures of such parts."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 
@@ -192,6 +196,21 @@ class Target(ABC):
                 "Choose the nearest, and check the result",
             )
         return version
+
+    def limitations_of_parts(self, subject: Subject) -> str:
+        """Return the limitations that concern parts that are not skin; empty if there are none.
+
+        Parameters
+        ----------
+        subject : Subject
+            Skin to export.
+
+        Returns
+        -------
+        str
+            `part_limitations` for heads with pictures of such parts.
+        """
+        return "" if subject.part_pictures is None else self.part_limitations
 
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
         """Return the path of the main file: the output itself, or a file in it if it is a folder.

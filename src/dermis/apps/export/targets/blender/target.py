@@ -190,6 +190,7 @@ class Blender(Target):
         " Burley's profile ignores thin parts. All methods use one layer, so the red of layered skin is lost."
         " EEVEE was not tested."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the subsurface radius for which the method's profile is closest to the reference."""

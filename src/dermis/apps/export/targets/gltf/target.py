@@ -45,6 +45,7 @@ class Gltf(Target):
         f" colour, so the skin is too light. The variant {TRANSMISSION_VARIANT} looks like skin in all"
         " programs, but light is not diffused: shadow edges stay sharp."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the volume whose random walk is closest to the reference, or the transmission of an ear."""

@@ -91,6 +91,7 @@ class EnginePage(Target):
 
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
+    part_limitations: ClassVar[str] = ""
     licence: ClassVar[str]
     """Licence of the library."""
     drawing_script: ClassVar[Path]

@@ -70,6 +70,8 @@ def add_mesh(
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable.normals[vertex])))
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    if head.maps.parts is not None:
+        prim.CreateDoubleSidedAttr(True)
     _add_uv(prim, texture_coordinates(head), polygons)
     subsets, family, tokens = {}, "materialBind", UsdGeom.Tokens
     for k in np.unique(polygons.material).tolist():
