@@ -94,7 +94,6 @@ MAP_TYPES: Mapping[str, MapType] = {
     "normal": MapType("vector3", "", "raw"),
     "eye": MapType("color3", "srgb_texture", "sRGB"),
     "parts_colour": MapType("color3", "srgb_texture", "sRGB"),
-    "parts_cutout": MapType("color3", "srgb_texture", "sRGB"),
     "parts_opacity": MapType("float", "", "raw"),
     "parts_roughness": MapType("float", "", "raw"),
     "parts_metalness": MapType("float", "", "raw"),

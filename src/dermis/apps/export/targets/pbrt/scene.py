@@ -26,7 +26,7 @@ from dermis.scene.lights import (
     StripeLight,
 )
 
-DirectiveParameters = Mapping[str, ArrayLike]
+DirectiveParameters = Mapping[str, ArrayLike | Sequence[str]]
 Lines = list[str]
 PICTURE_SIDE, SAMPLES_PER_PIXEL = 1024, 256
 _MAX_BOUNCES = 100
@@ -37,13 +37,15 @@ def directive(word: str, kind: str, parameters: DirectiveParameters | None = Non
 
     word : first word of the directive, such as "Material"
     kind : pbrt's name of the implementation, such as "subsurface"
-    parameters : text, Boolean, number or array of numbers by type and name, such as "float eta"
+    parameters : text, texts, Boolean, number or array of numbers by type and name, such as "float eta"
     """
     texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([word, f'"{kind}"', *texts])
 
 
-def _text(value: ArrayLike) -> str:
+def _text(value: ArrayLike | Sequence[str]) -> str:
+    if isinstance(value, list) and isinstance(value[0], str):
+        return " ".join(map(_text, value))
     if isinstance(value, str):
         return '"' + value.replace("\\", "_").replace('"', "_") + '"'
     if isinstance(value, bool):

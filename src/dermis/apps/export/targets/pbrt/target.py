@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -12,11 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.apps.export.fitting import fit_scale, scale_lengths
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
-from dermis.apps.export.targets.openpbr.materials import encode_map_files, file_prefix, map_arrays
+from dermis.apps.export.targets.openpbr.materials import (
+    PART_PREFIX,
+    encode_map_files,
+    file_prefix,
+    map_arrays,
+)
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
 from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
+from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Material
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion.boundary import fresnel, internal_moment
 from dermis.optics.media import SKIN_ETA
@@ -31,6 +39,12 @@ _ALBEDO_DENSITY = 8.0
 _TEXTURES_BY_ROLE = {
     "colour": ("spectrum", "sRGB", "reflectance"),
     "roughness": ("float", "linear", "roughness"),
+}
+_PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
+    "colour": ("spectrum", "sRGB"),
+    "alpha": ("float", "linear"),
+    "metalness": ("float", "linear"),
+    "opacity": ("float", "linear"),
 }
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
 _OPAQUE_ROUGHNESS = 0.3  # materials other than skin
@@ -153,6 +167,10 @@ class Pbrt(Target):
         "Colours become smooth spectra. The scene must stay in millimetres: the parameter scale multiplies "
         "mfp here, but in media given by sigma it multiplies sigma."
     )
+    part_limitations = (
+        "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
+        "mirrored."
+    )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths for which pbrt is closest to the reference."""
@@ -229,17 +247,19 @@ def _scene_lines(
     lines += [*camera_lines(scene.camera, f"{prefix}picture.exr"), "WorldBegin"]
     lines += [*light_lines(scene.lights, scene.environment), *textures.lines]
     files = dict(textures.files)
+    part_lines, part_files = _part_textures(subject, prefix)
+    lines, files = [*lines, *part_lines], files | part_files
     for number in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm)
-        is_skin = material.kind == "skin"
-        text = (
-            _skin_material(parameters, textures.material_textures)
-            if is_skin
-            else _opaque_material(material.colour)
-        )
-        shape = directive("Shape", "plymesh", {"string filename": name})
-        lines += ["AttributeBegin", text, shape, "AttributeEnd"]
+        roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
+        if material.kind == "skin":
+            texts = [_skin_material(parameters, textures.material_textures)]
+        else:
+            texts = _opaque_materials(material, roles, f"part_{number}", prefix)
+        alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
+        shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
+        lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
     return lines, files
 
 
@@ -258,9 +278,53 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return directive("Material", "subsurface", values)
 
 
-def _opaque_material(colour: tuple[float, float, float]) -> str:
-    roughness = {"float roughness": _OPAQUE_ROUGHNESS, "bool remaproughness": False}
-    return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **roughness})
+def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
+    """Return the directives of the material of a part that is not skin, with the pictures that it needs.
+
+    name : prefix of the names of materials that metal parts mix
+    prefix : prefix of the names of the image files
+    """
+    values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
+    if "colour" in roles:
+        values = {"texture reflectance": "parts_colour"}
+    if "alpha" in roles:
+        values["texture roughness"] = "parts_alpha"
+    else:
+        values["float roughness"] = _OPAQUE_ROUGHNESS
+    values["bool remaproughness"] = False
+    if "normal" in roles:
+        values["string normalmap"] = f"{prefix}{PART_PREFIX}normal.png"
+    if "metalness" not in roles:
+        return [directive("Material", "coateddiffuse", values)]
+    names = {f"{name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
+    return [
+        *(directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names),
+        directive(
+            "Material",
+            "mix",
+            {"string materials": [*names], "texture amount": "parts_metalness"},
+        ),
+    ]
+
+
+def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
+    """Return the directives of the textures of parts that are not skin, and their image files by name.
+
+    prefix : prefix of the names of the image files
+    """
+    lines, files = Lines(), dict[str, bytes]()
+    if subject.part_pictures is not None:
+        for role, data in subject.part_pictures.encode([*_PART_TEXTURES, "normal"]).items():
+            file = f"{prefix}{PART_PREFIX}{role}.png"
+            files[file] = data
+            if role in _PART_TEXTURES:
+                lines.append(_image_directive(f"{PART_PREFIX}{role}", *_PART_TEXTURES[role], file))
+    return lines, files
+
+
+def _image_directive(name: str, texture_type: str, encoding: str, file: str) -> str:
+    options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
+    return directive(f'Texture "{name}" "{texture_type}"', "imagemap", options)
 
 
 class SkinTextures(NamedTuple):
@@ -296,8 +360,7 @@ def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
             textures.material_textures["normalmap"] = "string", file
             continue
         texture_type, encoding, parameter = _TEXTURES_BY_ROLE[role]
-        options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
-        textures.lines.append(directive(f'Texture "{role}" "{texture_type}"', "imagemap", options))
+        textures.lines.append(_image_directive(role, texture_type, encoding, file))
         textures.material_textures[parameter] = "texture", role
     return textures
 
