@@ -104,7 +104,7 @@ def _strength(maps: PartMaps) -> float:
 _LEVELS: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
     "colour": _colours,
     "cutout": lambda maps: np.concatenate([_colours(maps), linear_levels(maps.colour[..., 3:])], axis=2),
-    "opacity": lambda maps: linear_levels(maps.colour[..., 3:] >= 0.5),
+    "opacity": lambda maps: linear_levels(np.float32(maps.colour[..., 3:] >= 0.5)),
     "roughness": lambda maps: linear_levels(maps.surface[..., 2:3]),
     "alpha": lambda maps: linear_levels(maps.surface[..., 2:3] ** 2),
     "metalness": lambda maps: linear_levels(maps.surface[..., 3:]),

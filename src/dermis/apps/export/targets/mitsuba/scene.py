@@ -14,6 +14,7 @@ from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.targets.maps import encode_map_exr
 from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
+from dermis.apps.export.targets.mitsuba.parts import PicturedParts
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
@@ -27,7 +28,8 @@ BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rou
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
-_OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
+OPAQUE_ROUGHNESS = 0.3
+"""Square root of Beckmann's m of materials that state no roughness."""
 
 
 class IsotropicMedium(NamedTuple):
@@ -50,14 +52,16 @@ class SkinAppearance(NamedTuple):
         for uniform skin
     dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : PLY file of each other material, by material index
+    coloured : PLY file with vertex colours of each other material without pictures, by material index
+    parts : other materials with pictures
     """
 
     media: Mapping[Boundary, IsotropicMedium]
     roughness: float | Floats
     transmittance: Floats | None = None
     dimming: Floats | None = None
-    opaque: Mapping[int, bytes] = MappingProxyType({})
+    coloured: Mapping[int, bytes] = MappingProxyType({})
+    parts: PicturedParts = PicturedParts()
 
 
 def scene_files(
@@ -81,8 +85,9 @@ def scene_files(
     for each in BOUNDARIES:
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
-    for index, content in appearance.opaque.items():
+    for index, content in {**appearance.coloured, **appearance.parts.meshes}.items():
         yield _opaque_file(index), content
+    yield from appearance.parts.files.items()
     if appearance.transmittance is not None and appearance.dimming is not None:
         yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
         yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
@@ -163,9 +168,10 @@ def _scene_elements(
     if scene.environment is not None:
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
-    for index in appearance.opaque:
-        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": opaque})
+    opaque = {"type": "principled", "roughness": OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    parts += appearance.parts.textures
+    surfaces = dict.fromkeys(appearance.coloured, opaque) | dict(appearance.parts.surfaces)
+    parts += [{"type": "ply", "filename": _opaque_file(k), "bsdf": own} for k, own in surfaces.items()]
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]

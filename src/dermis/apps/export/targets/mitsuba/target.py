@@ -7,6 +7,7 @@ which another medium is fitted.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,9 +25,11 @@ from dermis.apps.export.target import (
     replace_values,
     write_files,
 )
+from dermis.apps.export.targets.mitsuba.parts import pictured_parts
 from dermis.apps.export.targets.mitsuba.scene import (
     BOUNDARIES,
     MATCHED_REFLECTANCE,
+    OPAQUE_ROUGHNESS,
     Boundary,
     IsotropicMedium,
     SkinAppearance,
@@ -65,6 +68,10 @@ class Mitsuba(Target):
         "One medium per channel cannot represent layers, whose red light spreads differently. Through rough "
         "and smooth surfaces, point, spot and parallel lights cannot be sampled and are black. The matched "
         "surface has a constant reflectance, and colour maps change its lightness only. Hairs are omitted."
+    )
+    part_limitations = (
+        "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
+        "mirrored."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -109,9 +116,9 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and its meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        appearance = SkinAppearance(
-            media, *skin_textures(subject, colours), _opaque_meshes(scene, self.adapter)
-        )
+        parts = pictured_parts(scene.head, OPAQUE_ROUGHNESS)
+        coloured = _coloured_meshes(scene, self.adapter, parts.meshes)
+        appearance = SkinAppearance(media, *skin_textures(subject, colours), coloured, parts)
         return write_files(
             output, scene_files(scene, appearance, self._boundary, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
         )
@@ -146,14 +153,17 @@ def _boundary_factor(boundary: Boundary) -> float:
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
-def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
-    """Return a PLY file for each of the head's materials except skin, by material index."""
-    if all(material.kind == "skin" for material in scene.head.mesh.materials):
+def _coloured_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
+    """Return a PLY file for each material of the head except skin and pictured ones, by material index."""
+    mesh = scene.head.mesh
+    opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
+    coloured = [k for k in opaque if k not in pictured]
+    if not coloured:
         return {}
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    return coloured_meshes(Renderer(adapter), scene)
+    return coloured_meshes(Renderer(adapter), scene, coloured)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,17 @@ _POINT_KEYS, _VECTOR_KEYS = ("position", "center"), ("direction",)
 _PLUGINS_BY_KIND = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
     "shape": ("rectangle", "sphere", "disk", "ply"),
-    "bsdf": ("null", "diffuse", "principled", "dielectric", "roughdielectric", "mask", "roughconductor"),
+    "bsdf": (
+        "null",
+        "diffuse",
+        "principled",
+        "dielectric",
+        "roughdielectric",
+        "mask",
+        "roughconductor",
+        "normalmap",
+        "twosided",
+    ),
     "texture": ("bitmap", "mesh_attribute"),
     "medium": ("homogeneous",),
     "phase": ("isotropic", "hg"),
