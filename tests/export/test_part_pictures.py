@@ -54,31 +54,43 @@ def load_quietly(path: Path) -> Head:
         return load_head(path, subdivide=0)
 
 
-@pytest.fixture(scope="module")
-def avatar(tmp_path_factory: pytest.TempPathFactory) -> Subject:
-    path = full_egg().write(tmp_path_factory.mktemp("egg") / "egg.glb")
+def load_subject_quietly(path: Path) -> Subject:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DermisWarning)
         return load_subject(path, profile="skin1", subdivide=0)
+
+
+@pytest.fixture(scope="module")
+def avatar(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    return load_subject_quietly(full_egg().write(tmp_path_factory.mktemp("egg") / "egg.glb"))
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     """Return an egg whose collar has only a picture of its colour."""
-    path = Egg().write(tmp_path_factory.mktemp("egg") / "plain.glb")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DermisWarning)
-        return load_subject(path, profile="skin1", subdivide=0)
+    return load_subject_quietly(Egg().write(tmp_path_factory.mktemp("egg") / "plain.glb"))
 
 
-def emission_strength(subject: Subject) -> float:
-    assert subject.part_pictures is not None
-    return subject.part_pictures.emission_strength
+@pytest.fixture
+def decoded_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Decode USD in this process, as the start of another takes half a second."""
+    pytest.importorskip("pxr")
+    from dermis.formats.usd import read as usd_read
+    from dermis.formats.usd.decoder import decode
+
+    (tmp_path / "copies").mkdir()
+    monkeypatch.chdir(tmp_path / "copies")
+    monkeypatch.setattr(usd_read, "run_decoder", lambda module, request, *others: decode(request))
 
 
 def parts_of(subject: Subject) -> PartMaps:
     assert subject.head is not None and subject.head.maps.parts is not None
     return subject.head.maps.parts
+
+
+def emission_strength(subject: Subject) -> float:
+    emission = parts_of(subject).emission
+    return 0.0 if emission is None else float(emission.max())
 
 
 def cloth_texels(head: Head, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -121,7 +133,7 @@ def test_gltf_contains_the_pictures(avatar: Subject, tmp_path: Path) -> None:
         "KHR_materials_emissive_strength": {"emissiveStrength": pytest.approx(strength)}
     }
     names = [one["name"] for one in tree["images"]]
-    assert {"parts cutout", "parts surface", "parts normal", "parts emission"} <= set(names)
+    assert {"parts colour", "parts surface", "parts normal", "parts emission"} <= set(names)
     check_equal_parts(avatar, load_quietly(file))
 
 
@@ -146,6 +158,20 @@ def test_parts_that_state_no_roughness_keep_the_usual_one() -> None:
     assert pictures is not None
     assert pictures.roles(Material("hat", "opaque", has_maps=True)) == {"colour"}
     assert pictures.roles(Material("hat", "opaque", roughness=0.2)) == set()
+
+
+@pytest.mark.parametrize("name", ["out.glb", "out.usda"])
+def test_uniform_emission_needs_no_picture(name: str, tmp_path: Path, decoded_here: None) -> None:
+    egg = Egg()
+    egg.cloth |= {"emissiveFactor": [1.0, 0.5, 0.0]}
+    egg.cloth["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": 3.0}}
+    egg.tree["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+    subject = load_subject_quietly(egg.write(tmp_path / "egg.glb"))
+    assert parts_of(subject).emission is None
+    export_skin(subject, "usd" if name.endswith("a") else "gltf", tmp_path / name)
+    assert not list(tmp_path.glob("*emission*"))
+    (shirt,) = [one for one in load_quietly(tmp_path / name).mesh.materials if one.has_maps]
+    assert shirt.emission == pytest.approx((3.0, 1.5, 0.0), rel=1e-5)
 
 
 def test_blender_imports_a_head_with_pictures(avatar: Subject, tmp_path: Path) -> None:
@@ -174,17 +200,8 @@ def test_pages_contain_the_pictures(avatar: Subject, target: str, tmp_path: Path
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdz"])
-def test_usd_is_read_back(
-    avatar: Subject, suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("pxr")
-    from dermis.formats.usd import read as usd_read
-    from dermis.formats.usd.decoder import decode
-
+def test_usd_is_read_back(avatar: Subject, suffix: str, tmp_path: Path, decoded_here: None) -> None:
     export_skin(avatar, "usd", tmp_path / f"out{suffix}")
-    (tmp_path / "copies").mkdir()
-    monkeypatch.chdir(tmp_path / "copies")
-    monkeypatch.setattr(usd_read, "run_decoder", lambda module, request, *others: decode(request))
     check_equal_parts(avatar, load_quietly(tmp_path / f"out{suffix}"))
 
 

@@ -38,9 +38,9 @@ class PartPictures:
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
     def roles(self, material: Material) -> set[PartRole]:
-        """Return the roles of the pictures that a part needs; a uniform default value needs none."""
-        is_cut, is_rough = material.opacity_cutoff > 0.0, material.roughness is not None
-        is_metal = material.metalness > 0.0
+        """Return the roles of the pictures that a part needs."""
+        is_cut, is_metal = material.opacity_cutoff > 0.0, material.metalness > 0.0
+        is_rough = material.roughness is not None
         needed: dict[PartRole, bool] = {
             "colour": True,
             "cutout": is_cut,
@@ -62,10 +62,15 @@ class PartPictures:
         with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
-    @property
-    def emission_strength(self) -> float:
-        """Return the radiance of a level of 1 in the picture of the emission."""
-        return _strength(self.maps)
+    def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
+        """Return the largest radiance that a part emits, and the colour by which its picture is multiplied.
+
+        A part without such a picture emits this colour.
+        """
+        if self.maps.emission is not None:
+            return float(self.maps.emission.max()), (1.0, 1.0, 1.0)
+        strength = max(material.emission)
+        return strength, tuple(value / strength for value in material.emission)
 
     @cached_property
     def _has_normals(self) -> bool:
@@ -94,17 +99,13 @@ def _surface(maps: PartMaps) -> Bytes:
 
 def _emission(maps: PartMaps) -> Bytes:
     assert maps.emission is not None
-    return encode_srgb8(maps.emission / np.float32(_strength(maps)))
-
-
-def _strength(maps: PartMaps) -> float:
-    return 0.0 if maps.emission is None else float(maps.emission.max())
+    return encode_srgb8(maps.emission / maps.emission.max())
 
 
 _LEVELS: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
     "colour": _colours,
     "cutout": lambda maps: np.concatenate([_colours(maps), linear_levels(maps.colour[..., 3:])], axis=2),
-    "opacity": lambda maps: linear_levels(np.float32(maps.colour[..., 3:] >= 0.5)),
+    "opacity": lambda maps: np.uint8(255) * (maps.colour[..., 3:] >= 0.5),
     "roughness": lambda maps: linear_levels(maps.surface[..., 2:3]),
     "alpha": lambda maps: linear_levels(maps.surface[..., 2:3] ** 2),
     "metalness": lambda maps: linear_levels(maps.surface[..., 3:]),

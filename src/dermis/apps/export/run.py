@@ -211,8 +211,8 @@ def export_skin(
         subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
-    if limitations := target.limitations_of_parts(subject):
-        notify(f"{subject.name}: {limitations}")
+    if subject.part_pictures is not None and target.part_limitations:
+        notify(f"{subject.name}: {target.part_limitations}")
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
@@ -225,6 +225,7 @@ def export_skin(
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
     """Return the report of an export without writing any file: parameters and predicted errors."""
+    own_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
         curve_error(subject.curve, target.predicted_curve(one, subject, version))
@@ -242,7 +243,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
         d_mm=fit_burley_width(subject.curve),
         error=errors[0],
         naive_error=errors[1],
-        limitations=" ".join(filter(None, (target.limitations, target.limitations_of_parts(subject)))),
+        limitations=" ".join([target.limitations, *own_limitations]).rstrip(),
         untested=target.untested,
     )
 

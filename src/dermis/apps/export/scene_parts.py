@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import notify
+from dermis.mesh.mesh import Mesh
 from dermis.scene.lights import Light
 
 
@@ -28,6 +29,20 @@ def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Ligh
     replacement = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
     notify(f"{culprit} has no {light.kind} light, so it becomes a {replacement.kind} light")
     return replacement
+
+
+def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float], *, v_up: bool) -> bytes:
+    """Return selected triangles of a mesh as a binary PLY file with normals and uv.
+
+    faces : (t,) mask of the selected triangles
+    centre_mm : (3,) point that becomes the origin of the file [mm]
+    v_up : whether v points upwards
+    """
+    vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
+    u, v = mesh.uv[vertex].astype("<f4").T
+    positions = mesh.positions[vertex] - np.asarray(centre_mm)
+    uv = np.column_stack([u, 1.0 - v if v_up else v])
+    return encode_ply(corner.reshape(-1, 3), positions, mesh.normals[vertex], uv)
 
 
 def encode_ply(

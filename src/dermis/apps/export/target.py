@@ -197,21 +197,6 @@ class Target(ABC):
             )
         return version
 
-    def limitations_of_parts(self, subject: Subject) -> str:
-        """Return the limitations that concern parts that are not skin; empty if there are none.
-
-        Parameters
-        ----------
-        subject : Subject
-            Skin to export.
-
-        Returns
-        -------
-        str
-            `part_limitations` for heads with pictures of such parts.
-        """
-        return "" if subject.part_pictures is None else self.part_limitations
-
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
         """Return the path of the main file: the output itself, or a file in it if it is a folder.
 

@@ -122,20 +122,20 @@ def surface_material(
 
 
 def part_pictures(parts: PartPictures) -> dict[str, bytes]:
-    """Return the PNG files of parts that are not skin, by name."""
+    """Return the PNG files of parts that are not skin, by name; the colour has alpha where parts need it."""
     found = parts.encode(("cutout", "surface", "normal", "emission"))
-    colour = {} if "cutout" in found else parts.encode(("colour",))
-    return {_part_picture(role): data for role, data in {**colour, **found}.items()}
+    colour = {"colour": found.pop("cutout")} if "cutout" in found else parts.encode(("colour",))
+    return {f"parts {role}": data for role, data in {**colour, **found}.items()}
 
 
-def part_material(material: Material, parts: PartPictures, pictures: Mapping[str, bytes]) -> Tree:
+def part_material(material: Material, parts: PartPictures) -> Tree:
     """Return the glTF material of a part with the pictures that `part_pictures` returns.
 
     Its textures reference pictures by name, as {"index": name}.
     """
     roles = parts.roles(material)
     surface: Tree = {
-        "baseColorTexture": _part_texture("cutout" if _part_picture("cutout") in pictures else "colour"),
+        "baseColorTexture": _part_texture("colour"),
         "metallicFactor": float("metalness" in roles),
         "roughnessFactor": 1.0 if "roughness" in roles else _usual_roughness(material),
     }
@@ -147,19 +147,17 @@ def part_material(material: Material, parts: PartPictures, pictures: Mapping[str
     if "normal" in roles:
         gltf["normalTexture"] = _part_texture("normal")
     if "emission" in roles:
-        strength = parts.emission_strength
-        gltf |= {"emissiveTexture": _part_texture("emission"), "emissiveFactor": [min(strength, 1.0)] * 3}
+        gltf["emissiveTexture"] = _part_texture("emission")
+    if max(material.emission) > 0.0:
+        strength, colour = parts.emission(material)
+        gltf["emissiveFactor"] = [min(strength, 1.0) * value for value in colour]
         if strength > 1.0:
             gltf["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
     return gltf
 
 
-def _part_picture(role: PartRole) -> str:
-    return f"parts {role}"
-
-
 def _part_texture(role: PartRole) -> Tree:
-    return {"index": _part_picture(role)}
+    return {"index": f"parts {role}"}
 
 
 def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:

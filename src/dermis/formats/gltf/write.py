@@ -117,7 +117,7 @@ def _primitive_sources(
         if eye >= 0:
             materials.append(eye_material(own))
         elif part_maps is not None and own.has_maps:
-            materials.append(part_material(own, part_maps, pictures))
+            materials.append(part_material(own, part_maps))
         else:
             materials.append(surface_material(own, pictures, roles, roughness))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):

@@ -14,11 +14,11 @@ from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.targets.maps import encode_map_exr
 from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
-from dermis.apps.export.targets.mitsuba.parts import PicturedParts
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
+from dermis.formats.part_pictures import PartRole
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
@@ -28,8 +28,15 @@ BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rou
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
-OPAQUE_ROUGHNESS = 0.3
-"""Square root of Beckmann's m of materials that state no roughness."""
+_OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
+_PART_IOR = 1.5  # of the metallic-roughness model
+_PART_INPUTS: Mapping[PartRole, str] = {
+    "colour": "base_color",
+    "roughness": "roughness",
+    "metalness": "metallic",
+}
+PART_ROLES: tuple[PartRole, ...] = (*_PART_INPUTS, "normal", "opacity")
+"""Roles of the pictures of parts that are not skin."""
 
 
 class IsotropicMedium(NamedTuple):
@@ -52,16 +59,18 @@ class SkinAppearance(NamedTuple):
         for uniform skin
     dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
         skin
-    coloured : PLY file with vertex colours of each other material without pictures, by material index
-    parts : other materials with pictures
+    opaque : PLY file of each other material, by material index
+    pictured : roles of the pictures of each material that has some, by material index
+    pictures : PNG files by role
     """
 
     media: Mapping[Boundary, IsotropicMedium]
     roughness: float | Floats
     transmittance: Floats | None = None
     dimming: Floats | None = None
-    coloured: Mapping[int, bytes] = MappingProxyType({})
-    parts: PicturedParts = PicturedParts()
+    opaque: Mapping[int, bytes] = MappingProxyType({})
+    pictured: Mapping[int, set[PartRole]] = MappingProxyType({})
+    pictures: Mapping[PartRole, bytes] = MappingProxyType({})
 
 
 def scene_files(
@@ -85,9 +94,9 @@ def scene_files(
     for each in BOUNDARIES:
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
-    for index, content in {**appearance.coloured, **appearance.parts.meshes}.items():
+    for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
-    yield from appearance.parts.files.items()
+    yield from ((_part_file(role), content) for role, content in appearance.pictures.items())
     if appearance.transmittance is not None and appearance.dimming is not None:
         yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
         yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
@@ -168,10 +177,14 @@ def _scene_elements(
     if scene.environment is not None:
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    opaque = {"type": "principled", "roughness": OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
-    parts += appearance.parts.textures
-    surfaces = dict.fromkeys(appearance.coloured, opaque) | dict(appearance.parts.surfaces)
-    parts += [{"type": "ply", "filename": _opaque_file(k), "bsdf": own} for k, own in surfaces.items()]
+    opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    for role in appearance.pictures:
+        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_file(role)}
+        parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
+    for index in appearance.opaque:
+        roles = appearance.pictured.get(index)
+        bsdf = opaque if roles is None else _part_surface(roles)
+        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
@@ -200,6 +213,24 @@ def _skin_elements(
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
         parts.append({**shape, "interior": xml.Ref("skin_medium")})
     return [xml.object_element(part, "", backend) for part in parts]
+
+
+def _part_surface(roles: set[PartRole]) -> SceneDict:
+    """Return Mitsuba's description of the surface of a part that is not skin, with pictures."""
+    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
+    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
+    if "normal" in roles:
+        bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
+    bsdf = {"type": "twosided", "bsdf": bsdf}
+    return {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf} if "opacity" in roles else bsdf
+
+
+def _part_texture(role: PartRole) -> xml.Ref:
+    return xml.Ref(f"parts_{role}")
+
+
+def _part_file(role: PartRole) -> str:
+    return f"textures/{_part_texture(role).name}.png"
 
 
 def _opaque_file(index: int) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
@@ -25,16 +26,16 @@ from dermis.apps.export.target import (
     replace_values,
     write_files,
 )
-from dermis.apps.export.targets.mitsuba.parts import pictured_parts
 from dermis.apps.export.targets.mitsuba.scene import (
     BOUNDARIES,
     MATCHED_REFLECTANCE,
-    OPAQUE_ROUGHNESS,
+    PART_ROLES,
     Boundary,
     IsotropicMedium,
     SkinAppearance,
     scene_files,
 )
+from dermis.formats.part_pictures import PartRole
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.half_space import HalfSpaceKind, half_space, tabulated_albedo
 from dermis.optics.media import Floats
@@ -116,9 +117,10 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and its meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        parts = pictured_parts(scene.head, OPAQUE_ROUGHNESS)
-        coloured = _coloured_meshes(scene, self.adapter, parts.meshes)
-        appearance = SkinAppearance(media, *skin_textures(subject, colours), coloured, parts)
+        pictured = _pictured_parts(subject)
+        opaque = _opaque_meshes(scene, self.adapter, pictured)
+        pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
+        appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
         return write_files(
             output, scene_files(scene, appearance, self._boundary, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
         )
@@ -153,17 +155,31 @@ def _boundary_factor(boundary: Boundary) -> float:
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
-def _coloured_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
-    """Return a PLY file for each material of the head except skin and pictured ones, by material index."""
-    mesh = scene.head.mesh
-    opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
-    coloured = [k for k in opaque if k not in pictured]
-    if not coloured:
+def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
+    """Return the pictures of each part that has some, by material index, without eyes that are modelled."""
+    head, pictures = subject.head_or_ball, subject.part_pictures
+    if pictures is None:
         return {}
+    used = {*np.unique(head.mesh.material).tolist()} - {*(head.eyes.material.tolist() if head.eyes else ())}
+    roles = {k: pictures.roles(head.mesh.materials[k]) for k in sorted(used)}
+    return {k: own for k, own in roles.items() if own}
+
+
+def _opaque_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
+    """Return a PLY file for each of the head's materials except skin, by material index.
+
+    pictured : materials with pictures
+    """
+    mesh, centre = scene.head.mesh, scene.head.centre_mm
+    opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
+    meshes = {k: mesh_ply(mesh, mesh.material == k, centre, v_up=False) for k in opaque if k in pictured}
+    if len(meshes) == len(opaque):
+        return meshes
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    return coloured_meshes(Renderer(adapter), scene, coloured)
+    coloured = [k for k in opaque if k not in pictured]
+    return meshes | coloured_meshes(Renderer(adapter), scene, coloured)
 
 
 @dataclass(frozen=True, eq=False)

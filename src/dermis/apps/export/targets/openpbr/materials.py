@@ -164,8 +164,8 @@ def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial
     roles = pictures.roles(material)
     maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
     values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
-    if "emission" in roles:
-        values["emission_luminance"] = pictures.emission_strength
+    if max(material.emission) > 0.0:
+        values["emission_luminance"], values["emission_color"] = pictures.emission(material)
     return OpenPbrMaterial(
         material.name, {key: value for key, value in values.items() if key not in maps}, maps
     )

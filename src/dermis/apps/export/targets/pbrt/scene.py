@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.scene_parts import encode_ply, supported_lights
+from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
 from dermis.environment.panorama import UNIFORM
-from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (
@@ -89,18 +88,6 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
     elif environment is not None:
         lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
     return lines
-
-
-def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
-    """Return selected triangles of a mesh as a binary PLY file with normals and uv (v upwards).
-
-    faces : (t,) mask of the selected triangles
-    centre_mm : (3,) point that becomes the origin of the file [mm]
-    """
-    vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
-    uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
-    positions = mesh.positions[vertex] - np.asarray(centre_mm)
-    return encode_ply(corner.reshape(-1, 3), positions, mesh.normals[vertex], uv)
 
 
 def _distance(light: PointLight) -> float:

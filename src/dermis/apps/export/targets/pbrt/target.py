@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.export.fitting import fit_scale, scale_lengths
+from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
 from dermis.apps.export.targets.openpbr.materials import (
@@ -20,7 +21,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     map_arrays,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines
 from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -251,7 +252,7 @@ def _scene_lines(
     lines, files = [*lines, *part_lines], files | part_files
     for number in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm)
+        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm, v_up=True)
         roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]

@@ -134,9 +134,11 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
     """
     types = Sdf.ValueTypeNames
     surface = _add_shader(material, "preview", "UsdPreviewSurface")
+    luminance = float(np.max(definition.values.get("emission_luminance", 0.0)))
     for key, value in definition.values.items():
         if key in _PREVIEW_INPUTS and not (key == "base_color" and "subsurface_color" in definition.maps):
-            _set_input(surface, _PREVIEW_INPUTS[key], value)
+            radiance = tuple(luminance * np.array(value)) if key == "emission_color" else value
+            _set_input(surface, _PREVIEW_INPUTS[key], radiance)
     uv = None
     for key, role in definition.maps.items():
         if key not in _PREVIEW_INPUTS:
@@ -157,13 +159,10 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
             texture.CreateInput("scale", types.Float4).Set((2.0, 2.0, 2.0, 1.0))
             texture.CreateInput("bias", types.Float4).Set((-1.0, -1.0, -1.0, 0.0))
         if role == "parts_emission":
-            texture.CreateInput("scale", types.Float4).Set(
-                (*[definition.values["emission_luminance"]] * 3, 1.0)
-            )
+            texture.CreateInput("scale", types.Float4).Set((luminance, luminance, luminance, 1.0))
         if is_cut:
-            surface.CreateInput("opacity", types.Float).ConnectToSource(
-                texture.CreateOutput("a", types.Float)
-            )
+            opacity = texture.CreateOutput("a", types.Float)
+            surface.CreateInput("opacity", types.Float).ConnectToSource(opacity)
             surface.CreateInput("opacityThreshold", types.Float).Set(0.5)
         scalar = map_type.type == "float"
         output = texture.CreateOutput("r" if scalar else "rgb", types.Float if scalar else types.Float3)
