@@ -246,10 +246,9 @@ def _scene_lines(
     textures = skin_textures(subject, prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
     lines += [*camera_lines(scene.camera, f"{prefix}picture.exr"), "WorldBegin"]
-    lines += [*light_lines(scene.lights, scene.environment), *textures.lines]
-    files = dict(textures.files)
     part_lines, part_files = _part_textures(subject, prefix)
-    lines, files = [*lines, *part_lines], files | part_files
+    lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
+    files = textures.files | part_files
     for number in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm, v_up=True)
@@ -298,14 +297,10 @@ def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefi
     if "metalness" not in roles:
         return [directive("Material", "coateddiffuse", values)]
     names = {f"{name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
-    return [
-        *(directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names),
-        directive(
-            "Material",
-            "mix",
-            {"string materials": [*names], "texture amount": "parts_metalness"},
-        ),
-    ]
+    mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
+    mixed = directive("Material", "mix", {**mix, "texture amount": "parts_metalness"})
+    named = [directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names]
+    return [*named, mixed]
 
 
 def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
