@@ -124,8 +124,10 @@ def surface_material(
 def part_pictures(parts: PartPictures) -> dict[str, bytes]:
     """Return the PNG files of parts that are not skin, by name; the colour has alpha where parts need it."""
     found = parts.encode(("cutout", "surface", "normal", "emission"))
-    colour = {"colour": found.pop("cutout")} if "cutout" in found else parts.encode(("colour",))
-    return {f"parts {role}": data for role, data in {**colour, **found}.items()}
+    if "cutout" not in found:
+        found |= parts.encode(("colour",))
+    names = {role: f"parts {'colour' if role == 'cutout' else role}" for role in found}
+    return {names[role]: data for role, data in found.items()}
 
 
 def part_material(material: Material, parts: PartPictures) -> Tree:
