@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, compute_form_factors
-from dermis.mesh.mesh import Mesh, build_mesh
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
 pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
@@ -38,7 +38,7 @@ def room() -> Mesh:
         pair = np.array([[0, 1, 2], [0, 2, 3]])
         triangles.append(4 * face + (pair[:, ::-1] if turned else pair))
     made = np.concatenate(points), np.concatenate(uv), np.concatenate(triangles)
-    return build_mesh(*made, np.zeros(12, int), (SKIN,))
+    return build_mesh(*made, np.zeros(12, int), SKIN)
 
 
 def found(mesh: Mesh) -> FormFactors:
@@ -68,6 +68,25 @@ def test_the_faces_of_a_room() -> None:
     expected[np.arange(6), np.arange(6)], expected[np.arange(6), opposite] = 0.0, OPPOSITE
     assert np.abs(given - expected).max() < CLOSE
     assert np.abs(given.sum(axis=1) - 1.0).max() < CLOSE
+
+
+def test_parts_that_are_cut_out_do_not_block_light() -> None:
+    mesh = room()
+    card = Material("hair", "opaque", has_maps=True, opacity_cutoff=0.5)
+    x, y, z = np.eye(3)
+    corners = mesh.positions[mesh.triangles]
+    across = np.stack([0.9 * (one - x) for one in (y + z, y - z, -y - z)])
+    extended = build_mesh(
+        np.concatenate([mesh.positions, across + x]),
+        np.concatenate([mesh.uv, np.zeros((3, 2))]),
+        np.concatenate([mesh.triangles, [[24, 25, 26]]]),
+        np.append(np.zeros(len(corners), int), 1),
+        (*SKIN, card),
+    )
+    without, with_card = found(mesh), found(extended)
+    solid = replace(extended, materials=(*SKIN, replace(card, opacity_cutoff=0.0)))
+    np.testing.assert_array_equal(without.cell_factor, with_card.cell_factor)
+    assert len(found(solid).cell_factor) != len(without.cell_factor)
 
 
 def test_places_lie_on_their_patch() -> None:

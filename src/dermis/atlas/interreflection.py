@@ -67,11 +67,12 @@ class FormFactors:
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
     """Return the form factors that `compute_form_factors` computes, cached on disk."""
+    cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
     digest = hashlib.sha256(
         f"{_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
         f"{LINE_BUNDLES} {LINES_PER_SIDE} {_MIN_FORM_FACTOR}".encode()
     )
-    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped)):
+    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped), *cut_out):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [field.name for field in fields(FormFactors)]
 
@@ -90,7 +91,8 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     another is the fraction of the lines leaving the first patch that meet the second one next.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none
+    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, except those
+        cut out by their opacity, such as cards of hair, which are left out
     """
     facing, left = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
     if len(facing):
@@ -107,7 +109,9 @@ def _trace_lines(
     bundles : number of bundles of parallel lines, one per direction
     lines : number of lines along each side of a bundle
     """
-    used, corner = np.unique(mesh.triangles, return_inverse=True)
+    solid = ~mesh.cut_out
+    corner_uv, mapped = corner_uv[solid], mapped[solid]
+    used, corner = np.unique(mesh.triangles[solid], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)

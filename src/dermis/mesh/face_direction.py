@@ -11,8 +11,8 @@ from dermis.mesh.geometry import cross_columns, dot_columns
 
 Direction = Literal["x", "z", "-x", "-z"]
 _MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
-# Of the eyes, relative to their distance from each other:
-_MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.25, 0.25, 3.0
+# Of the eyes, relative to their width together:
+_MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MIN_GAP, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.1, 0.25, 0.25, 3.0
 # Of the head, relative to its height:
 _HEAD_WIDTH = 0.68  # of the head alone, without shoulders
 _DEPTHS = 0.5, 1.6  # smallest and largest
@@ -45,13 +45,15 @@ def _from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
         return None
     middle, spread = (eyes.min(axis=0) + eyes.max(axis=0)) / 2, np.ptp(eyes, axis=0)
     front = 2 if spread[0] > spread[2] else 0
-    distance = spread[2 - front]
+    width = spread[2 - front]
+    if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_GAP * width:
+        return None  # it is one eye
     offset = np.abs(points - middle)
-    near = points[(offset[:, 1] < distance / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _REACH * distance)]
-    if spread[front] > _MAX_EYE_DEPTH * distance or spread[1] > _MAX_EYE_HEIGHT * distance or not len(near):
+    near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _REACH * width)]
+    if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
         return None
     shift = middle - (near.min(axis=0) + near.max(axis=0)) / 2
-    if abs(shift[front]) < _MIN_AHEAD * distance or abs(shift[2 - front]) > _MAX_ASIDE * distance:
+    if abs(shift[front]) < _MIN_AHEAD * width or abs(shift[2 - front]) > _MAX_ASIDE * width:
         return None
     return _direction(front, shift[front])
 
