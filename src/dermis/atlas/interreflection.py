@@ -109,9 +109,9 @@ def _trace_lines(
     bundles : number of bundles of parallel lines, one per direction
     lines : number of lines along each side of a bundle
     """
-    solid = ~mesh.cut_out
-    corner_uv, mapped = corner_uv[solid], mapped[solid]
-    used, corner = np.unique(mesh.triangles[solid], return_inverse=True)
+    blocks = ~mesh.cut_out
+    corner_uv, mapped = corner_uv[blocks], mapped[blocks]
+    used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
