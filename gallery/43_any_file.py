@@ -25,8 +25,10 @@ def draw(studio):
         files = [write_avatar(studio, folder), write_pictures(scan, folder)]
         files += [write_vertex_colours(scan, folder), *(unpack_mesh(one, folder) for one in ("hand", "body"))]
         avatar, three, coloured, hand, body = (studio.head(str(file)) for file in files)
-    near = dermis.Camera(position=(110, 20, 500), target=(18, 5, 0), frame_mm=120)
-    scenes = {"avatar": (avatar, dermis.portrait(avatar)), "lashes, brows and hair": (avatar, near)}
+    side = dermis.Camera(position=(600, 40, 620), target=(0, -35, -50), frame_mm=330)
+    near = dermis.Camera(position=(60, 20, 500), target=(4, 0, 0), frame_mm=95)
+    scenes = {"avatar": (avatar, dermis.portrait(avatar)), "from the side": (avatar, side)}
+    scenes["cards of lashes and brows"] = avatar, near
     scenes["a picture for each of three materials"] = three, dermis.portrait(three)
     scenes["colours of vertices, no uv"] = coloured, dermis.portrait(coloured)
     scenes |= {name: (one, dermis.full_body(one)) for name, one in (("hand", hand), ("body", body))}
