@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from dermis.environment.lobe_harmonics import (
     IsotropicLobes,
@@ -163,6 +162,8 @@ def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbou
     start : initial parameters (4, 5)
     neighbours : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
     """
+    from scipy.optimize import least_squares
+
     scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
     free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
