@@ -31,6 +31,7 @@ from dermis.frame.features.surface.maps import detail_bindings, has_parts, uploa
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
+from dermis.frame.features.translucency.pair_shape import pair_positions_mm
 from dermis.frame.features.visibility.layers import ViewLayers, make_layers
 from dermis.frame.lights.environment import environment_record
 from dermis.frame.limits import check_limits
@@ -143,11 +144,9 @@ def _shared_bindings(
     """Return the shader resources that all atlas layouts share, apart from maps and lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
-    curvature = shapes.curvature
+    curvature, light_count = shapes.curvature, sum(request.light_part_counts)
     return {
-        "skin": skin_record(
-            program, skin, request.head.maps, request.profile, sum(request.light_part_counts)
-        ),
+        "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
         "environment": environment_record(program, environment, skin, total, request.has_occlusion),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
@@ -194,7 +193,7 @@ def _make_layout(
         upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=number
     )
     tables, settings = shapes.tables, request.settings
-    at_rest = partial(rest_geometry, memo, device, geometry, tables, head, request.pair_positions_mm, index)
+    at_rest = partial(rest_geometry, memo, device, geometry, tables, head)
     bindings: MutableBindings = {**geometry.resources, **shared}
     gutter_update = None
     if shapes.rest_shape and textures.gutter:
@@ -211,7 +210,8 @@ def _make_layout(
         occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=number)
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
-        posed, rest = ({**one.resources, **textures.resources} for one in (geometry, at_rest()))
+        searched = at_rest(pair_positions_mm(memo, request), index)
+        posed, rest = ({**one.resources, **textures.resources} for one in (geometry, searched))
         blurred = request.split.blurred_mm2, request.split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
         translucency = make_translucency(memo, device, posed, rest, atlas, *blurred, *tissue, owner=number)

@@ -64,14 +64,6 @@ class FrameRequest:
         return self.topology is not self.head.bare
 
     @property
-    def pair_positions_mm(self) -> NDArray[np.float32] | None:
-        """Return the control points at rest in which translucent pairs are searched [mm].
-
-        None means those of the topology: people of one template share its pairs, only the weights differ.
-        """
-        return None if self.is_shared else self.rest_positions_mm
-
-    @property
     def albedo_from_map(self) -> bool:
         """Return whether the colour map alone determines the albedo."""
         return self.skin.albedo == "map"

@@ -22,7 +22,6 @@ from dermis.mesh.skeleton import Skeleton
 _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
 _REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
 _CLOSE_MM = 0.5
-_MAX_CORNERS = 512
 _BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction, of which a pose may bring another one outermost
 _RANDOM_POSES, _SEED = 128, 0
@@ -121,13 +120,6 @@ def rig_outline(
     weights = np.zeros((len(bones), len(points)), np.float32)
     np.add.at(weights, (number.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
     return RigOutline(rest, delta, weights, bones.astype(np.intp))
-
-
-def hull_corners(positions: Floats) -> Intp:
-    """Return indices of convex hull corners of points (p, 3); of more than 512, the most extreme ones."""
-    corners = hull_vertices(positions)
-    few = len(corners) <= _MAX_CORNERS
-    return corners if few else corners[extreme_points(positions[corners], _MAX_CORNERS)]
 
 
 def extreme_points(positions: Floats, count: int = _FEW_DIRECTIONS) -> Intp:

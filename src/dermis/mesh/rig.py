@@ -13,7 +13,7 @@ from dermis.base.disk import cached_array
 from dermis.base.summary import ShortRepr
 from dermis.mesh.eyeball import LidContact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
-from dermis.mesh.outline import RigOutline, find_outline_points, hull_corners, rig_outline
+from dermis.mesh.outline import RigOutline, extreme_points, find_outline_points, rig_outline
 from dermis.mesh.rotations import rigid_motion
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
@@ -146,8 +146,7 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If the rest positions in `motion` differ from those of the rig, the corners of their convex hull are
-        added.
+        If the rest positions in `motion` differ from those of the rig, their extreme points are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -160,7 +159,7 @@ class Rig(ShortRepr):
         """
         points, outline = self._last_outline
         if not np.array_equal(positions[points].T, outline.rest_mm[:3]):
-            points = np.union1d(self._outline_points, hull_corners(positions))
+            points = np.union1d(self._outline_points, extreme_points(positions))
             outline = rig_outline(positions, self.targets, self.skeleton, points)
             vars(self)["_last_outline"] = points, outline
         return outline
@@ -172,7 +171,7 @@ class Rig(ShortRepr):
     @cached_property
     def _outline_points(self) -> Intp:
         if self.template is not None:
-            return np.union1d(self.template._outline_points, hull_corners(self.positions_mm))
+            return np.union1d(self.template._outline_points, extreme_points(self.positions_mm))
         targets, skeleton = self.targets, self.skeleton
         sources: list[Numbers] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
         if skeleton is not None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache, partial
 from itertools import count
 
 import numpy as np
@@ -102,34 +104,35 @@ def make_translucency(
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).pairs_for_width(widest_mm)
+    cells = memo.get(_cell_divisions, atlas, owner=owner)(widest_mm)
+    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).find(cells)
     buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
     return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
 
 
+def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
+    """Return a function that divides an atlas into cells for a width, and caches the last few divisions."""
+    return lru_cache(_CACHE_SIZE)(partial(divide_into_cells, atlas))
+
+
 class PairCache:
-    """Cache of the translucent pairs of a surface, for the last few widths of the widest Gaussian.
+    """Cache of the translucent pairs of a surface, for the last few divisions into cells.
 
     surface : resources of geometry.wgsl and of the atlas, for the search
     """
 
     def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
         self._device, self._surface, self._atlas = device, surface, atlas
-        self._cache: dict[float, PairBuffers] = {}
+        self._cache: dict[Cells, PairBuffers] = {}
 
-    def pairs_for_width(self, widest_mm: float) -> PairBuffers:
-        """Return the pairs that are near enough for the widest Gaussian.
-
-        widest_mm : standard deviation of that Gaussian [mm]
-        """
-        pairs = self._cache.pop(widest_mm, None)
+    def find(self, cells: Cells) -> PairBuffers:
+        """Return the pairs that are near enough for the widest Gaussian of the cells."""
+        pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:
                 self._cache.pop(next(iter(self._cache)))
-            pairs = find_pairs(
-                self._device, self._surface, self._atlas, divide_into_cells(self._atlas, widest_mm)
-            )
-        self._cache[widest_mm] = pairs
+            pairs = find_pairs(self._device, self._surface, self._atlas, cells)
+        self._cache[cells] = pairs
         return pairs
 
 
