@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -15,6 +15,7 @@ from dermis.apps.validation.pages import DOCS, add_tests_to_path, data_file, fil
 from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
+from dermis.frame.features.translucency.pair_shape import StrainGauge
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Texture, download
 from dermis.human.expressions import expression
@@ -46,6 +47,14 @@ EXPRESSIONS: dict[str, dict[str, float]] = {
     "jaw aside": expression("jaw-aside"),
     "wink": expression("wink"),
 }
+DEFORMATIONS: dict[str, Callable[[Points], Points]] = {
+    "10 % narrower": lambda points: (points * [0.9, 1.0, 1.0]).astype(np.float32),
+    "15 % larger": lambda points: (points * 1.15).astype(np.float32),
+    "waves of 1.6 mm": lambda points: (points + 1.6 * np.sin(points[:, [1, 2, 0]] / 8)).astype(np.float32),
+    "ears 20 % thinner": lambda points: _with_thinner_ears(points, 0.2),
+    "ears 40 % thinner": lambda points: _with_thinner_ears(points, 0.4),
+}
+"""Positions (p, 3) of a mesh sequence from those of the head at rest."""
 LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 OCCLUSION_ATLAS_SIDE = 512
@@ -70,6 +79,7 @@ def motion(adapter: str = "auto") -> None:
         expressions="\n".join(expression_rows(renderer, head, persons)),
         seams="\n".join(seam_rows(renderer, head, persons)),
         occlusions="\n".join(occlusion_table(renderer, head)),
+        deformations="\n".join(deformation_rows(renderer, dermis.load_head("lee_perry_smith", subdivide=0))),
         adapter=renderer.device.adapter.name,
     )
 
@@ -128,6 +138,21 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
         worst = {view: max(worst[view], errors[view]) for view in LIGHT_AND_CAMERA}
         yield f"| {name} | {100 * errors['front']:.2f} | {100 * errors['back']:.2f} |"
     yield f"| **worst** | **{100 * worst['front']:.2f}** | **{100 * worst['back']:.2f}** |"
+
+
+def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
+    """Yield Markdown rows, one per deformation: strain, and picture errors from front and back."""
+    gauge = StrainGauge(head)
+    for name, deform in DEFORMATIONS.items():
+        points = deform(head.positions_mm)
+        front, back = (picture_error(renderer, head, points, {}, view) for view in LIGHT_AND_CAMERA)
+        yield f"| {name} | {100 * gauge.strain(points):.0f} | {100 * front:.2f} | {100 * back:.2f} |"
+
+
+def _with_thinner_ears(points: Points, fraction: float) -> Points:
+    """Return points (p, 3) of which those beside the scan's head are scaled along z about its origin."""
+    ear = np.clip((np.abs(points[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
+    return (points * (1.0 - ear * [0.0, 0.0, fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
