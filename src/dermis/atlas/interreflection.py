@@ -22,10 +22,10 @@ SAMPLES_PER_PATCH = 8
 """Number of sample points of a patch, at which its radiosity is computed."""
 # Number of directions of parallel lines; fewest and most lines along a bundle's side.
 LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
-_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # to find out whether any skin faces other skin
+_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # for a test whether any skin faces other skin
 _CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
-_MAX_TRACED_TRIANGLES = 300_000  # of finer meshes, points closer than some lines are merged
-_MERGED_LINES = 1.5
+_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES are merged
+_MERGED_LINES = 1.5  # distance below which points are merged, in distances between lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side

@@ -18,7 +18,7 @@ from dermis.images.filters import mip_chain
 from dermis.images.io import read_image
 from dermis.mesh.mesh import Mesh
 
-_STRIP_TEXELS = 1 << 22  # texels that are sampled at once, to limit memory
+_STRIP_TEXELS = 1 << 22  # texels that are sampled at a time, to limit memory
 _DEFAULTS: Mapping[Role, tuple[float, ...]] = {
     "colour": (1.0, 1.0, 1.0),
     "normal": (0.0, 0.0),
@@ -26,16 +26,16 @@ _DEFAULTS: Mapping[Role, tuple[float, ...]] = {
     "metalness": (1.0,),
     "emission": (1.0, 1.0, 1.0),
 }
-"""Values where a material has no picture, to which its factors apply."""
+"""Values of materials without a picture; the factors of the material multiply them."""
 
 
 @dataclass(frozen=True, eq=False)
 class PackedTextures:
     """Common layout and maps of several materials.
 
-    vertices, uv : (n,) and (n, 2) vertices of the mesh and their uv in the common maps
-    maps : (side, side, k) values by role, factors included; only roles that a picture or a factor sets
-    notes : sentences on what is not exact
+    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) their uv in the common maps
+    maps : (side, side, k) map of each role, multiplied by factors; only roles that a material sets
+    notes : sentences on loss of detail
     """
 
     vertices: Numbers
@@ -51,10 +51,10 @@ def pack_textures(
     members: Mask,
     required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
-    """Return the common layout and maps of some materials of a mesh.
+    """Return the common layout and maps of selected materials of a mesh.
 
-    surface, materials : of the file that the mesh comes from
-    members : (m,) materials of the mesh that share the maps
+    surface, materials : surface data and materials of the mesh's file
+    members : (m,) mask of the mesh's materials that share the maps
     required : roles that have a map even if no material has a picture for them
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
@@ -70,7 +70,7 @@ def pack_textures(
 
 @dataclass(frozen=True, eq=False)
 class _Baker:
-    """Maps over a layout of tiles."""
+    """Baker of maps for a layout of tiles."""
 
     mesh: Mesh
     surface: FileSurface
@@ -79,7 +79,7 @@ class _Baker:
     side: int
 
     def roles(self, required: Sequence[Role]) -> list[Role]:
-        """Return the roles for which a material has a picture, and those required."""
+        """Return the required roles and those for which a material has a picture."""
         used = {role for tile in self.tiles for role in self._material(tile).textures}
         return [role for role in _DEFAULTS if role in used or role in required]
 
@@ -99,7 +99,7 @@ class _Baker:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
     def _tile_values(self, tile: Tile, role: Role) -> Floats:
-        """Return the values (h, w, k) of a role over a tile, factors included."""
+        """Return the values (h, w, k) of a role on a tile's texels, multiplied by the material's factors."""
         material, (width, height) = self._material(tile), tile.size
         texture = material.textures.get(role)
         factor = _factor(material, role, self.surface.colours is not None)
@@ -124,7 +124,7 @@ class _Baker:
             values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
 
     def _sampled(self, tile: Tile, texture: Texture, role: Role) -> Floats:
-        """Return the values (h, w, k) of a picture over a tile."""
+        """Return a picture resampled to the texels of a tile, (h, w, k)."""
         picture = read_role(texture, role)
         base = base_texture(self._material(tile))
         if base is not None and base.mapping == texture.mapping:
@@ -137,7 +137,7 @@ class _Baker:
         return sample_points(picture, position, texture.wrap)
 
     def _interpolated(self, tile: Tile, values: Numbers) -> Floats:
-        """Return values of the tile's vertices (n, k) at its texels (h, w, k), continued beyond triangles."""
+        """Interpolate values (n, k) of a tile's vertices at its texels (h, w, k), with extrapolation."""
         from scipy.ndimage import distance_transform_edt
 
         width, height = tile.size
@@ -207,7 +207,7 @@ def _unit_range(image: Numbers) -> Floats:
 
 
 def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return a picture (h, w, k) at all pairs of positions u (w,) and v (h,), 0 to 1 within it, filtered."""
+    """Sample a picture with mip filtering on a grid of positions u (w,), v (h,) in [0, 1]: (h, w, k)."""
     step = (
         max(abs(float(u[-1] - u[0])) / max(len(u) - 1, 1), 1e-9),
         max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
@@ -232,7 +232,7 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
 
 
 def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return a picture (h, w, k) at positions (..., 2), 0 to 1 within it, interpolated."""
+    """Sample a picture by bilinear interpolation at positions (..., 2) in [0, 1]: (..., k)."""
     left, right, across = _neighbours(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
     top, bottom, down = _neighbours(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
     x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)
@@ -242,13 +242,13 @@ def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) ->
 
 
 def _reduced(picture: Floats, texels_per_sample: float) -> Floats:
-    """Return the mip level of a picture that has about one texel for each sample."""
+    """Return the mip level of a picture that has about one texel per sample."""
     level = int(np.floor(np.log2(max(texels_per_sample, 1.0)) + 0.1))
     return mip_chain(picture)[level] if level else picture
 
 
 def _neighbours(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
-    """Return the two texels around positions, 0 to 1 within a picture, and the weight of the second."""
+    """Return the two texels around each position in [0, 1] along one axis, and the weight of the second."""
     texel = position * size - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * size, np.rint(texel), texel)
     first = np.floor(texel)

@@ -54,7 +54,7 @@ def cached_arrays(
     """Return the arrays that `make` computes from `sources`, from the disk cache if they are there.
 
     parameters : text with everything else that the result depends on, part of the key
-    names : of the arrays in the result
+    names : names of the arrays in the result
     """
     sources = [sources] if isinstance(sources, np.ndarray) else sources
     return load_or_make("arrays", array_key(sources, parameters), names, make)
@@ -76,7 +76,7 @@ def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arr
     """Return arrays from the disk cache; without a valid entry, compute them with `make` and cache them.
 
     folder : name of a folder of the cache
-    names : of the arrays in the result
+    names : names of the arrays in the result
     """
     arrays = load_arrays(folder, key, names)
     if arrays is None:
@@ -211,7 +211,7 @@ def _read_block(path: Path, block: memoryview, offset: int) -> str:
     """Read a block of bytes of a file into memory and return its SHA-256.
 
     block : memory to be filled
-    offset : of the block in the file
+    offset : position of the block in the file [bytes]
     """
     with open_private_file(path) as file:
         file.seek(offset)

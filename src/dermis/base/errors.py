@@ -11,7 +11,7 @@ _MAX_NAME, _MAX_TEXT = 300, 400  # characters in a message
 
 
 class DermisError(Exception):
-    """Error that the caller can fix: the message says what was expected, what was found and what to do.
+    """Error that the caller can fix; the message says what was expected, what was received and what to do.
 
     The command line prints the message without a traceback and exits with status 2.
 
@@ -47,7 +47,7 @@ def notify(message: str) -> None:
 
 
 def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn:
-    """Raise a `DermisError` with what was expected, what was found and what to do.
+    """Raise a `DermisError` that says what was expected, what was received and what to do.
 
     The message is "culprit: expected EXPECTED, but ACTUAL. ADVICE."
 

@@ -1,4 +1,4 @@
-"""Properties of other programs' files and their treatment, as readers declare them for docs/formats.md."""
+"""Declarations of file properties and their treatment by the readers, from which docs/formats.md is built."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ no_effect = partial(_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
-    """Return the keys of properties with one of some treatments; of all properties without any given."""
+    """Return the keys of the properties with one of the given treatments; by default of all properties."""
     chosen = (one for one in properties if not treatments or one.treatment in treatments)
     return tuple(dict.fromkeys(key for one in chosen for key in one.keys))
 

@@ -23,9 +23,9 @@ from dermis.base.errors import DermisError, error_text, refuse
 
 MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
-MAX_TEXT_BYTES = 1 << 20  # of settings: scenes, lights, tables
+MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
-_MAX_BITS = 64  # of an integer, as in TOML; each can be converted to a float
+_MAX_BITS = 64  # of integers, as in TOML; all can be converted to float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
 _LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
@@ -39,7 +39,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
     expected : what the file should be, for error messages
     max_bytes : largest accepted size
-    name : of the file in error messages; by default its path
+    name : name of the file in error messages; by default its path
 
     Raises DermisError when the file is missing, not regular, too large or unreadable.
     """

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of the null device, for closed stdin, stdout, stderr
+_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # modes of the null devices that replace closed stdin,
+stdout and stderr
 
 
 class StandardStreams:

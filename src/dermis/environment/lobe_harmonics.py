@@ -62,7 +62,7 @@ class IsotropicLobes(NamedTuple):
 def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
     """Expand a specular lobe in spherical harmonics, as a fitting target.
 
-    cosine : of the angle between view and surface normal
+    cosine : cosine of the angle between view and surface normal
     m : roughness [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about it.

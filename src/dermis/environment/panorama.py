@@ -21,9 +21,9 @@ _MIN_ROWS, _MAX_ROWS = 256, 512
 """Rows of a loaded panorama: smaller ones are resampled for accurate integrals, larger ones averaged."""
 _MAX_RADIANCE = 1e12  # far above that of the sun; prevents overflow of single precision
 MAX_SUNS = 4
-_PEAK_FACTOR = 32.0  # of the mean radiance, above which a texel may belong to a sun
+_PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
 _CLUSTER_DEGREES = 8.0
-_MIN_SUN_FRACTION = 0.05  # of the irradiance of the mean radiance
+_MIN_SUN_FRACTION = 0.05  # least irradiance of a sun, relative to that of the mean radiance
 
 
 def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
@@ -32,7 +32,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     name : a sample, a file (.hdr, .exr), or "uniform"
     max_rows : largest h; larger pictures are reduced by averaging
 
-    A few infinite, NaN or negative pixels are mended, with a note.
+    A few infinite, NaN or negative pixels are repaired, with a note.
 
     Raises DermisError for any other name, and for a picture without radiance.
     """
@@ -86,8 +86,8 @@ def resample(radiance: NDArray[np.floating], height: int) -> Floats:
 def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
     """Return means of a piecewise constant function over other intervals, along the first axis.
 
-    values : (n, ...) of the function between consecutive edges
-    edges : (n + 1,) increasing
+    values : (n, ...) values of the function between consecutive edges
+    edges : (n + 1,) increasing edges of these intervals
     target_edges : (k + 1,) edges of the intervals over which the k means are taken
     """
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
@@ -130,7 +130,7 @@ class Sun:
     """Bright peak of a panorama, rendered as a directional light.
 
     direction : (3,) unit vector towards the sun
-    irradiance : (3,) on a surface that faces the sun, linear Rec. 709
+    irradiance : (3,) irradiance of a surface that faces the sun, linear Rec. 709
     radius : angular radius [rad]
     """
 

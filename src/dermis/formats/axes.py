@@ -38,9 +38,9 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, which a user chooses, with those that a file states where they are left out.
+        """Return these axes, chosen by a user, completed by the axes that a file states.
 
-        The front of the file applies only with its own up axis.
+        The front that the file states is used only if the up axis is that of the file.
         """
         chosen = self._replace(up=self.up or stated.up)
         same = chosen.front == "auto" and chosen.top == stated.top

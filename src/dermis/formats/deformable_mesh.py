@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 _MIN_DISPLACEMENT_MM = 1e-3  # smaller displacements count as 0
-_MIN_NORMAL_CHANGE = 2e-3  # of a unit normal, a tenth of a degree
+_MIN_NORMAL_CHANGE = 2e-3  # smaller changes of unit normals count as 0: a tenth of a degree
 _MIN_WEIGHT = 1e-6  # smaller weights count as 0
 _MAX_CANDIDATES = 8  # bones among which four are selected
 _PRIOR_MM2 = 1.0  # penalty for deviations from the interpolated weights

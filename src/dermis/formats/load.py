@@ -76,15 +76,16 @@ def load_rigged(
 ) -> RiggedMesh:
     """Load mesh and rig of a file of one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
-    Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; others are opaque.
+    `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; others are opaque.
     The mesh is checked by `check_mesh`; its size is not checked.
 
-    unit_mm : length of the file's unit [mm]; None for that of the file or its format (`default_unit_mm`)
-    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
+    unit_mm : length of the file's unit [mm]; None for the unit stated by the file or its format
+        (`default_unit_mm`)
+    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" selects by
         format
     up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`; by default
-        those that the file states, and a front that `face_direction` finds
-    skin_groups : names of the groups that are skin; empty to find them
+        the up axis that the file states, and the front that `face_direction` finds
+    skin_groups : names of the groups that are skin; empty to detect them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
 
@@ -97,9 +98,9 @@ def load_rigged(
     load = partial(_load_uncached, source, unit, v_origin, axes, groups)
     is_glb = is_binary_gltf(source) and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
-    if not data or b'"uri"' in data:  # parts of it are in other files
+    if not data or b'"uri"' in data:  # such meshes depend on other files
         return load()
-    default_name = source.stem  # of groups without a name
+    default_name = source.stem  # name of groups that have none
     return cached_rigged(data, repr((default_name, unit, v_origin, axes, groups)), load)
 
 
@@ -166,12 +167,12 @@ def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
 
 
 def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
-    """Return axes with the front that the shape shows, and a note if it is not the usual one.
+    """Return axes with the front detected from the shape, and a note if it is not the default one.
 
-    A stated front is kept, and so is that of files that this package wrote.
+    A front that the file states is not changed, nor that of files that this package wrote.
 
-    part : all vertices of the file
-    skin : (f,) whether triangles are skin
+    part : mesh part with all vertices of the file
+    skin : (f,) mask of triangles that are skin
     """
     if axes.front != "auto" or any(one.maps is not None for one in mesh_file.materials):
         return axes, ""
@@ -203,9 +204,9 @@ def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
 
 
 class _AssignedMaterials(NamedTuple):
-    """Materials of the mesh, and which of them each part of the file has.
+    """Materials of the mesh, and the material of each part of the file.
 
-    of_part : index of the material of each part
+    of_part : material index of each part
     in_file, has_uv : see `FileSurface`
     """
 
@@ -216,12 +217,12 @@ class _AssignedMaterials(NamedTuple):
 
     @property
     def skin(self) -> Mask:
-        """Return which materials are skin, (m,)."""
+        """Return the mask (m,) of the materials that are skin."""
         return np.array([one.kind == "skin" for one in self.materials])
 
 
 def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> tuple[_AssignedMaterials, str]:
-    """Return the materials of the mesh, in the order of the file, and a note on what was taken for skin."""
+    """Return the materials of the mesh, in the order of the file, and a note on which of them are skin."""
     parts, unnamed = mesh_file.parts, (source.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
     is_opaque = _match_groups(groups, names.opaque, "opaque", source)
@@ -262,7 +263,7 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
 def _without_empty(
     mesh: RawMesh, assigned: _AssignedMaterials
 ) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
-    """Return the mesh and its materials without those whose triangles are all left out, and a note."""
+    """Return the mesh and its materials without materials that have no triangles left, and a note."""
     kept = np.bincount(mesh.material, minlength=len(assigned.materials)) > 0
     if kept.all() or not kept[assigned.skin].any():
         return mesh, assigned, ()
@@ -279,7 +280,7 @@ def _without_empty(
 def _match_groups(
     groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
 ) -> list[bool]:
-    """Return for each group of triangles whether its name is in `names`; a name that no group has is refused.
+    """Return whether each group's name is in `names`; refuse names that no group has.
 
     option : argument of `load_rigged` with these names, for the error
     """
@@ -293,7 +294,7 @@ def _match_groups(
 
 
 class GroupNames(NamedTuple):
-    """Names of groups of a file that users state to be skin, not skin, or eyeballs."""
+    """Names of a file's groups that the user declares to be skin, not skin, or eyeballs."""
 
     skin: tuple[str, ...] = ()
     opaque: tuple[str, ...] = ()
@@ -301,10 +302,10 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """What the pictures of a mesh file need besides the mesh.
+    """Surface data of a mesh file that its pictures need in addition to the mesh.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
-    has_uv : (m,) whether the triangles of each material have uv in the file
+    has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
     other_uv : (v, 2) further uv coordinates by their index in the file
     """
@@ -318,10 +319,10 @@ class FileSurface(NamedTuple):
 class RiggedMesh(NamedTuple):
     """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
 
-    notes : sentences on what of the file is mended, replaced or left out, for users
-    materials : of the file, to which `surface` refers; empty if the mesh is from the disk cache
+    notes : sentences for users on content that was repaired, replaced or left out
+    materials : materials of the file, which `surface` indexes; empty if the mesh is from the disk cache
     unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
-    file_vertices : vertices of the file from which the points of the mesh come
+    file_vertices : index of the file's vertex at each point of the mesh
     """
 
     mesh: Mesh
@@ -338,7 +339,7 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
     data : bytes of the file; the mesh must not depend on other files
     options : text with all options that influence the result, part of the cache key
-    load : reads the file
+    load : function that reads the file
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
     digest.update(data)
@@ -404,9 +405,9 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
 
 
 def is_eye_name(names: Sequence[str]) -> bool:
-    """Return whether the names of a group denote an eyeball or a part of one: Eye_L, sclera, Std_Cornea_R.
+    """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    names : of the group, its material first; the first name with a known word decides
+    names : names of the group, with its material first; the first name with a known word decides
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """

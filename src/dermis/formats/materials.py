@@ -43,7 +43,7 @@ class Texture:
 
     @property
     def mapping(self) -> tuple[int, UvTransform]:
-        """Return what determines the position in the picture of each point of the surface."""
+        """Return the uv set and the transform, which determine the texture coordinates."""
         return self.uv_set, self.transform
 
     def map_uv(self, uv: Doubles) -> Doubles:
@@ -56,16 +56,16 @@ class Texture:
 class FileMaterial:
     """Material of a mesh file, as glTF's metallic-roughness model states it.
 
-    names : of the material, empty for none
+    name : name of the material, empty for none
     textures : pictures by role; factors multiply them
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
     stated_metalness : factor of the metalness [-]; None where the file leaves it to the default of glTF, 1
-    emission, normal_scale : as in glTF
+    emission, normal_scale : emissiveFactor and normalTexture.scale of glTF
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
     skin_only : properties that only the maps of skin have
-    missing : sentences on pictures that are not found, by role
+    missing : sentences on missing pictures, by role
     unused : properties that have no effect here, for the note
     """
 
@@ -105,7 +105,7 @@ class FileMaterial:
 def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
     """Refuse materials whose pictures have too many texels together.
 
-    path : of the file, for the error
+    path : path of the file, for error messages
     """
     pictures: dict[tuple[str, str], object] = {}
     for material in materials:

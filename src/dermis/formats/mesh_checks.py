@@ -27,7 +27,7 @@ def check_mesh(mesh: Mesh, culprit: object, *, has_pictures: bool = False) -> No
     """Refuse a mesh that cannot be rendered as skin.
 
     culprit : source of the mesh for errors, usually its file
-    has_pictures : whether its file has pictures, which are packed so that uv outside [0, 1] are valid
+    has_pictures : whether the file has pictures; uv outside [0, 1] are then valid, as pictures are packed
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
     triangles, edges of more than two triangles, and a mesh without skin.
@@ -47,8 +47,8 @@ def check_arrays(
 ) -> None:
     """Refuse positions, uv and triangles from which no valid `Mesh` can be built.
 
-    positions : (v, 3) [mm]
-    uv : (v, 2)
+        positions : (v, 3) vertex positions [mm]
+    uv : (v, 2) vertex uv
     triangles : (f, 3) vertex indices
     culprit : source of the mesh for errors, usually its file
     """
@@ -106,9 +106,9 @@ def check_uv_range(mesh: Mesh, culprit: object) -> None:
 
 
 def flat_triangles(positions: NDArray[np.floating], triangles: NDArray[np.integer]) -> Mask:
-    """Return which triangles have no area in single precision, (f,).
+    """Return the mask (f,) of triangles without area in single precision.
 
-    positions : (v, 3) [mm]
+        positions : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
     """
     columns = np.ascontiguousarray(positions.T, np.float64)

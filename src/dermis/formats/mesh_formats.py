@@ -25,10 +25,10 @@ from dermis.formats.usd.shading import USD_MATERIALS
 class MeshFormat:
     """Format of mesh files.
 
-    suffixes : in lower case, with the dot
+    suffixes : file name suffixes in lower case, with the dot
     read : function that reads a file; it may raise any exception for a damaged one
-    properties : properties of its files, without those of materials
-    materials : properties of materials
+    properties : file properties and their treatment, without those of materials
+    materials : properties of materials and their treatment
     """
 
     suffixes: tuple[str, ...]

@@ -23,7 +23,7 @@ from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
 
 _RELIEF_ROLES = ("normal", "height")
-_GREY_TEST_SAMPLES = 256  # texels that are compared along a side
+_GREY_TEST_SAMPLES = 256  # compared texels along a side
 
 
 def read_obj_text(path: Path) -> str:
@@ -47,7 +47,7 @@ def read_obj(path: Path) -> MeshFile:
 def parse_obj(path: Path, text: str) -> MeshFile:
     """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
 
-    path : of the file, for errors and to find its .mtl
+    path : path of the file, for errors and to find its .mtl
     """
     geometry = parse_geometry(path, text)
     library = read_library(path, geometry.statements)
@@ -77,7 +77,7 @@ def obj_maps(
     root of the roughness m.
 
     material : name of the material in the .mtl files
-    overridden : roles of maps that the caller sets otherwise; those of the file are not read
+    overridden : roles of maps that the caller sets by other means, and which are not read from the file
     height_mm, normal_y : see `load_maps`
     """
     textures = read_library(path, read_obj_text(path)).materials[material].textures

@@ -1,6 +1,6 @@
 """Geometry of OBJ files: polygons with positions, uv, normals and colours, and the group of each polygon.
 
-Statements of numbers are parsed as arrays, all others one by one.
+Numeric statements are parsed as arrays, all others individually.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILI
 _LINE_FEED, _SPACE, _SLASH = b"\n /"
 _VERTEX_KINDS = ("v", "vt", "vn")
 _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
-_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # position and colour; in a statement
+_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers of a vertex that are used (position, colour), and allowed
 _POLYPAINT = "#MRGB"
 _CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
 _LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
@@ -78,9 +78,9 @@ _KINDS_LEFT_OUT = {key: kind for kind, keys in _LEFT_OUT.items() for key in keys
 class ObjGeometry:
     """Geometry of an OBJ file.
 
-    pairs, pair : names of `usemtl` and `g` that occur together, and the index of the pair of each polygon
-    statements : the other statements, as text
-    notes : sentences on what of the file is mended or left out
+    pairs, pair : combinations of `usemtl` and `g` names, and the index of each polygon's combination
+    statements : non-numeric statements, as text
+    notes : sentences on content that was repaired or left out
     """
 
     polygons: Polygons
@@ -98,9 +98,9 @@ _Statement = tuple[int, str, str]
 class _Rows:
     """Statements of one kind without their first word.
 
-    line : (n,) line of each, counted from 0
+        line : (n,) line of each statement, counted from 0
     text : ASCII codes, with a line feed at the end of each statement
-    start : (n,) position of each in the text
+    start : (n,) position of each statement in the text
     """
 
     line: Index
@@ -140,7 +140,7 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
 def _plain_text(text: str) -> str:
     """Join continued lines; remove blanks at the start of lines and comments at their end.
 
-    Lines keep their numbers.
+    The number of lines is unchanged.
     """
     if "\\\n" in text:
         text = _CONTINUED_LINE.sub(lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), text)
@@ -151,7 +151,7 @@ def _plain_text(text: str) -> str:
 
 
 def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement], dict[str, None]]:
-    """Return the statements of numbers by kind, the others that are used, and the first words of the rest."""
+    """Return numeric statements by kind, other statements that are used, and the first words of the rest."""
     data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
@@ -194,7 +194,7 @@ def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
 def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str = "") -> NoReturn:
     """Refuse statement `index` of a kind.
 
-    actual : clause, by default the text of the statement
+    actual : clause of the error message; by default the text of the statement
     """
     ends = np.append(rows.start[1:], len(rows.text))
     words = " ".join(rows.text[rows.start[index] : ends[index]].tobytes().decode(errors="replace").split())
@@ -205,7 +205,7 @@ def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str
 def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
-    A fourth number alone is a weight, by which the others are divided; three further ones are a colour.
+    One number after the position is a weight, by which the position is divided; three are a colour.
     """
     table, counts = _table(path, rows, "v")
     positions, notes = table[:, :3], list[str]()
@@ -236,7 +236,7 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
 
 
 def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return the first numbers of statements, (n, 6), NaN where there are fewer, and how many each has."""
+    """Return the first six numbers of statements (n, 6), NaN for missing ones, and the counts (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))
@@ -259,14 +259,15 @@ def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
-            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
+            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type:
+            ignore[type - var]
         except ValueError:
             return index
     return 0
 
 
 def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
-    """Return the number of corners of each face, and the indices (c, 3) of each corner, -1 for none."""
+    """Return the number of corners of each face, and three indices per corner (c, 3), -1 for none."""
     faces = rows["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
@@ -303,7 +304,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
 def _groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
-    """Return the pairs of `usemtl` and `g` names, and the index of the pair of each face.
+    """Return the combinations of `usemtl` and `g` names, and the index of each face's combination.
 
     face_line : (n,) lines of the faces
 

@@ -1,4 +1,4 @@
-"""Materials of OBJ files, as their .mtl files state them."""
+"""Materials of OBJ files, from their .mtl files."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ _NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER)
 _UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
-_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # that programs write beside a picture of the colour
+_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
 _MAX_LINE = 4096  # characters
 _LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 _UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
@@ -153,7 +153,7 @@ class MaterialLibrary:
 def read_library(path: Path, text: str) -> MaterialLibrary:
     """Read the .mtl files that an OBJ file references.
 
-    path, text : of the OBJ file
+    path, text : path and text of the OBJ file
     """
     library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
     for listed in library_names(text)[: limits.MAX_LIBRARIES]:
@@ -198,7 +198,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
 
 
 def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
-    """Return the name of the picture of a texture, that of one tile if it is a sequence of UDIM tiles."""
+    """Return the file name of a texture's picture; for a sequence of UDIM tiles, that of the given tile."""
     return _UDIM.sub(str(udim), texture.name)
 
 
@@ -219,7 +219,7 @@ def _parse_texture(key: str, statement: str) -> MtlTexture:
     name, factor = statement[start:], texture.factor
     match name.rsplit(maxsplit=2):
         case [first, last, number] if last.lower() == "-bm" and _NUMBER_PATTERN.fullmatch(number):
-            factor, name = float(number), first  # some programs write the option after the name
+            factor, name = float(number), first  # some programs write options after the name
     return replace(texture, name=name, factor=factor)
 
 
@@ -242,12 +242,12 @@ def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
 def with_materials(
     path: Path, parts: Sequence[MeshPart], library: MaterialLibrary
 ) -> tuple[list[MeshPart], tuple[FileMaterial, ...], list[str]]:
-    """Return the parts of an OBJ file with their materials, and notes on pictures that are not found.
+    """Return the parts of an OBJ file with their materials, and notes on missing pictures.
 
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
-    path : of the OBJ file
-    parts : their first name is that of the material, if it has one
+    path : path of the OBJ file
+    parts : mesh parts, whose first name is that of the material if it has one
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
@@ -270,7 +270,7 @@ def with_materials(
 
 
 def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
-    """Return the triangles of a part by the UDIM tile that they are in."""
+    """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
     if part.uv is None or not len(part.triangles):
         return [(_FIRST_UDIM, part)]
     column, row = np.floor(part.uv[part.triangles].mean(axis=1)).astype(int).T

@@ -20,9 +20,9 @@ from dermis.mesh.mesh import Material, Mesh
 PartRole = Literal[
     "colour", "cutout", "opacity", "roughness", "metalness", "surface", "alpha", "normal", "emission"
 ]
-"""Content of a picture: colour in sRGB; the same with opacity, of which surfaces end at 0.5; opacity 0 or 1;
-perceptual roughness; metalness; both in green and blue, as in glTF; width alpha of the distribution of
-normals, the square of the roughness; normals, green up; emission relative to its maximum, in sRGB."""
+"""Content of a picture: sRGB colour; sRGB colour with opacity, cut out at 0.5; opacity 0 or 1; perceptual
+roughness; metalness; roughness in green and metalness in blue, as in glTF; width alpha of the normal
+distribution, the square of the roughness; normals, green up; sRGB emission relative to its maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class PartPictures:
         return {role for role, used in needed.items() if used} if material.has_maps else set()
 
     def encode(self, roles: Iterable[PartRole]) -> dict[PartRole, bytes]:
-        """Return the pictures of those of the roles that any part needs, as 8-bit PNG files."""
+        """Return 8-bit PNG files by role, for those of the given roles that any part needs."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
         used = set[PartRole]().union(*map(self.roles, parts))
         levels = {role: _LEVELS[role](self.maps) for role in roles if role in used}
@@ -65,7 +65,7 @@ class PartPictures:
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
         """Return the largest radiance that a part emits, and the colour by which its picture is multiplied.
 
-        A part without such a picture emits this colour.
+        A part without a picture of its emission emits this colour.
         """
         if self.maps.emission is not None:
             return float(self.maps.emission.max()), (1.0, 1.0, 1.0)
@@ -85,7 +85,7 @@ def normal_levels(slopes: Floats) -> Bytes:
 
 
 def linear_levels(values: Numbers) -> Bytes:
-    """Return values from 0 to 1, of any shape, as 8-bit levels without a colour curve."""
+    """Return values from 0 to 1, of any shape, as 8-bit levels without sRGB encoding."""
     return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)
 
 

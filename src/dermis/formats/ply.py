@@ -1,4 +1,4 @@
-"""PLY files: the columns of their elements as arrays, and the mesh that these describe."""
+"""PLY files: elements as arrays of columns, and the mesh that they describe."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _TYPES = {
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 _FACE_NAMES = ("vertex_indices", "vertex_index")
-_SCALAR_PREFIX = "scalar_"  # of the values of scanners in CloudCompare
+_SCALAR_PREFIX = "scalar_"  # prefix that CloudCompare writes before names of scanner values
 _ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
 _SCANNER_VALUES = (
     *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
@@ -92,7 +92,7 @@ _STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=T
 
 
 class _Property(NamedTuple):
-    """Property of an element; a list if the type of its length is not ""."""
+    """Property of an element; a list if `length_dtype` is not ""."""
 
     name: str
     dtype: str
@@ -107,7 +107,7 @@ class _Element:
 
 
 class _List(NamedTuple):
-    """Lists of all rows of an element: their lengths (n,), and the items of all of them."""
+    """List property of an element: lengths of the lists (n,), and the concatenated items."""
 
     lengths: Index
     items: Numbers
@@ -117,7 +117,7 @@ class _Header(NamedTuple):
     """Header of a PLY file.
 
     order : byte order, "=" for text
-    size : of the header in bytes
+    size : size of the header in bytes
     pictures : file names of pictures, in comments
     """
 
@@ -128,14 +128,14 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _List"]):
-    """Columns of an element by name; notes which of them are used."""
+    """Columns of an element by name, which record the columns that were used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
     def take(self, names: Sequence[str]) -> Numbers | None:
-        """Return properties that are no lists side by side, (n, k); None unless all of them exist."""
+        """Return scalar properties as columns of an array (n, k); None unless all of them exist."""
         columns = [column for name in names if isinstance(column := self.get(name), np.ndarray)]
         if not columns or len(columns) < len(names):
             return None
@@ -143,11 +143,11 @@ class _Columns(dict[str, "Numbers | _List"]):
         return np.column_stack(columns)
 
     def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
-        """Return the first of several sets of properties that exists, (n, k)."""
+        """Return the first existing set of properties as an array (n, k)."""
         return next((one for names in choices if (one := self.take(names)) is not None), None)
 
     def take_list(self, names: Sequence[str]) -> _List | None:
-        """Return the first list property of some names that exists."""
+        """Return the first existing list property among some names."""
         for name in names:
             if isinstance(column := self.get(name), _List):
                 self.used.add(name)
@@ -221,9 +221,9 @@ def _read_header(path: Path, data: bytes) -> _Header:
 
 
 def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
-    """Return an element without its properties; an implausible count for a mesh or the file size is refused.
+    """Return an element without its properties; refuse an implausible count for a mesh or the file size.
 
-    words : after "element"
+    words : words after "element"
     """
     name, count = words if len(words) == 2 else ("", "")
     if not (count.isdecimal() and len(count) < 12):
@@ -237,7 +237,7 @@ def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) ->
 def _declared_property(path: Path, words: Sequence[str]) -> _Property:
     """Return a property.
 
-    words : after "property"
+    words : words after "property"
     """
     is_list = words[:1] == ["list"]
     kinds = words[is_list:-1]
@@ -274,7 +274,7 @@ class _ElementReader:
     """Reader of the rows of an element.
 
     order : byte order
-    is_text : whether the data are numbers of a text as float64, one for each value
+    is_text : whether the data are the numbers of a text file, as float64
     """
 
     path: Path
@@ -286,7 +286,7 @@ class _ElementReader:
     def read(self, position: int) -> tuple[_Columns, int]:
         """Return the columns of the element, and the position after its last row.
 
-        position : of the first row [bytes]
+        position : position of the first row [bytes]
         """
         columns, properties = _Columns(), self.element.properties
         lists = [one for one in properties if one.length_dtype]
@@ -310,7 +310,7 @@ class _ElementReader:
         return np.dtype(np.float64 if self.is_text else self.order + name)
 
     def _fixed_size(self, properties: Sequence[_Property]) -> int:
-        """Return the size of properties without the items of lists [bytes]."""
+        """Return the size of a row's properties without the items of lists [bytes]."""
         return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
 
     def _check_end(self, end: int) -> None:
@@ -319,9 +319,9 @@ class _ElementReader:
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
     def _gather(self, start: Index, count: Index, dtype: str, size: Index) -> Numbers:
-        """Return `count` values of one type from each of the positions `start`, concatenated.
+        """Read `count` values of one type at each of the positions `start`, and concatenate them.
 
-        size : of each row [bytes]
+        size : size of one value [bytes]
         """
         stored = self._dtype(dtype)
         if (size == size[0]).all() and (count == count[0]).all():
@@ -353,7 +353,7 @@ class _ElementReader:
     def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
         """Return whether the lists of all rows have the lengths of the first row.
 
-        size : of the first row [bytes]
+        size : size of the first row [bytes]
         """
         start = position + size * np.arange(self.element.count)
         if start[-1] + size > len(self.data):
@@ -367,7 +367,7 @@ class _ElementReader:
         return True
 
     def _walk(self, position: int, steps: Sequence[_ListStep], rest: int, rows: int) -> tuple[Index, int]:
-        """Return the lengths of the lists of some rows, (rows, lists), and the position after these rows.
+        """Read rows in sequence; return the lengths of their lists (rows, lists), and the next position.
 
         rest : size of the properties after the last list [bytes]
         """
@@ -392,7 +392,7 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """What precedes a list since the one before, the type of its length, and the size of an item [bytes]."""
+    """Step from one list of a row to the next: bytes to skip, type of the length, size of an item [bytes]."""
 
     skip: int
     length: np.dtype[Any]
@@ -400,9 +400,9 @@ class _ListStep(NamedTuple):
 
 
 def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tuple[Index, Index]:
-    """Return the numbers of corners of faces and of the triangles of strips, and the vertex of each corner.
+    """Return the number of corners of each face and strip triangle, and the vertex of each corner.
 
-    points : number of vertices
+    points : number of vertices in the file
     """
     own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
     if faces and own is None:
@@ -421,7 +421,7 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
 
 
 def _strip_triangles(strips: _List) -> Index:
-    """Return the triangles (t, 3) of strips, in which -1 starts another strip; every second one is turned."""
+    """Return the triangles (t, 3) of strips, which -1 separates; every second triangle is reversed."""
     index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
@@ -435,9 +435,9 @@ def _strip_triangles(strips: _List) -> Index:
 def _uv(
     path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv (t, 2), and those of each corner, -1 for none.
+    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 for none.
 
-    counts, index : numbers of corners of polygons, and the vertex of each corner
+    counts, index : number of corners of each polygon, and the vertex of each corner
     """
     wedges = faces.take_list(("texcoord",))
     if wedges is None:
@@ -469,10 +469,10 @@ def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
 
 
 def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None, list[str]]:
-    """Return the picture that most faces have, and a note on the others.
+    """Return the picture that most faces use, and a note on the other pictures.
 
-    names : of the pictures
-    numbers : (n, 1) index of the picture of each face, or None
+    names : names of the pictures
+    numbers : (n, 1) picture index of each face, or None
     """
     if not names:
         return None, []

@@ -65,23 +65,23 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
 
 
 def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
-    """Return the vertex colours of all parts, white for parts without; None if no part has any."""
+    """Join the vertex colours of all parts, white for parts without; None if no part has any."""
     if all(part.colours is None for part in parts):
         return None
     return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in parts])
 
 
 def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
-    """Return further uv coordinates of all parts, 0 for parts without."""
+    """Join one further set of uv coordinates of all parts; 0 for parts without it."""
     return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
-    """Return a mesh part with some of its vertices, their morph targets and bones.
+    """Return a mesh part with the selected vertices, their morph targets and bones.
 
     used : (n,) indices of the vertices; they may repeat
 
-    Triangles, uv and normals are not changed.
+    Triangles, uv and normals are unchanged.
     """
     order, count = np.argsort(used, kind="stable"), np.bincount(used, minlength=len(part.positions))
     first, targets = np.cumsum(count) - count, {}
@@ -166,11 +166,11 @@ def read_mesh_file(source: Path) -> MeshFile:
 
 
 def _without_unused_vertices(part: MeshPart) -> MeshPart:
-    """Return a mesh part without the vertices that no triangle uses, whose numbers may be invalid."""
+    """Return a mesh part without unused vertices, whose coordinates may be invalid."""
     count, uv, normals = len(part.positions), part.uv, part.normals
     damaged = any(array is not None and len(array) != count for array in (uv, normals))
     if damaged or part.triangles.min() < 0 or part.triangles.max() >= count:
-        return part  # which is refused
+        return part  # refused below
     used, triangles = compact_vertices(part.triangles)
     if len(used) == count:
         return part

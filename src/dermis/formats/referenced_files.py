@@ -14,10 +14,10 @@ _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer pa
 def find_referenced_file(path: Path, name: str) -> Path | None:
     """Return the existing file that a mesh file references by name, or None.
 
-    path : of the mesh file
-    name : relative to its folder; Windows separators are accepted
+    path : path of the mesh file
+    name : name relative to the folder of the mesh file; Windows separators are accepted
 
-    A name outside the folder is reduced to its last component, which is searched in the folder.
+    A name outside the folder is reduced to its last component and searched in the folder.
     """
     named = PureWindowsPath(name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):

@@ -44,7 +44,7 @@ def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) 
 
 
 def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
-    """Return for each pair of vertices whether some morph target moves them apart, (n,).
+    """Return the mask (n,) of vertex pairs that some morph target moves apart.
 
     first, second : (n,) vertex indices of the pairs
     linear : (3, 3) matrix from the file's space to the head's [mm]
@@ -58,7 +58,7 @@ def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles
 
 
 def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
-    """Return for each pair of vertices whether their bone weights differ, (n,).
+    """Return the mask (n,) of vertex pairs with different bone weights.
 
     first, second : (n,) vertex indices of the pairs
     """

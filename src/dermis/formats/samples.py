@@ -35,7 +35,7 @@ class Sample:
 
     kind : "head" for a mesh with maps, "environment" for a latitude-longitude picture
     folder : name of its folder below DERMIS_DATA, or below the cache
-    files : by role: mesh, colour, specular, normal, height, licence, or environment
+    files : files by role: mesh, colour, specular, normal, height, licence, or environment
     licence, attribution : terms of use, and the authors to credit
     unit_mm : length of one unit of the mesh [mm]
     v_origin : edge of the maps where v = 0, "top" or "bottom"

@@ -45,7 +45,7 @@ def read_stl(path: Path) -> MeshFile:
 def _binary_corners(path: Path, data: bytes, count: int) -> tuple[Doubles, tuple[str, ...]]:
     """Return the corners (3f, 3) of a binary file, and notes.
 
-    count : of triangles that its header states
+    count : number of triangles that the header states
     """
     _check_count(path, count)
     if len(data) < _HEADER_BYTES + count * _RECORD.itemsize:

@@ -21,9 +21,9 @@ T = TypeVar("T", np.float64, np.int64)
 
 
 def decode_text(data: bytes) -> str:
-    """Return a text with line feeds as its only line ends.
+    """Decode a text, with line feeds as the only line ends.
 
-    data : UTF-8, or UTF-16 after its byte order mark; lines that are not UTF-8 are Latin-1
+    data : UTF-8, or UTF-16 with a byte order mark; lines that are not valid UTF-8 are read as Latin-1
 
     Raises ValueError for damaged UTF-16.
     """
@@ -46,7 +46,7 @@ def _decode_line(line: bytes) -> str:
 
 
 def listed(names: Collection[str]) -> str:
-    """Return names of a file for a message, without those beyond the first few."""
+    """Return the first few names of a list as text for a message."""
     first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
     shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
@@ -63,7 +63,7 @@ def parse_numbers(text: Bytes, count: int, dtype: type[T]) -> NDArray[T]:
     """Return the numbers in a text, separated by blanks and line feeds.
 
     text : ASCII codes
-    count : of the words in the text
+    count : number of words in the text
 
     Raises ValueError if a word is not a number.
     """

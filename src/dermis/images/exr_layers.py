@@ -20,7 +20,7 @@ class ExrLayer:
     """Layer of an OpenEXR file with the channels of a picture.
 
     part : index of its part
-    name : of the layer; in files of several parts with the name of its part; empty for plain R, G and B
+    name : name of the layer; in files of several parts with the name of its part; empty for plain R, G and B
     channels : names of the channels of red, green, blue and, if there is one, alpha; or of grey
     """
 

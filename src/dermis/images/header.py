@@ -16,7 +16,7 @@ class PictureHeader:
     """Size and colour space of a picture file, and what is done with its other properties.
 
     size : width and height of the stored picture [pixel]
-    colour_space : of the decoded pixels
+    colour_space : colour space of the decoded pixels
     orientation : EXIF's number of the turn or mirroring that shows the picture upright; 1 is none
     notes : sentences about properties that are converted or not used
     colour_note : sentence about the conversion of colours, for pictures whose pixels are colours

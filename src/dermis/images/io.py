@@ -136,7 +136,7 @@ def mended_radiance(name: object, radiance: Floats) -> Floats:
 
     Infinite values become the largest finite one, other values 0.
 
-    name : of the file, for messages
+    name : name of the file, for messages
 
     Raises DermisError if most pixels are not finite, or no value is above 0.
     """

@@ -109,7 +109,7 @@ def _normals(corners: Doubles) -> Doubles:
 def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
     """Return points (n, 3) that are spread evenly over triangles (f, 3, 3), and their unit normals.
 
-    normals : of the triangles, as long as twice their area, as columns (3, f)
+    normals : normals of the triangles, as long as twice their area, as columns (3, f)
     """
     areas = np.sqrt(dot_columns(normals, normals))
     total = np.cumsum(areas)

@@ -225,7 +225,7 @@ def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
-    names : of the morph targets of the rig
+    names : names of the morph targets of the rig
     """
     for name, weight in weights.items():
         if name not in names:

@@ -80,7 +80,7 @@ class MapOptions:
 def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
     """Return the head of a sample or a mesh file, and the look of its eyes that the file states.
 
-    name : of the sample or of the file
+    name : name of the sample or of the file
     mesh_options : keyword arguments of `load_rigged`
     """
     sample = SAMPLES.get(name)

@@ -23,8 +23,9 @@ from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand
 
 Parameters = dict[str, float | int | str]
 _JAW_TARGET = "jawOpen"
-_WEIGHT_POWER = 1.5  # random weights are a uniform number to this power, so that small ones are more frequent
-_HASH_BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
+_WEIGHT_POWER = 1.5  # random weights are uniform numbers raised to this power, so that small weights are more
+frequent
+_HASH_BITS = 52  # used bits of the hash; this number of bits plus one half is exact in double precision
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
 _VARIATION_KEYS = "intensity", "asymmetry", "variation"

@@ -99,8 +99,9 @@ class Subject:
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
         """Return a program's profile with its total energy expressed relative to the reference profile.
 
-        The energy becomes that of the reference, times the ratio of the light that the program returns to the
-        albedo for which it returns this light.
+        A program may return more or less light than the albedo that it is given. The energy of the reference
+        is
+        multiplied by the ratio of the two.
 
         curve : profile that the program renders, with the energy that it returns for the subject's albedo
         """

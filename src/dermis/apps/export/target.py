@@ -118,7 +118,7 @@ class Target(ABC):
     part_limitations: ClassVar[str] = (
         "Only skin is exported; an export to gltf contains the other parts with their pictures."
     )
-    """Sentences on what is not exported of parts that are not skin, for heads with pictures of such parts."""
+    """Limitations of parts that are not skin, in sentences, for heads with pictures of such parts."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 

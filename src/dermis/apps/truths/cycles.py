@@ -263,10 +263,11 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
     The colour is the diffuse reflectance of the medium, the radius 4 pi mean free paths. Cycles divides radii
-    by 4 pi, and finds the albedo of its random walk from the colour by a fit whose inverse is
-    `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and leaves through
-    a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for this colour and
-    radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5 % by the
+    by 4 pi, and derives the albedo of its random walk from the colour by a fit, which inverts
+    `diffuse_albedo` within 1 %. The walk is therefore through this medium, but light enters and leaves
+    through a Lambertian surface. The method "burley" is the profile of [ChristensenBurley2015] for this
+    colour and radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
+    % by the
     profile.
     """
     if isinstance(medium, Lambertian):

@@ -66,8 +66,8 @@ def sample_irradiance(
     contrast : irradiance difference between the ends of a side that counts as high, over the largest
         irradiance [-]
 
-    Samples at the corners of triangles with linear interpolation have a smaller error for their number than
-    random points, points of even distances [Turk1992] or centres of triangles. A sum over points without
+    For equal numbers of samples, linear interpolation between triangle corners has a smaller error than
+    random points, evenly distributed points [Turk1992] or triangle centroids. A sum over points without
     interpolation misses the profile's peak between them.
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.

@@ -65,7 +65,8 @@ def relative_rmse(
     t) + (1 - E)(n² - s²). For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased
     estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
     too small, by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share
-    paths, so their deviations are added, which is at most sqrt(c) too much. The root's standard error is the
+    paths, so their standard deviations are added, which overestimates by at most sqrt(c). The root's standard
+    error is the
     larger distance to sqrt(E ± error of E), or to 0.
 
     Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's variance.
@@ -91,7 +92,8 @@ def energy_ratio(
     """Return the sum of the image over the sum of the reference [-].
 
     The parameters are those of `relative_rmse`. The ratio's relative error is that of the reference's sum,
-    whose variance is the sum of the variances; channels may share paths, so their deviations are added.
+    whose variance is the sum of the pixels' variances; channels may share paths, so their standard deviations
+    are added.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())

@@ -81,7 +81,7 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (k,) of blur levels that edges of a given length resolve.
 
-    A level is resolved if the standard deviation that it adds is at least two edges.
+    A level is resolved if the standard deviation that it adds is at least two edge lengths.
 
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     edge_mm : length of the longest edge, see `longest_edge_mm` [mm]

@@ -32,7 +32,8 @@ def integrate_exitance(
     profile : profile R, by Euclidean distance, through thin parts too
     error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a piece of one is replaced by three points if Taylor's remainder is
+    A node of the octree, a triangle or a part of a triangle is replaced by three points if Taylor's remainder
+    is
     below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
     integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
     relation between the bound and `error` is measured.

@@ -10,7 +10,7 @@ from dermis.atlas.raster import barycentric_weights, covered_texels
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
-# Texels have a gap if their surface points are farther apart than so many texel steps plus the slack.
+# There is a gap between texels whose surface points are farther apart than this many steps plus the slack.
 _GAP_STEPS, _GAP_SLACK_MM = 2.0, 0.5
 _INNER_MARGIN = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
 
@@ -88,7 +88,7 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
 
 
 def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
-    """Return the mask of texel pairs whose anchors are farther apart than both texels are from them.
+    """Return the mask of texel pairs whose anchors are farther apart than either texel is from its anchor.
 
     The anchor of a texel is the nearest point of its chart.
     """

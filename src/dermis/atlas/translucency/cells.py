@@ -24,9 +24,7 @@ _CELL_SIGMAS = (
 )
 _MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs
 _MAX_TEXELS = 1024  # largest number of texels per side whose light is averaged, if there are fewer cells
-_SAME_POINT_TEXELS = (
-    0.1  # distance of a texel from the atlas position of its surface point, below which it shows itself
-)
+_SAME_POINT_TEXELS = 0.1  # a texel whose surface point is at most this far from it in the atlas shows itself
 
 
 @dataclass(frozen=True, eq=False)

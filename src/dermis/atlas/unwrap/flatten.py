@@ -112,7 +112,8 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     density : (f,) desired length in the plane over that on the surface [-]
     weight : (f,) importance of each triangle's stretch [-]
 
-    The start is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is then
+    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is
+    then
     made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
     [Rabinovich2017].
     """

@@ -20,8 +20,8 @@ _CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
     """Return a mesh with a new uv layout for some triangles, and the source of each of its vertices.
 
-    The triangles keep their order; vertices on the new seams are duplicated. The disk cache keeps
-    the layout.
+    The order of the triangles is unchanged; vertices on the new seams are duplicated. The layout is cached on
+    disk.
 
     unwrapped : (f,) triangles to lay out
     """

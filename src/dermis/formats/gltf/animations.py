@@ -26,7 +26,7 @@ class AnimationTrack(NamedTuple):
     """Animated property of several nodes or morph targets, with the curve of its values.
 
     path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
-    names : (m,) of the nodes or of the morph targets
+    names : (m,) names of the nodes or morph targets
     """
 
     path: str
@@ -56,7 +56,7 @@ def clip_names(path: Path) -> tuple[str, ...]:
 def read_clip(path: Path, name: str | None) -> Animation:
     """Read an animation clip of a .glb or .gltf file.
 
-    name : of the clip; None for the only clip of the file
+    name : name of the clip; None for the only clip of the file
 
     Raises DermisError for a missing or damaged clip.
     """
@@ -164,7 +164,7 @@ class AnimationCurve:
     """Values as functions of time for m nodes that have the same keys, with n components each.
 
     times_s : (k,) times of the keys, not decreasing [s]
-    values : (k, m, n) at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
+    values : (k, m, n) values at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
     kind : interpolation between keys
     is_rotation : whether the values are quaternions (n = 4), for which "LINEAR" is spherical interpolation
 

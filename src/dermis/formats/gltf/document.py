@@ -29,7 +29,7 @@ _GLB_MAGIC = 0x46546C67
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_MIN_READ_COST = 512  # components whose decoding takes as long as the overhead of an accessor
+_MIN_READ_COST = 512  # cost of reading an accessor without its components [components]
 _TOP_LEVEL_ARRAYS = [
     "accessors",
     "animations",
@@ -96,7 +96,7 @@ class Document:
         return _checked_size(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
 
     def replace_values(self, index: int, values: Numbers) -> None:
-        """Store other values of the shape of an accessor; they are converted to its type."""
+        """Replace the values of an accessor by an array of the same shape, converted to its type."""
         accessor = self.item("accessors", index)
         data = values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
         buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))

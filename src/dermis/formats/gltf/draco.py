@@ -21,7 +21,7 @@ _ADVICE = "Decimate it, or export without compression"
 
 
 class _Primitive(NamedTuple):
-    """Compressed primitive: its own tree, and that of its extension."""
+    """Compressed primitive: its JSON tree, and the tree of its compression extension."""
 
     tree: Tree
     extension: Tree

@@ -11,7 +11,7 @@ from dermis.base.native_decoding import answer_request
 def decode(request: Arrays) -> Arrays:
     """Return the attributes and triangles of compressed meshes.
 
-    They are called by the name of the mesh in the request, a slash, and the attribute's identifier or
+    Their names are the name of the mesh in the request, a slash, and the attribute's identifier or
     "triangles".
     """
     import DracoPy

@@ -22,7 +22,7 @@ _SKIN_IOR = {"KHR_materials_ior": {"ior": 1.4}}
 EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 """Names of the pictures of an eye."""
 _TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
-_CLEARCOAT_FACTOR = 0.52  # of glTF's clear coat, which reflects 0.04 at normal incidence; eyes reflect 0.021
+_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
 _HAIR_ROUGHNESS = 0.45
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
@@ -63,7 +63,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
 
     The extras reference pictures as {"index": name}; `embedded_materials` reads them.
 
-    slopes : (n, n, 2) of the relief, written as normal map for other programs if `maps` has none
+    slopes : (n, n, 2) slopes of the relief, written as normal map for other programs if `maps` has none
     """
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
@@ -208,6 +208,6 @@ def _base_material(material: Material, roughness: float) -> Tree:
 
 
 def _usual_roughness(material: Material) -> float:
-    """Return the perceptual roughness of a surface whose file states none, by its name [-]."""
+    """Return a default perceptual roughness for a material, chosen by words in its name [-]."""
     matches = (value for word, value in _ROUGHNESS_BY_WORD.items() if word in material.name.casefold())
     return next(matches, _DEFAULT_ROUGHNESS)

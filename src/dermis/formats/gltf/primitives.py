@@ -24,7 +24,7 @@ HAIR_COLOURS = 64
 _TUBE_SIDES = 3
 _RADIUS_FACTOR = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))  # the mean width equals that of a circle
 _MIN_DISPLACEMENT_MM = 0.01  # smaller displacements count as 0
-_ALBEDO_EXPONENT = 5.89  # of fibres of roughness 0.3 in hair: [Chiang2016] equation 9
+_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
@@ -44,7 +44,7 @@ class PrimitiveSource(Protocol):
 class SurfacePrimitive:
     """Triangles of one material, with the vertices that they use.
 
-    points : the whole mesh
+    points : deformable mesh of the head
     faces : (f,) indices of the triangles
     eye : index of the eye whose uv layout a textured eyeball uses; -1 for other surfaces
     """

@@ -208,7 +208,7 @@ class _Reader:
 
 
 def read_picture(document: Document, source: Any) -> EmbeddedPicture:
-    """Return an image of a document; its content decides on its format.
+    """Return an image of a document; its format is detected from its content.
 
     Raises DermisError for a file outside the folder.
     """

@@ -18,13 +18,13 @@ from dermis.mesh.rig import INFLUENCES
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
-_BATCH_VERTICES = 1 << 16  # vertices
+_BATCH_VERTICES = 1 << 16
 
 
 class SkinInfluences(NamedTuple):
     """Bones that move each vertex, and their weights, which sum to 1.
 
-    bone, weight : (v, 4)
+    bone, weight : (v, 4) bone indices, and their weights
     """
 
     bone: Index
@@ -192,7 +192,7 @@ def read_targets(
 ) -> dict[str, VertexDisplacements]:
     """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
-    names : of the morph targets of the mesh
+    names : names of the morph targets of the mesh
     count : number of vertices of the primitive
 
     Raises DermisError if the number of displacements is not `count`, and for values that are not finite.
@@ -239,7 +239,7 @@ def apply_targets(
 ) -> Doubles:
     """Return positions (v, 3) displaced by morph targets.
 
-    weights : by target name; missing ones are 0
+    weights : weights by target name; missing ones are 0
     """
     result = positions
     for name, target in targets.items():

@@ -115,7 +115,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
-    notes : on what is left out of the parts that are read
+    notes : notes on content that was not read
     """
 
     document: Document
@@ -140,7 +140,7 @@ class _SceneReader:
     def _check_count(self, name: str, count: int) -> None:
         """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
 
-        name : of the limit, a key of `_MAX_COUNTS`
+        name : name of the limit, a key of `_MAX_COUNTS`
         """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
@@ -164,7 +164,7 @@ class _SceneReader:
     def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
-        names : of the morph targets of the mesh
+        names : names of the morph targets of the mesh
         """
         part, targets = self._read_primitive(mesh, names, primitive)
         if node is None:
@@ -195,7 +195,7 @@ class _SceneReader:
         targets = self.avatar.with_expressions(mesh, names, targets)
         displaced = apply_targets(positions, targets, self.weights)
         if displaced is not positions:
-            normals = None  # they are those of the undisplaced shape
+            normals = None  # the normals of the file belong to the undisplaced shape
         if colours is not None and colours.shape[1] > 3 and colours[:, 3].min() < 1.0:
             self.notes["the transparency of vertices (alpha of COLOR_0) is left out"] = None
         triangles = self._triangles(primitive, len(positions))

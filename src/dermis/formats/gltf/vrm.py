@@ -39,7 +39,7 @@ VRM_PROPERTIES = (
     noted(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON),
     *(noted(text, "", *keys) for text, keys in _NOT_READ.items()),
 )
-"""Properties of VRM files beside those of glTF."""
+"""Properties of VRM files in addition to those of glTF."""
 _MATERIAL_BINDS = ("materialValues", "materialColorBinds", "textureTransformBinds")
 _UNNAMED = ("", "unknown")
 _PERCENT = 0.01
@@ -48,9 +48,9 @@ _MAX_WEIGHT = 100.0
 
 @dataclass(frozen=True)
 class Avatar:
-    """Properties of a VRM file; those of other glTF files are the defaults.
+    """Properties that a VRM file adds to glTF; the defaults are for other glTF files.
 
-    expressions : weights by index of the morph target, by name of the expression, by identity of the mesh
+    expressions : for each mesh (by `id`) and expression (by name), the weights by morph target index
     """
 
     axes: Axes = DEFAULT_AXES
@@ -62,8 +62,8 @@ class Avatar:
     ) -> dict[str, VertexDisplacements]:
         """Return the morph targets of a primitive and its expressions; targets keep their names.
 
-        names : of the morph targets of the mesh
-        targets : of the primitive, by name
+        names : names of the morph targets of the mesh
+        targets : targets of the primitive, by name
 
         Raises ValueError if the expressions displace too many vertices.
         """
@@ -97,9 +97,9 @@ def read_avatar(document: Document) -> Avatar:
 
 
 class _Bind(NamedTuple):
-    """Morph target of an expression.
+    """Morph target that an expression moves.
 
-    name : of the expression
+    name : name of the expression
     target : index of the target in the mesh
     """
 

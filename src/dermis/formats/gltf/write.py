@@ -51,7 +51,7 @@ def encode_head(
 
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override those of the rest pose
-    slopes : (n, n, 2) of the relief, written as normal map for programs that read no height map
+    slopes : (n, n, 2) slopes of the relief, written as normal map for programs that read no height map
     notes : extras of the file's asset
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     additions : properties to add to the material of skin

@@ -38,10 +38,10 @@ NEUTRAL_SCORE = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
 MAX_TIME = 1e19
 """Largest time of a frame in any unit: nanoseconds of three centuries."""
-_MAX_STEP_S = 2.0  # largest plausible median step between frames of a capture
+_MAX_STEP_S = 2.0  # largest plausible median interval between frames of a capture
 _TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
-_PERCENT_RANGE = (10.0, 200.0)  # largest weight of a capture in percent: more than any pose as a fraction
-_LARGE_WEIGHT = 2.0  # more than exaggerated poses have
+_PERCENT_RANGE = (10.0, 200.0)  # range of the largest weight of a capture in percent; fractions are smaller
+_LARGE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
 _COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
@@ -49,7 +49,7 @@ _PREFIX_WORDS = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|ske
 """Words that programs add to the names of bones."""
 _SIDE_OF_WORD = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NECK_WORDS, _EYE_WORDS = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
-_HEAD_FRACTION = 0.5  # of a head rotation; the neck bones rotate by the rest
+_HEAD_FRACTION = 0.5  # part of a head rotation that the head bone performs; neck bones perform the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
     """Return a facial capture as a clip for a head, linearly interpolated between frames.
 
     culprit : the capture's file, for errors
-    name : of the clip
+    name : name of the clip
 
     Raises DermisError when no name matches the head.
     """
@@ -150,7 +150,7 @@ def note_lost_frames(culprit: object, count: int, total: int) -> None:
 
 
 def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
-    """Replace NaN in values (k, n) by linear interpolation over time; the first and last numbers are held.
+    """Replace NaN in values (k, n) by linear interpolation over time, and by constants at both ends.
 
     times_s : (k,) times of the rows [s]
     """
@@ -304,7 +304,7 @@ def _ancestors(skeleton: Skeleton, bone: int) -> set[int]:
 
 
 def _bone_words(name: str) -> tuple[list[str], str]:
-    """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
+    """Return the words of a bone's name without numbers and prefixes, and the side "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
     sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]

@@ -45,7 +45,7 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
 
     Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 
-    name : of the clip; required if the file has several
+    name : name of the clip; required if the file has several
 
     Raises DermisError for a damaged clip, and if no name matches the head.
     """

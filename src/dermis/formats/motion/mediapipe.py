@@ -46,7 +46,7 @@ _MATRIX_KEYS = (
     "facialtransformationmatrices",
 )
 _FACE_KEYS = ("faces", "landmarks", "facelandmarks")
-"""Plain keys of lists with one entry for each face, of which those of landmarks are not used."""
+"""Plain keys of lists with one entry for each face; landmarks are not used."""
 _LIST_KEYS = ("categories", "classification")
 _DATA_KEYS = ("data", "packeddata", "value")
 _NAME_KEYS = ("categoryname", "label", "name", "displayname")
@@ -87,7 +87,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     API, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or a list of names and
     scores for each face; facial transformations (4, 4) are nested or flat lists or objects with data, and
     rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
-    first face is used. Frames without a face are interpolated. Notes say what was assumed.
+    first face is used. Frames without a face are interpolated. Assumptions are noted.
 
     fps : frame rate if the frames have no time; by default that of the file, or 30
 
@@ -133,7 +133,7 @@ def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]
     except DermisError:
         if second is None:
             raise
-        document = parse_json(text, path, _EXPECTED)  # written over several lines
+        document = parse_json(text, path, _EXPECTED)  # an object over several lines
     else:
         if second is not None:
             rest = ((name, parse_json(line, name, _EXPECTED)) for name, line in chain([second], lines))
@@ -235,8 +235,8 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
 def _facial_transformation(culprit: str, value: object) -> Doubles | None:
     """Return the facial transformation (4, 4) of the first face, None if there is none.
 
-    The column with the translation is the last one of the result. Without a translation, flat lists of an API
-    are taken by columns, as they are there.
+    The translation is in the last column of the result. A flat list without a translation is taken to be in
+    column-major order, as MediaPipe's APIs return it.
 
     value : matrix as a nested or flat list, an object with it, or a list of either
     """
@@ -292,7 +292,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and what the head has no bone for."""
+    """Return angles (k, 3) by bone name [degrees], and the names of rotations without a bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

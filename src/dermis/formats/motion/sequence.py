@@ -89,8 +89,8 @@ def load_sequence(
     The vertices of the files must have the order of the head's file.
 
     fps : frame rate, by default 30
-    unit_mm : unit of the files [mm]; None for one that makes the first about as large as the head
-    up, front : axes of the files, see `load_head`; without both those of the head's file
+    unit_mm : unit of the files [mm]; by default one for which the first mesh is about as large as the head
+    up, front : axes of the files, see `load_head`; by default the axes of the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
@@ -177,7 +177,7 @@ class _FrameCache:
 def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as a head [mm].
 
-    It is that of the file's format if this fits; otherwise a note says which unit was found.
+    It is the unit of the file's format if this fits; otherwise a note states the unit.
     """
     read_mm, head_mm = (
         np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
@@ -211,9 +211,9 @@ def _by_number(file: Path) -> tuple[int, str]:
 class FrameVertices(NamedTuple):
     """Vertices of one mesh file, without those that no triangle uses.
 
-    positions_mm : (v, 3)
+    positions_mm : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
-    uv : (v, 2) with the v direction of the file
+    uv : (v, 2) uv with the v direction of the file
     """
 
     positions_mm: Floats
@@ -222,7 +222,7 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """Everything but the positions of an OBJ file, to recognise files that differ only in positions.
+    """Pattern of an OBJ file: all but its positions, to recognise files that differ only in these.
 
     digest : hash of all lines except `v` and `vn`
     lines : number of `v` lines
@@ -302,7 +302,7 @@ def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], 
 def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
     """Return the pattern of an OBJ file.
 
-    data : its text in UTF-8
+    data : text of the file in UTF-8
 
     The file is parsed with the index of each `v` line as x coordinate, which shows the line of each vertex.
     """

@@ -31,7 +31,7 @@ _OWN_MATERIAL_ONLY = "faces of one mesh read different texture coordinates: thos
 
 
 class _Primvar(NamedTuple):
-    """Values (n, k), and the index of the value of each corner (c,)."""
+    """Primitive variable: values (n, k), and the index of each corner's value (c,)."""
 
     values: Doubles
     corner_index: Index
@@ -49,7 +49,7 @@ class _Faces(NamedTuple):
     vertex: Index
 
     def corner_elements(self, interpolation: str) -> Index | None:
-        """Return the element of a primvar for each corner, (c,); None for an unknown interpolation."""
+        """Return the index of the primvar element for each corner (c,); None for an unknown interpolation."""
         corners = len(self.vertex)
         return {
             "constant": np.zeros(corners, np.int64),
@@ -123,7 +123,7 @@ class _SceneReader:
         return own.ComputePurpose() not in _HIDDEN and own.ComputeVisibility(self.time) != "invisible"
 
     def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
-        """Add the arrays of a mesh, and return its names and materials."""
+        """Add the arrays of a mesh to the answer, and return its names and materials."""
         prim, matrix = mesh.GetPrim(), np.array(self.places.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._geometry(mesh)
         materials, group = self._material_groups(prim, len(faces.counts))
@@ -169,7 +169,7 @@ class _SceneReader:
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
-        """Return the materials of a mesh, -1 for none, and the index in them of each of `count` faces.
+        """Return the materials of a mesh, -1 for none, and the index of each of `count` faces in this list.
 
         Faces that are holes have the index -1.
         """
@@ -201,7 +201,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv coordinates of a mesh that its materials use, else those of a usual name."""
+        """Return the uv coordinates that the mesh's materials use, or by default those with a common name."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_OWN_MATERIAL_ONLY] = None
@@ -212,7 +212,7 @@ class _SceneReader:
         return next((one for one in found if one is not None), None)
 
     def _primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
-        """Return a primvar of `width` numbers; None if there is none of that width."""
+        """Return a primvar if its elements have `width` numbers, else None."""
         if not primvar or not primvar.HasValue():
             return None
         values = np.array(primvar.Get(self.time), np.float64)
@@ -230,7 +230,7 @@ class _SceneReader:
         return _Primvar(values, element)
 
     def _normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
-        """Return the normals of a mesh; None if it has none, or is subdivided in other programs."""
+        """Return the normals of a mesh; None if it has none, or is a subdivision surface."""
         if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
             return None
         primvars = self.geom.PrimvarsAPI(mesh.GetPrim())
@@ -268,7 +268,7 @@ def _unit(vectors: Doubles) -> Doubles:
 def decode(request: Arrays) -> Arrays:
     """Return the meshes of a file, see `_SceneReader.read`.
 
-    request : "file", its absolute path, and "path", as users name it
+    request : absolute path of the file under "file", and the path that the user typed under "path"
     """
     file, path = (Path(as_text(request[name])) for name in ("file", "path"))
     stage, folder = open_stage(file, path, Path.cwd())

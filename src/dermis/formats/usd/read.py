@@ -56,7 +56,7 @@ USD_PROPERTIES = (
     refused("layers in other places, value clips", "before any of them is opened"),
     noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
 )
-"""Properties of USD files besides their materials."""
+"""Properties of USD files without their materials."""
 
 
 def read_usd(path: Path) -> MeshFile:
@@ -95,7 +95,7 @@ def _parts(
 ) -> tuple[list[MeshPart], list[str]]:
     """Return the parts of a mesh, one for each group, and notes.
 
-    prefix : of the names of its arrays
+    prefix : prefix of the names of the mesh's arrays
     """
     mesh = {name.removeprefix(prefix): own for name, own in answer.items() if name.startswith(prefix)}
     check_polygon_sizes(path, mesh["counts"])
@@ -119,13 +119,13 @@ def _parts(
 
 
 def _selected(counts: Index, corners: Index, kept: Mask) -> tuple[Index, Index]:
-    """Return the polygons of which `kept` (n,) is true: their numbers of corners, and their corners."""
+    """Return the polygons that a mask (n,) selects: their numbers of corners, and their corners."""
     corner = expand_runs((np.cumsum(counts) - counts)[kept], counts[kept])[1]
     return counts[kept], corners[corner]
 
 
 class _Pictures:
-    """Pictures of a USD file: in its package, or in its folder and below.
+    """Pictures of a USD file, from its package or from its folder and subfolders.
 
     data : bytes of the file
     """
@@ -139,7 +139,7 @@ class _Pictures:
     def material(self, tree: Tree) -> FileMaterial:
         """Return a material; pictures that are missing are left out, with a note.
 
-        tree : as `MaterialReader.read` returns it
+        tree : material as returned by `MaterialReader.read`
         """
         textures, missing = dict[Role, Texture](), dict[str, str]()
         for role, one in tree["textures"].items():

@@ -69,7 +69,7 @@ class _Source(NamedTuple):
 class MaterialReader:
     """Reader of the materials of a stage.
 
-    folder : of the layers, to which names of pictures are relative
+    folder : folder of the layers, to which the names of pictures are relative
     """
 
     def __init__(self, path: Path, folder: Path, time: Usd.TimeCode) -> None:
@@ -79,7 +79,7 @@ class MaterialReader:
     def read(self, material: UsdShade.Material) -> Tree:
         """Return a material as keyword arguments of `FileMaterial`, with its textures as trees.
 
-        "uv" and "vertex_colours" name the primvars of its texture coordinates and vertex colours.
+        The entries "uv" and "vertex_colours" are names of primvars.
         """
         tree: Tree = {"name": material.GetPrim().GetName(), "textures": {}, "unused": []}
         surface = material.ComputeSurfaceSource()[0]
@@ -98,7 +98,7 @@ class MaterialReader:
         return _as_unlit(tree)
 
     def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
-        """Add what an input is connected to: a texture, or colours of vertices."""
+        """Add the texture or the vertex colours to which an input is connected."""
         kind = str(source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             tree |= {"vertex_colours": self._text(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
@@ -141,7 +141,7 @@ class MaterialReader:
         }
 
     def _transform(self, shader: UsdShade.Shader) -> list[float]:
-        """Return the transform of uv with v down, see `Texture`; that of the shader has v up."""
+        """Convert the shader's transform, which has v up, to a transform of uv with v down, see `Texture`."""
         angle = math.radians(self._value(shader, "rotation", 0.0))
         (x, y), (scale_x, scale_y) = (
             self._value(shader, name, default)
@@ -152,7 +152,7 @@ class MaterialReader:
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
     def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
-        """Add the opacity; a picture of it must be the alpha of the picture of the colour."""
+        """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
         source, cutoff = self._source(surface, "opacity"), values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
@@ -172,7 +172,7 @@ class MaterialReader:
                 tree["unused"].append(text)
 
     def _file(self, texture: UsdShade.Shader) -> str:
-        """Return the name of a picture relative to the folder of the layers; if it is outside, as written."""
+        """Return a picture's name relative to the folder of the layers, or unchanged if it is outside."""
         for attribute in self._attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
@@ -181,7 +181,7 @@ class MaterialReader:
         return ""
 
     def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
-        """Return the attributes that provide the value of an input, through interfaces of materials."""
+        """Return the attributes that provide an input's value, resolved through material interfaces."""
         entry = shader.GetInput(name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
@@ -195,7 +195,7 @@ class MaterialReader:
         return None
 
     def _value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
-        """Return the constant value of an input as numbers; the default if it has none."""
+        """Return the constant value of an input as numbers, or the default."""
         for attribute in self._attributes(shader, name):
             if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
                 numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
@@ -211,7 +211,7 @@ class MaterialReader:
 
 
 def _as_unlit(tree: Tree) -> Tree:
-    """Return a material in which the emission of an unlit scan is the colour of the surface."""
+    """Return a material in which the emission of an unlit scan becomes the surface colour."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]

@@ -91,7 +91,7 @@ def _ball_triangles(
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
-    stencils : of a subdivided mesh; None if it is not subdivided
+    stencils : stencils of a subdivided mesh; None if it is not subdivided
     """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:

@@ -26,7 +26,7 @@ GRID_VOXELS = 96
 _GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, over the height of the picture, and its lower limit."""
 _COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
-_SAMPLES_PER_VOXEL = 3.0  # samples per area of a voxel's side
+_SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
 _MIN_ROOT = 0.01
 _PHOTONS = 40_000

@@ -24,7 +24,7 @@ MAX_FILES = 200
 """Maximum number of files of a server."""
 
 IDLE_TIMEOUT_S = 20.0
-"""Maximum time between two received pieces of a file [s]."""
+"""Maximum time between two received chunks of a file [s]."""
 
 TICKET_HEADER = b"x-dermis-ticket"
 _UPLOAD_PATH = "upload"
@@ -98,7 +98,7 @@ class Uploads:
         kind : suffix of the file
         """
         self._count += 1
-        folder = self._folder / str(self._count)  # its own, because a scene may refer to files beside it
+        folder = self._folder / str(self._count)  # separate folders: a scene may refer to files beside it
         path = folder / f"upload{kind}"
         with self._upload_in_progress(name):
             folder.mkdir(mode=0o700)

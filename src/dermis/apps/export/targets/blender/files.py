@@ -50,7 +50,7 @@ _BLENDER_TASK = BlenderTask(
 _TIMEOUT_S = 600.0
 _GGX_RATIO = 0.5
 """GGX roughness over the renderer's Beckmann roughness, by least squares of the square roots of the lobes."""
-_MAX_NAME_LENGTH = 60  # characters; Blender keeps 63
+_MAX_NAME_LENGTH = 60  # characters; Blender truncates names to 63
 _DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
 _HELPER_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
 _TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
@@ -137,7 +137,7 @@ def skin_slots(head: Head) -> list[int]:
 def script_text(export: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
-    As texts are written as literals, a name cannot become code.
+    Texts are written as literals, so that a name cannot inject code.
 
     export : numbers, texts, and nested lists and dictionaries of them
     """

@@ -18,7 +18,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-_SUBDIVISIONS = 4  # pieces into which each edge is divided
+_SUBDIVISIONS = 4  # segments per edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
@@ -64,7 +64,7 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
     """Divide each triangle into n^2 smaller ones, without sharing vertices between original triangles.
 
     triangles : (t,) indices of the original triangles
-    n : number of pieces of each edge
+    n : number of segments per edge
     """
     grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}

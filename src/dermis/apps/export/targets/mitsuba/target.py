@@ -1,8 +1,8 @@
 """Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as Mitsuba has no diffusion profiles.
 
-A refracting surface of index 1.4 around the medium corresponds to tissue. Light through it is found by random
-rays only, so an environment and area lights work. Point and spot lights need the index-matched surface, for
-which another medium is fitted.
+A refracting surface of index 1.4 around the medium corresponds to tissue. Lights cannot be
+sampled through a refracting surface, and random rays only hit environments and area lights. Point and spot
+lights therefore need the index-matched surface, for which another medium is fitted.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def _boundary_factor(boundary: Boundary) -> float:
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the pictures of each part that has some, by material index, without eyes that are modelled."""
+    """Return the roles of each part's pictures by material index, without eyes that have geometry."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
