@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # modes of the null devices that replace closed stdin,
-stdout and stderr
+_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of null devices in place of closed standard streams
 
 
 class StandardStreams:

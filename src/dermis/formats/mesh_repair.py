@@ -445,8 +445,7 @@ class _Surface:
             cosine = view @ normal[:, visible]
             for side, facing in zip(seen, (cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE), strict=True):
                 side += np.bincount(piece[visible[facing]], minlength=len(own))
-        cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # covered by an isolated convex component, on
-        average
+        cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # of an isolated convex component
         alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(own)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)

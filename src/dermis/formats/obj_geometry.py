@@ -259,8 +259,7 @@ def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
-            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type:
-            ignore[type - var]
+            parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
         except ValueError:
             return index
     return 0

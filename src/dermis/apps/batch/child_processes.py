@@ -60,8 +60,7 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
     process = _SPAWN_CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
     with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
         process.start()
-    child_pipe.close()  # only the child has this end open, so that the parent's end breaks when the child
-    dies
+    child_pipe.close()  # the parent's end now breaks when the child dies
     return ChildProcess(process, parent_pipe)
 
 
