@@ -42,7 +42,7 @@ def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
 
     The array of order m is (degree + 1 - m, c); as the panorama is real, negative orders are redundant.
 
-    radiance : (h, w, c)
+    radiance : (h, w, c) radiance of the panorama
     """
     height, width = radiance.shape[:2]
     weighted = radiance * (_row_weights(height) * 2.0 * np.pi / width)[:, None, None]

@@ -44,7 +44,7 @@ _PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "I;16B": ("I;16B", np.uint16),
     "F": ("F", np.float32),
 }
-"""Pillow's mode and the NumPy type of the result by Pillow's mode of the file."""
+"""For each Pillow mode of a file, the mode to which it is converted and the NumPy type of the pixels."""
 _PNG_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
 _TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_RGB = 258, 262, 2
 

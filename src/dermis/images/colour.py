@@ -14,7 +14,7 @@ _XYZ_OF_REC709 = np.array(
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
 )
 _WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
-_CIELAB_DELTA = 6.0 / 29.0  # of the CIELAB function
+_CIELAB_DELTA = 6.0 / 29.0  # constant delta of the CIELAB function
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:

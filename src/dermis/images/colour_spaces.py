@@ -32,7 +32,7 @@ programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
 _CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
 _LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
-_SAME_SPACE = 5e-3  # largest difference of a matrix or a curve from those of sRGB
+_SAME_SPACE = 5e-3  # largest difference from the matrix or curve of sRGB
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _ICC_HEADER, _MAX_ICC_TAGS = 128, 200
@@ -43,7 +43,7 @@ _MAX_NAME = 60  # characters
 class ColourSpace:
     """Colour space of a picture's pixels; the default is sRGB for levels and linear Rec. 709 for floats.
 
-    name : for notes
+    name : name of the colour space, for notes
     to_rec709 : (3, 3) matrix from linear colours to linear Rec. 709; None for the primaries of Rec. 709
     curves : (3, 65536) linear values of evenly spaced levels by channel; None for the curve of sRGB
     """
@@ -120,7 +120,7 @@ def profile_name(icc: bytes) -> str:
 
 
 def profile_space(icc: bytes) -> ColourSpace | None:
-    """Return the colour space of an ICC profile of primaries and curves, or a grey curve; None for tables.
+    """Return the colour space of an ICC profile with primaries and curves; None for a profile of tables.
 
     Such profiles are converted here at the full depth of the picture, because LittleCMS in Pillow has 8 bits.
 
@@ -141,7 +141,7 @@ def profile_space(icc: bytes) -> ColourSpace | None:
 
 
 def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
-    """Return a colour space, in which parts equal to those of sRGB are None.
+    """Return a colour space; a matrix or curves equal to those of sRGB become None.
 
     to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
     """
@@ -160,7 +160,7 @@ def _to_rec709(primaries: Sequence[float]) -> Doubles:
 
 
 def _xyz_of(primaries: Sequence[float]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to the white D50 of profiles by Bradford.
+    """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to the D50 white point of ICC profiles.
 
     primaries : chromaticities x, y of red, green, blue and white
     """

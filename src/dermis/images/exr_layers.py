@@ -19,8 +19,9 @@ _MAX_LISTED = 6
 class ExrLayer:
     """Layer of an OpenEXR file with the channels of a picture.
 
-    part : index of its part
-    name : name of the layer; in files of several parts with the name of its part; empty for plain R, G and B
+    part : index of the part that contains the layer
+    name : name of the layer, in files of several parts preceded by the name of the part; empty for plain R,
+        G, B
     channels : names of the channels of red, green, blue and, if there is one, alpha; or of grey
     """
 
@@ -32,7 +33,8 @@ class ExrLayer:
 def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
     """Return the layer of an OpenEXR file that is read, and a note if there are several with colours.
 
-    A layer without a name has precedence over one whose name means the whole picture, and that over others.
+    Layers without a name have precedence over layers whose name means the whole picture, and these over
+    others.
 
     parts : name and channels of each part
 
@@ -54,9 +56,9 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
 
 
 def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> Iterator[ExrLayer]:
-    """Yield the layers of a part that are pictures: R, G, B in any case or in words, with or without A, or Y.
+    """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
 
-    several : whether the file has several parts, and layers are named by them
+    several : whether the file has several parts, whose names then precede those of the layers
     """
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:

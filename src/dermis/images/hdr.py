@@ -21,7 +21,7 @@ from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
 _CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # by number of channels
-_MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts, because the library decodes all of them
+_MAX_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 _ASPECT_TOLERANCE = 1e-3
 _MAX_NAME = 60  # characters
@@ -97,7 +97,7 @@ def decode_exr(data: bytes) -> Floats:
 
 
 def exr_header(data: bytes) -> PictureHeader:
-    """Return what the header of an OpenEXR file says about its picture; pixels are not decoded."""
+    """Return the header of an OpenEXR file; pixels are not decoded."""
     file = _open_exr_header(data)
     layer, layer_note = _checked_layer(file)
     header = file.parts[layer.part].header
@@ -173,9 +173,9 @@ def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
 
 
 def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
-    """Return the size of the display window, and rows and columns of the data window inside it.
+    """Return the size of the display window, and two pairs of slices for the data window inside.
 
-    They are relative to the data window, then to the display window.
+    The slices (rows, columns) are first relative to the data window, then to the display window.
     """
     data, shown = (np.array(header[name], np.int64)[:, ::-1] for name in ("dataWindow", "displayWindow"))
     low, high = np.maximum(data[0], shown[0]), np.minimum(data[1], shown[1]) + 1
@@ -256,7 +256,7 @@ def decode_radiance(data: bytes) -> Floats:
 
 
 def radiance_header(data: bytes) -> PictureHeader:
-    """Return what the header of a Radiance .hdr file says."""
+    """Return the header of a Radiance .hdr file."""
     header = _radiance_header(data)
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths

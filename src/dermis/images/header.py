@@ -1,4 +1,4 @@
-"""What the header of a picture file says about its pixels."""
+"""Header of a picture file: size, colour space, orientation and notes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dermis.images.colour_spaces import SRGB, ColourSpace
 
 
 class UnsupportedError(ValueError):
-    """Error for a valid picture with pixels that are not read."""
+    """Error for a valid picture whose pixel format is not supported."""
 
 
 @dataclass(frozen=True)
 class PictureHeader:
-    """Size and colour space of a picture file, and what is done with its other properties.
+    """Size and colour space of a picture file, with notes on its other properties.
 
     size : width and height of the stored picture [pixel]
     colour_space : colour space of the decoded pixels
-    orientation : EXIF's number of the turn or mirroring that shows the picture upright; 1 is none
+    orientation : EXIF orientation, 1 to 8: rotation or reflection that turns the picture upright; 1 is none
     notes : sentences about properties that are converted or not used
     colour_note : sentence about the conversion of colours, for pictures whose pixels are colours
     is_grey : whether the pixels have one colour channel

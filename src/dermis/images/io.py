@@ -59,14 +59,14 @@ ODD_PIXELS = (
     refused("radiance above 10¹² in panoramas"),
     refused("odd pixels in maps of heads"),
 )
-"""Pixels of panoramas and linear photographs that are no radiance; the notes state their number."""
+"""Invalid pixels of panoramas and linear photographs, and their replacements."""
 
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
     """Picture file of a glTF file or of a USD package, whose colours are sRGB whatever profile it has.
 
-    name : for error messages
+        name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
     """
 
@@ -74,12 +74,12 @@ class EmbeddedPicture:
     data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name, which stands in error messages instead of a path."""
+        """Return the name, which replaces a path in error messages."""
         return self.name
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the pixels (H, W, C) of a picture file of numbers as stored, row 0 at the top.
+    """Return the pixels (H, W, C) of a picture file with numeric data, row 0 at the top, as stored.
 
     C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
     camera orientation are not used. Notes name other properties that are not used.
@@ -95,14 +95,14 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
 
 
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
-    """Return the pixels (H, W, C) of a picture of colours as `read_image`, and their colour space.
+    """Return the pixels (H, W, C) of a picture of colours, read as by `read_image`, and their colour space.
 
-    The colour space is that of the file's profile or primaries. Pictures of glTF files are sRGB or linear
-    Rec. 709, as glTF demands.
+    The colour space is given by the file's profile or primaries; pictures of glTF files are sRGB or linear
+    Rec. 709, as glTF requires.
 
     upright : turn the picture as its EXIF says, as for photographs
 
-    Raises DermisError as `read_image`.
+    Raises DermisError as `read_image` does.
     """
     data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
     header = _header(path, data)
@@ -114,7 +114,7 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
 def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
     """Issue the note of `read_image` or `read_colours` for a picture that is in a cache.
 
-    colours : whether its pixels are colours, to which profiles apply
+    colours : whether the pixels are colours, to which colour profiles apply
     """
     _note(path, _header(path, read_bytes(path)), colours, upright=False)
 
@@ -177,7 +177,7 @@ def _pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: boo
 
 
 def _turned(image: Pixels, orientation: int) -> Pixels:
-    """Return a picture (H, W, C) turned and mirrored by EXIF's number of its orientation, 1 to 8."""
+    """Return a picture (H, W, C) rotated and mirrored according to its EXIF orientation, 1 to 8."""
     upright = image.swapaxes(0, 1) if orientation >= 5 else image
     upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright
     turned: Any = upright[:, ::-1] if orientation in (2, 3, 6, 7) else upright
@@ -212,7 +212,7 @@ def _apply_codec(
         refuse(path, "a picture of at most 8192 x 8192 pixels", str(fault), "Resize it")
     except UnsupportedError as fault:
         refuse(path, _EXPECTED_PICTURE, str(fault), "Convert it to PNG, or to EXR if it is linear")
-    except DermisError as fault:  # a package is missing
+    except DermisError as fault:  # raised if a package is missing
         raise DermisError(f"{path}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         raise DermisError(
@@ -310,7 +310,7 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
 def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], fast: bool = False) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    parts : for each part by name, its channels (H, W) by name; most programs show only the first part
+    parts : channels (H, W) by name, for each part by name; most programs show only the first part
     fast : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR

@@ -1,4 +1,4 @@
-"""Opening of PNG, JPEG, TIFF, WebP, AVIF and HEIC files with Pillow, and what their headers say."""
+"""Opening of PNG, JPEG, TIFF, WebP, AVIF and HEIC files with Pillow, and parsing of their headers."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ _MAX_BRAND_BYTES = 64
 _HEIC, _HEIC_DECODER = "HEIC", "dermis.images.heic_decoder"
 _PILLOW_LOCK = threading.Lock()
 _JPEG_SCAN = b"\xff\xda"
-_MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
+_MAX_SCANNED_PIXELS = 1 << 30  # total of all scans of a JPEG: sixteen scans of the largest picture
 _GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
 _EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
 _ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
@@ -152,16 +152,16 @@ def _open_heic(data: bytes) -> Image:
     return picture
 
 
-@lru_cache(maxsize=1)  # because the header and the pixels of a picture are read one after the other
+@lru_cache(maxsize=1)  # cached, as header and pixels of a picture are read one after the other
 def _decoded_heic(data: bytes) -> Arrays:
     request = Arrays(data=np.frombuffer(data, np.uint8))
     return run_decoder(_HEIC_DECODER, request, len(data), "a HEIC picture", "pixels")
 
 
 def pillow_header(data: bytes) -> PictureHeader:
-    """Return what the header of a picture file says.
+    """Return the header of a picture file.
 
-    Raises errors as `open_picture`.
+    Raises the errors of `open_picture`.
     """
     picture = open_picture(data)
     exif = _exif(picture)
@@ -174,9 +174,10 @@ def pillow_header(data: bytes) -> PictureHeader:
 
 
 def table_transform(picture: Image) -> ImageCmsTransform | None:
-    """Return the conversion to 8-bit sRGB by a picture's ICC profile, if that consists of tables; else None.
+    """Return the conversion of a picture to 8-bit sRGB if its ICC profile consists of tables, else None.
 
-    Profiles of tables are those of CMYK and of some scanners. The conversion is relative to white and black.
+    CMYK files and some scanners have profiles of tables. Conversion uses the relative colorimetric intent
+    with black point compensation.
     """
     from PIL import ImageCms
 
@@ -244,7 +245,7 @@ def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return SRGB, "its colour profile is damaged, and its colours are taken as sRGB"
     if space is None and table_transform(picture):
-        is_cmyk = picture.mode == "CMYK"  # noted where it is converted
+        is_cmyk = picture.mode == "CMYK"  # noted at the conversion
         return SRGB, None if is_cmyk else f"{_conversion_note(name)}, at 8 bits a channel"
     if space is None or picture.mode in ("CMYK", "F") or (icc[16:20] == b"GRAY" and not is_grey):
         return SRGB, f"its colour profile, {name}, does not fit its pixels, and is not used"

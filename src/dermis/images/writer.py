@@ -139,7 +139,7 @@ class FrameFiles:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
-        """Return those frame numbers whose pictures are not complete files of this sequence.
+        """Return the frame numbers without a complete picture of this sequence.
 
         size : width and height of the pictures
         """

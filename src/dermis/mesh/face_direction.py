@@ -14,8 +14,8 @@ _MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
 # Of the eyes, relative to their width together:
 _MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MIN_GAP, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.1, 0.25, 0.25, 3.0
 # Of the head, relative to its height:
-_HEAD_WIDTH = 0.68  # of the head alone, without shoulders
-_DEPTHS = 0.5, 1.6  # smallest and largest
+_HEAD_WIDTH = 0.68  # largest width of the head without shoulders
+_DEPTHS = 0.5, 1.6  # smallest and largest depth
 _MAX_ASYMMETRY = 0.03  # root mean square distance of mirrored points from the surface
 _MIN_NOSE = 0.04  # protrusion of the middle of the face
 _MIN_RELIEF = 0.03  # see `_relief`
@@ -25,7 +25,7 @@ _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 
 def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direction | None:
-    """Return the horizontal axis along which a face looks, None if it cannot be found with certainty.
+    """Return the horizontal axis along which a face looks; None if it is uncertain.
 
     positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices
@@ -47,7 +47,7 @@ def _from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     front = 2 if spread[0] > spread[2] else 0
     width = spread[2 - front]
     if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_GAP * width:
-        return None  # it is one eye
+        return None  # the vertices are those of one eye
     offset = np.abs(points - middle)
     near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _REACH * width)]
     if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
@@ -92,7 +92,7 @@ def _direction(axis: int, sign: float) -> Direction:
 
 
 def _head_height(points: Doubles) -> float:
-    """Return the height of the head at the top of points (n, 3): where shoulders would make it too wide."""
+    """Return the height of the head at the top of points (n, 3), down to where shoulders exceed its width."""
     ordered = points[np.argsort(-points[:, 1])]
     depth, across = ordered[0, 1] - ordered[:, 1], ordered[:, ::2]
     widths = np.maximum.accumulate(across) - np.minimum.accumulate(across)
@@ -101,7 +101,7 @@ def _head_height(points: Doubles) -> float:
 
 
 def _normals(corners: Doubles) -> Doubles:
-    """Return the normals of triangles (f, 3, 3), as long as twice their area, as columns (3, f)."""
+    """Return the normals of triangles (f, 3, 3) with twice the area as their length, as columns (3, f)."""
     a, b, c = np.moveaxis(corners, 0, -1)
     return cross_columns(b - a, c - a)
 
@@ -109,7 +109,7 @@ def _normals(corners: Doubles) -> Doubles:
 def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
     """Return points (n, 3) that are spread evenly over triangles (f, 3, 3), and their unit normals.
 
-    normals : normals of the triangles, as long as twice their area, as columns (3, f)
+    normals : normals of the triangles with twice the area as their length, as columns (3, f)
     """
     areas = np.sqrt(dot_columns(normals, normals))
     total = np.cumsum(areas)
@@ -120,7 +120,7 @@ def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _asymmetry(points: Doubles, axis: int) -> float:
-    """Return the root mean square distance of points (n, 3) from those mirrored along a horizontal axis."""
+    """Return the root mean square distance of points (n, 3) from their mirror images along an axis."""
     single = points.astype(np.float32)
     mirrored = single[:: len(points) // _MIRRORED] * np.where(np.arange(3) == axis, -1, 1).astype(np.float32)
     squares = (-2 * mirrored) @ single[::2].T
@@ -130,7 +130,7 @@ def _asymmetry(points: Doubles, axis: int) -> float:
 
 
 def _relief(points: Doubles, normals: Doubles) -> float:
-    """Return how much the normals (n, 3) of points (n, 3) vary within small cells, 0 to 1."""
+    """Return the variation of normals (n, 3) at points (n, 3) within small cells, 0 to 1 [-]."""
     keys = np.floor(points / _CELL).astype(np.int64) @ [1, 1 << 20, 1 << 40]
     cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
     sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
@@ -138,9 +138,9 @@ def _relief(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge(points: Doubles, front: int) -> float:
-    """Return how far the middle of one side of a head protrudes beyond both sides of it, at most.
+    """Return the largest protrusion of the middle of the front or back of a head beyond its two sides.
 
-    points : (n, 3) of this side
+    points : (n, 3) points of the front or back
     """
     row = (points[:, 1] / -_ROW).astype(int)
     across, depth = points[:, 2 - front], np.abs(points[:, front])

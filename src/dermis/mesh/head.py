@@ -41,9 +41,9 @@ class Head:
     eyes : Eyes, optional
         Eyeballs of realistic shape.
     strands, hair : Strands, optional
-        Brows and lashes; hair of head and beard in random order, so that a few can represent all from afar.
+        Brows and lashes; hair of head and beard in random order, so that the first ones can represent all.
     note : str, optional
-        Parts of the file that are not used, and why; empty for none.
+        Parts of the file that are not used, with reasons; empty for none.
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional
@@ -147,9 +147,10 @@ class Head:
 
     @cached_property
     def axes(self) -> Doubles:
-        """Return the directions (3, 3), in rows, to the right, upwards and to the front of what is seen.
+        """Return the directions to the right, upwards and to the front, as rows (3, 3).
 
-        They are x, y and z for a head. A flat piece of skin is seen from the side that it faces.
+        They are x, y and z for a head; the front of a flat patch of skin is the side to which its normals
+        point.
         """
         return np.eye(3) if self.skull_mm is not None else facing_axes(self.mesh.positions, self.mesh.normals)
 

@@ -11,7 +11,7 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.summary import ShortRepr
 
-_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # for means: samples along each side, and largest distance of them
+_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and largest distance between them
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +51,7 @@ class Maps(ShortRepr):
     region: Bytes | None = None
     parts: PartMaps | None = None
     is_painted: ClassVar[bool] = False
-    """Whether the device paints those that are None."""
+    """Whether the device paints the maps that are None."""
 
     @property
     def has_roughness(self) -> bool:

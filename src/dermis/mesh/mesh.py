@@ -27,9 +27,9 @@ class Material:
     name : name of the group in the file
     kind : "skin" is rendered with subsurface scattering, "opaque" with a diffuse and a specular lobe
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
-    part : which teeth, or the tongue, for the colours of mouth.wgsl; None for other surfaces
+    part : part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
-    has_maps : whether `Maps.parts` has the colour and the surface of an opaque group, factors included
+    has_maps : whether `Maps.parts` contains colour and surface of an opaque group, with its factors applied
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709

@@ -23,19 +23,19 @@ _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
 _REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
 _CLOSE_MM = 0.5
 _BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
-_CANDIDATES_PER_DIRECTION = 16  # candidates per direction, of which a pose may bring another one outermost
+_CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
 _RANDOM_POSES, _SEED = 128, 0
 _MAX_DEGREES = 60.0
-_MAX_BONES = 4  # that are rotated in one pose
-_ACTIVE_TARGETS = 0.3  # fraction of the targets in one pose
-_MIN_WEIGHT = 0.02  # of a bone for a point to follow it
+_MAX_BONES = 4  # bones that are rotated in one pose
+_ACTIVE_TARGETS = 0.3  # fraction of the targets that are active in one pose
+_MIN_WEIGHT = 0.02  # least weight of a bone that a point follows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outline(ShortRepr):
     """Points that bound a shape in every direction.
 
-    points_mm : (n, 3)
+    points_mm : (n, 3) positions
     margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges add it
     """
 
@@ -66,7 +66,7 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
     try:
         return np.sort(ConvexHull(positions.astype(np.float64)).vertices).astype(np.intp)
-    except QhullError:  # it is flat
+    except QhullError:  # the positions lie in a plane
         return np.arange(len(positions))
 
 
@@ -88,8 +88,8 @@ class RigOutline(ShortRepr):
     def pose(self, weights: Floats, matrices: Floats) -> Floats:
         """Return the outline points in a pose, (s, 3) [mm].
 
-        weights : (t,) of the targets, relative to the rest pose
-        matrices : (b, 3, 4) of all bones of the rig
+        weights : (t,) weights of the targets, relative to the rest pose
+        matrices : (b, 3, 4) matrices of all bones of the rig
         """
         columns, active = self.rest_mm, weights.nonzero()[0]
         if len(active):
@@ -108,7 +108,7 @@ def rig_outline(
 ) -> RigOutline:
     """Return the outline of a rig that consists of the given points, with their targets and weights.
 
-    positions : (p, 3) of all control points at rest [mm]
+        positions : (p, 3) positions of all control points at rest [mm]
     points : (s,) indices of the outline points
     """
     rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])
@@ -134,7 +134,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 
     The poses are the rest pose, each morph target alone, and random poses.
 
-    positions : (p, 3) of all control points at rest [mm]
+    positions : (p, 3) positions of all control points at rest [mm]
     """
     candidates = _outline_candidates(positions, targets, skeleton)
     outline = rig_outline(positions, targets, skeleton, candidates)

@@ -21,9 +21,9 @@ MAX_WEIGHT = 100.0
 MAX_DEGREES = 1e5
 MAX_DISTANCE_MM = 1e6
 _BONE_VALUES = "three angles [degrees] or a (4, 4) matrix"
-_SUGGESTIONS = 3  # names that are proposed
-_MAX_LETTERS = 80  # of a name, that are compared
-_MIN_DETERMINANT = 1e-9  # of a matrix, relative to its size cubed
+_SUGGESTIONS = 3  # names that an error message proposes
+_MAX_LETTERS = 80  # compared letters of a name
+_MIN_DETERMINANT = 1e-9  # least determinant of a matrix, relative to the cube of its norm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +40,7 @@ class Pose(ShortRepr):
         space to its parent's, in the units of the file, as animations have it.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
-        person of the same topology, or a motion from elsewhere.
+        person of the same topology, or a motion from another program.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _bone_transforms(
 def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
-    names : (n,) of the bones
+    names : (n,) names of the bones
     """
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))

@@ -58,7 +58,7 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     u goes around +Y from -Z by -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an
     apex vertex of its own, with u at the middle of its base, so that none is degenerate.
 
-    radius_mm : [mm]
+    radius_mm : radius [mm]
     segments, rings : number of cells around the axis, and from pole to pole, at least 3 and 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):

@@ -29,7 +29,7 @@ __all__ = [
     "no_targets",
 ]
 
-_CACHE_VERSION = "outline 6"  # to be changed when other points are found
+_CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
@@ -65,9 +65,9 @@ class Stencils(ShortRepr):
 
 
 class BoneRotation(NamedTuple):
-    """Rotation of a bone that a morph target makes in addition to its displacements.
+    """Rotation of a bone by a morph target, in addition to the target's displacements.
 
-    target, bone : names
+    target, bone : names of the target and of the bone
     degrees : angles about the head's x, y and z at weight 1
     """
 
@@ -95,7 +95,7 @@ class Rig(ShortRepr):
     targets, skeleton : morph targets and bones; `skeleton` is None without bones
     stencils : subdivision from control points to mesh points; None without subdivision
     bone_rotations : rotations of bones by morph targets
-    rigid_followers : points that are not in the file, such as fitted eyeballs; they come after its own
+    rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None to let them intersect
     template : rig of the same topology whose outline points are reused, in addition to the corners of the
         convex hull; None to search outline points
@@ -243,8 +243,8 @@ class Rig(ShortRepr):
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """Return all control points in a pose, (p, 3) [mm]; the reference for the computation on the device.
 
-        weights : (t,) of the targets, relative to the rest pose
-        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; None for the rest pose
+        weights : (t,) weights of the targets, relative to the rest pose
+        matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         row_weights = np.repeat(weights, np.diff(targets.first))

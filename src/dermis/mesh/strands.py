@@ -74,9 +74,9 @@ class Strands(ShortRepr):
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
-    """Express knot offsets from each root in the frame of that root, as `Strands.knots_mm` has them.
+    """Express knot offsets from each root in the frame of that root, as in `Strands.knots_mm`.
 
-    offsets_mm : (n, k, 3) in head space, on the mesh at rest
+    offsets_mm : (n, k, 3) offsets in head space, on the mesh at rest
     """
     return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
@@ -150,7 +150,7 @@ def refine_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
 
     The first corner of each finer quad is a corner of the coarser face.
 
-    mesh : before subdivision
+    mesh : mesh before subdivision
     """
     loose_triangles = len(mesh.triangles) - 2 * len(mesh.quads)
     quad, position = roots.quad.astype(np.int64), roots.position.astype(np.float64)

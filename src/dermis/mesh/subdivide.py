@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 MAX_LEVELS = 3
-_CACHE_VERSION = "subdivision 1"  # to be changed when weights or corners change for the same mesh
+_CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
 _CACHED_TRIANGLES = 500_000
 """Number of finer triangles from which weights are cached on disk, which saves half a second or more."""
 Corners = NDArray[np.integer]
@@ -41,9 +41,9 @@ class Refinement:
     """Subdivision of all meshes of one topology: v finer vertices at q finer points.
 
     weights : (q, p) weights of the control points in each finer point
-    stencils : these weights as a rig stores them
+    stencils : the same weights in the format of a rig
     uv, point : (v, 2) and (v,) uv and point of the finer vertices
-    triangles, material, quads : of the finer mesh, see `Mesh`
+    triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
 
     weights: csr_array

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Cage(NamedTuple):
     """Polygons before a level of subdivision.
 
-    uv : (v, 2) of each vertex
+    uv : (v, 2) uv of each vertex
     point : (v,) point of each vertex
     corner : (n,) vertices at the corners, face by face
     sides : (f,) number of corners of each face
@@ -42,9 +42,9 @@ class _Sides:
     face : (n,) face of each side
     ends : (e, 2) points at the ends of each edge
     edge : (n,) edge of each side
-    border : (e,) whether the number of sides of an edge is not two
-    seam_edges, seam_edge : edges as pairs of vertices, and the one of each side; an edge on a uv seam counts
-        twice
+    border : (e,) mask of edges whose number of sides is not two
+    seam_edges, seam_edge : edges as pairs of vertices, and the index of each side's edge; an edge on a uv
+        seam counts twice
     """
 
     points: int
@@ -169,7 +169,7 @@ def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
-    """Return the matrix (e, p) that gives the points at both ends of an edge its weight.
+    """Return the matrix (e, p) whose entries for both end points of an edge are the edge's weight.
 
     weight : (e,) weight of each edge
     """
@@ -180,14 +180,14 @@ def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
 def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
     """Return the weights (p, p) of old points in the new positions of the old points.
 
-    own, each : (p,) for inner points: weight of the point itself, and of each neighbour
-    along : for border points: weight of either neighbour on the border
+    own, each : (p,) weights of an inner point itself, and of each of its neighbours
+    along : weight of each neighbour of a border point along the border
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
     neighbour_weight = np.where(is_inner, each, 0)[both]
     neighbour_weight[np.tile(sides.border, 2) & is_border[both]] = along
-    # points where borders meet, or where the surface is not manifold, stay
+    # points where borders meet, or where the surface is not manifold, do not move
     own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
     index, weights = np.arange(sides.points), np.concatenate((own_weight, neighbour_weight))
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))

@@ -17,8 +17,8 @@ from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
-_DISTANCE_MM = 1100.0  # of portrait photography; from a shorter distance the nose looks large
-_RELATIVE_DISTANCE = 3.0  # to the size of what is shown as a whole
+_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
+_RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
 _MARGIN = 1.08
 _UP = (0.0, 1.0, 0.0)
 
@@ -144,7 +144,7 @@ class Camera(FrozenModel):
 
 
 def portrait(head: Head) -> Camera:
-    """Return a camera that shows head and shoulders from the front, also those of a body.
+    """Return a camera that shows head and shoulders from the front.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ CAMERA_PRESETS = {
     "cheek": cheek,
     "full_body": full_body,
 }
-"""Functions of the head that return a camera, by name; hyphens and underscores are alike."""
+"""Functions of the head that return a camera, by name; hyphens and underscores are interchangeable."""
 
 
 def camera_preset(name: str, head: Head) -> Camera:

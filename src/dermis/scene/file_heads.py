@@ -40,7 +40,7 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, which replace those of the mesh file; None for no choice
+    files : picture files by role, which replace those of the mesh file; None keeps the picture of the mesh
     height_mm, normal_y : see `load_maps`
     """
 
@@ -50,19 +50,19 @@ class MapOptions:
 
     @property
     def given(self) -> dict[str, MapFile]:
-        """Return the files that users name."""
+        """Return the files that the user has chosen, by role."""
         return {role: file for role, file in self.files.items() if file is not None}
 
     @property
     def replaced(self) -> set[str]:
-        """Return the roles of pictures of the file that the given files replace."""
+        """Return the roles for which the user's files replace pictures of the mesh file."""
         relief = {"normal", "height", "bump"}
         return {*self.given, *(relief if relief & self.given.keys() else ())}
 
     def load(self, files: Mapping[str, Any]) -> Maps:
-        """Return the maps of the given files and, for other roles, of those that belong to the mesh.
+        """Load the user's files and, for all other roles, the pictures of the mesh.
 
-        files : pictures of the mesh by role, and "height_mm" of its height map
+        files : pictures of the mesh by role, and under "height_mm" the relief of its height map
         """
         chosen: dict[str, Any] = {
             role: files.get(role) if file is None else file for role, file in self.files.items()
@@ -78,7 +78,7 @@ class MapOptions:
 
 
 def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
-    """Return the head of a sample or a mesh file, and the look of its eyes that the file states.
+    """Return the head of a sample or a mesh file, and the eye look that the file states.
 
     name : name of the sample or of the file
     mesh_options : keyword arguments of `load_rigged`
@@ -139,7 +139,7 @@ def _with_materials(
 
 
 def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tuple[Maps, list[str]]:
-    """Return the maps of a material whose pictures are those of the skin, and notes on maps left out."""
+    """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
     if path.suffix.lower() != ".obj" or not material.name:
         return with_factors(options.load(material.skin_pictures()), material, options.given), []
     own, faults = obj_maps(

@@ -1,4 +1,4 @@
-"""Maps and materials of heads from mesh files: the pictures of each material on the parts that have it."""
+"""Maps and materials of heads from mesh files, from the pictures of each material."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh whose skin has uv everywhere: a new layout where the file has none, with a note."""
+    """Return a mesh with a new uv layout for skin without uv, and a note."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -39,7 +39,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures are the maps of the skin as they are, None if they must be packed.
+    """Return the material whose pictures serve unchanged as maps of the skin; None if they must be packed.
 
     rigged, materials : mesh and materials of a file
     """
@@ -59,9 +59,9 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
 
 
 def with_factors(maps: Maps, material: FileMaterial, given: Collection[str]) -> Maps:
-    """Return the maps of a skin material with its factors; roughness is the square of the file's.
+    """Return the maps of a skin material, multiplied by its factors; roughness is squared.
 
-    given : roles of maps that users replace, to which the factors do not apply
+    given : roles of maps that the user replaces, to which the factors do not apply
     """
     changed: dict[str, Any] = {}
     if material.maps is None and "colour" not in given and material.colour not in (None, (1.0, 1.0, 1.0)):
@@ -83,7 +83,7 @@ def _members(mesh: Mesh, kind: str) -> Mask:
 
 
 def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
-    """Return whether vertices of some materials have a colour other than white."""
+    """Return whether any vertex of the materials in a mask has a colour other than white."""
     if surface.colours is None:
         return False
     return bool((surface.colours[np.unique(mesh.triangles[members[mesh.material]])] < 1.0).any())
@@ -92,7 +92,7 @@ def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
 def with_file_textures(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
 ) -> tuple[Mesh, Maps, tuple[str, ...]]:
-    """Return the mesh with uv in common maps, the maps, and notes on what is not exact.
+    """Return the mesh with uv in common maps, the maps, and notes on loss of detail.
 
     rigged, materials : mesh and materials of a file
     pack_skin : whether the maps of the skin are packed, see `direct_material`
@@ -133,7 +133,7 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
 def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
     opaque = _members(mesh, "opaque")
-    if any(one.maps is not None for one in materials):  # eyes in files of this package are fitted again
+    if any(one.maps is not None for one in materials):  # this package wrote the file; eyes are fitted again
         opaque &= ~np.array([one.eye for one in mesh.materials])
     pictured = np.zeros_like(opaque)
     for index in np.flatnonzero(opaque):
@@ -150,7 +150,7 @@ def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
 
 
 def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
-    """Return a changed mesh of the same shape with the outline of the original, a costly hull."""
+    """Return a changed mesh of the same shape with the cached outline of the original."""
     vars(changed)["outline"] = mesh.outline
     return changed
 
@@ -176,7 +176,7 @@ def _emission(values: Floats | None) -> Floats | None:
 
 
 def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
-    """Return an opaque material with the surface that its file states."""
+    """Return an opaque material with the surface properties of its file."""
     if material.kind == "skin":
         return material
     if in_file is None:
@@ -198,10 +198,10 @@ def unused_properties(
     given: Collection[str],
     is_packed: bool,
 ) -> str:
-    """Return the note on what of a file's materials is not drawn; empty for nothing.
+    """Return a note on properties of a file's materials that are not drawn; empty if there are none.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
-    given : roles of maps of the skin that users replace
+    given : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
@@ -221,7 +221,7 @@ def unused_properties(
 
 
 def _replaced_by_skin(material: FileMaterial) -> list[str]:
-    """Return the properties of a material that skin has itself."""
+    """Return the properties of a material that the settings of the skin replace."""
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")

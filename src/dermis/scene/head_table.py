@@ -72,7 +72,7 @@ class HeadTable(FrozenModel):
     height_mm: _Relief = None
     """Relief of one grey level of an 8-bit height map [mm]."""
     specular: str | None = None
-    """Map of the specular strength, scaled to a mean of rho_s."""
+    """Map of the specular strength, scaled so that its mean is rho_s."""
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
     unit_mm: _Unit = None

@@ -247,7 +247,7 @@ LIGHTS: Registry[type[Light]] = Registry(
 reference; exports write a registered light as the class that it derives from."""
 
 
-_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0  # usual, and largest for which presets stay as they are
+_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0  # typical, and largest without scaling
 _NARROW_DEGREES = 10.0
 _SIZES = "width_mm", "height_mm", "radius_mm"
 _VECTORS = "position", "target", "direction", "up"

@@ -14,14 +14,14 @@ from dermis.mesh.rotations import matrix_angles, rigid_motion
 
 _ROOT_NAME, _BONE_NAMES = "scene", ("eye.L", "eye.R")
 _MAX_OTHER_FOLLOWERS = 0.05
-"""Of the points that follow a bone: with more beside the eye's, it is the head's and not the eye's."""
-_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02
+"""Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
+_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
 
 class FittedEyeball(NamedTuple):
     """Fitted eyeball that replaces an eyeball of a file.
 
-    centre : (3,) [mm]
+    centre : (3,) centre of the ball [mm]
     points : (n, 3) control points of the fitted eyeball [mm]
     replaced : (m,) indices of the control points of the file's eyeball
     """

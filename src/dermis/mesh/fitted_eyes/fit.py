@@ -28,7 +28,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_GRID_SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
+_GRID_SIDE = 2 * eyeball.SIDE  # quads along a cube edge, as of the human's eyes after one subdivision
 _MATERIAL_NAMES = "left eye", "right eye"
 _INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
@@ -161,7 +161,7 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
 
     balls : indices of the triangles of each eyeball of the file
     positions : (n, 3) points of each fitted eyeball [mm]
-    quads : (q, 4) of a fitted eyeball
+    quads : (q, 4) quads of a fitted eyeball
     """
     remains = np.ones(len(mesh.triangles), bool)
     remains[np.concatenate(balls)] = False
@@ -191,7 +191,7 @@ def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Mat
     """Return one mesh of both fitted eyeballs, each with its own material.
 
     positions : (n, 3) points of each eyeball [mm]
-    quads : (q, 4) of an eyeball
+    quads : (q, 4) quads of an eyeball
     """
     count, faces = len(positions[0]), len(quads)
     return build_mesh(
