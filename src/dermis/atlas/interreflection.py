@@ -94,11 +94,11 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, except those
         cut out by their opacity, such as cards of hair, which are left out
     """
-    facing, left = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
+    facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
     if len(facing):
         lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE))
-        facing, left = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
-    return _form_factors(facing, left, mesh, corner_uv, mapped)
+        facing, line_counts = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
+    return _form_factors(facing, line_counts, mesh, corner_uv, mapped)
 
 
 def _trace_lines(
@@ -117,9 +117,9 @@ def _trace_lines(
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
     if len(corner) > _MAX_TRACED_TRIANGLES:
         vertices, corner = merge_near_points(vertices, corner, _MERGED_LINES / per_mm)
-        solid = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
-        corner, corner_uv, mapped = corner[solid], corner_uv[solid], mapped[solid]
-    rng, left, facing = (
+        proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
+        corner, corner_uv, mapped = corner[proper], corner_uv[proper], mapped[proper]
+    rng, line_counts, facing = (
         np.random.default_rng(_SEED),
         np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE),
         [np.zeros((0, 2), np.int64)],
@@ -129,9 +129,9 @@ def _trace_lines(
         points = vertices @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
         line, depth, outward, triangle, weights = intersect_lines(points[corner])
         cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
-        left += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
+        line_counts += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
         facing.append(_facing_cells(line, depth, outward, cell))
-    return np.concatenate(facing), left
+    return np.concatenate(facing), line_counts
 
 
 def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
@@ -210,24 +210,26 @@ def _line_axes(direction: Doubles, angle: float) -> Doubles:
     return np.stack([c * right + s * up, c * up - s * right, direction])
 
 
-def _form_factors(facing: Index, left: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
+def _form_factors(
+    facing: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
+) -> FormFactors:
     """Return the form factors that result from counts of lines between cells.
 
     facing : (m, 2) pairs of cells that lines connect
-    left : (CELLS_PER_SIDE^2,) number of lines that left each cell
+    line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
     count = len(triangle) // SAMPLES_PER_PATCH
     has_texels = (facing >= 0).all(axis=1)
     cell, target = facing[has_texels, 0], patch_of[facing[has_texels, 1]]
     patch, known = patch_of[cell], target >= 0
-    left_patch = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count).astype(np.float64)
-    usual = np.median(left[left > 0]) if (left > 0).any() else 1.0
+    left_patch = np.bincount(patch_of[patch_of >= 0], line_counts[patch_of >= 0], count).astype(np.float64)
+    usual = np.median(line_counts[line_counts > 0]) if (line_counts > 0).any() else 1.0
     known_patch = known & (patch >= 0)
     return FormFactors(
-        *_sparse_rows(cell[known], target[known], left, count),
+        *_sparse_rows(cell[known], target[known], line_counts, count),
         _nearest_patch(patch_of),
-        np.minimum(left / usual, 1.0).astype(np.float32),
+        np.minimum(line_counts / usual, 1.0).astype(np.float32),
         *_sparse_rows(patch[known_patch], target[known_patch], left_patch, count),
         triangle,
         weights,
@@ -245,21 +247,25 @@ def _nearest_patch(patch_of: Index) -> Words:
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
-def _sparse_rows(row: Index, target: Index, left: Doubles, patches: int) -> tuple[Words, Words, Floats]:
+def _sparse_rows(
+    row: Index, target: Index, line_counts: Doubles, patches: int
+) -> tuple[Words, Words, Floats]:
     """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
 
     row : (m,) index of the cell or patch that each line left
     target : (m,) index of the patch that the line met next
-    left : (r,) number of lines that left each cell or patch
+    line_counts : (r,) number of lines that left each cell or patch
     patches : number of patches
     """
     entry, lines = np.unique(row * max(patches, 1) + target, return_counts=True)
     row, column = entry // max(patches, 1), entry % max(patches, 1)
-    factor = lines / left[row]
+    factor = lines / line_counts[row]
     large = factor >= _MIN_FORM_FACTOR
-    total, total_large = (np.bincount(row[some], factor[some], len(left)) for some in (slice(None), large))
+    total, total_large = (
+        np.bincount(row[some], factor[some], len(line_counts)) for some in (slice(None), large)
+    )
     factor = factor[large] * (total / np.maximum(total_large, 1e-12))[row[large]]
-    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(left)))])
+    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(line_counts)))])
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 

@@ -99,11 +99,11 @@ def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> 
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]:
+def _row_interval(p: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
     """Return the lowest and highest x at which each row y of texels intersects its triangle.
 
     p : (t, 3, 2) corners of the triangles [texel]
-    which : (n,) triangle index of each row
+    triangle : (n,) triangle index of each row
     y : (n,) row index
     """
     lowest = np.full(len(y), -np.inf)
@@ -114,7 +114,7 @@ def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]
     slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
     offsets = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
     for k in range(3):
-        slope, offset = slopes[which, k], offsets[which, k] + across[which, k] * y
+        slope, offset = slopes[triangle, k], offsets[triangle, k] + across[triangle, k] * y
         crossing = -offset / np.where(slope == 0, 1.0, slope)
         np.maximum(lowest, crossing, out=lowest, where=slope > 0)
         np.minimum(highest, crossing, out=highest, where=slope < 0)

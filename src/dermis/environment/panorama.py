@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 from dermis.formats.samples import SAMPLES, fetch_sample
 from dermis.images.colour import luminance
-from dermis.images.io import mended_radiance, read_colours
+from dermis.images.io import read_colours, repaired_radiance
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
@@ -43,7 +43,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = space.linear(mended_radiance(name, np.asarray(image[..., :3], np.float32)))
+    rgb = space.linear(repaired_radiance(name, np.asarray(image[..., :3], np.float32)))
     if (highest := float(rgb.max())) > _MAX_RADIANCE:
         refuse(name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again")
     height, width = rgb.shape[:2]

@@ -22,7 +22,7 @@ from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_fi
 from dermis.formats.axes import Axes, Axis, Front, file_axis, to_y_up
 from dermis.formats.materials import FileMaterial
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
-from dermis.formats.mesh_repair import RawMesh, mend
+from dermis.formats.mesh_repair import RawMesh, repair_mesh
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_binary_gltf, is_gltf
 from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
@@ -136,7 +136,7 @@ def _load_uncached(
             point = split_points(point, vertices, to_head[:3, :3], source)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
-        raw, mended = mend(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
+        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
         raw, assigned, emptied = _without_empty(raw, assigned)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
@@ -144,7 +144,7 @@ def _load_uncached(
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
-    notes = (*filter(None, (note, turned)), *mesh_file.notes, *mended, *emptied)
+    notes = (*filter(None, (note, turned)), *mesh_file.notes, *repairs, *emptied)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
     surface = FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv)

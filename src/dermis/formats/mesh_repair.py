@@ -30,17 +30,18 @@ from dermis.mesh.mesh import Material, Mesh, build_mesh
 
 _MAX_FLAT = 0.5
 """Fraction of triangles without area above which a mesh is refused instead of repaired [-]."""
-_MAX_CROWDED_EDGES = 100_000
+_MAX_NON_MANIFOLD_EDGES = 100_000
 """Number of non-manifold edges above which a mesh is refused instead of repaired."""
 _MAX_PAIRED_SIDES = 8
 """Triangles at an edge above which the edge is cut open, instead of a search for sheets across it."""
 _MIN_CONVEXITY = -0.05
 """Mean cosine of normals and directions from the centroid below which a component may be inverted [-]."""
-_OPPOSED = -0.5
+_MAX_OPPOSITE_COSINE = -0.5
 """Mean cosine of the file's normals and the triangles' normals below which these are opposite [-]."""
-_SEEN_BALANCE = 0.25
+_MIN_BALANCE = 0.25
 """Excess of one side among the visible samples above which a component shows that side outwards [-]."""
-_MIN_SEEN, _MIN_VISIBLE, _MIN_SLOPE = 8, 0.02, 0.05  # samples, fraction of an isolated component, cosine
+_MIN_VISIBLE_SAMPLES, _MIN_SLOPE = 8, 0.05  # slope as a cosine
+_MIN_VISIBLE_FRACTION = 0.02  # of the samples that an isolated component would have
 _VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 20, 64, 120_000
 _DOUBTFUL_SAMPLES = 0.25  # fraction of the samples for components that may be inverted
 _MAX_UV_EXCESS = 0.02
@@ -89,10 +90,12 @@ class RawMesh:
         """Return the sides of the triangles, grouped by edge."""
         return _group_sides(self.corners)
 
-    def with_triangles(self, kept: Mask) -> RawMesh:
+    def with_triangles(self, selected: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
-        quads = (np.cumsum(kept) - 1)[self.quads[kept[self.quads].all(axis=1)]]
-        return replace(self, triangles=self.triangles[kept], material=self.material[kept], quads=quads)
+        quads = (np.cumsum(selected) - 1)[self.quads[selected[self.quads].all(axis=1)]]
+        return replace(
+            self, triangles=self.triangles[selected], material=self.material[selected], quads=quads
+        )
 
     def with_corners(self, corners: Index) -> RawMesh:
         """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
@@ -124,7 +127,7 @@ class RawMesh:
         )
 
 
-def mend(
+def repair_mesh(
     mesh: RawMesh, materials: Sequence[FileMaterial | None], is_skin: Mask
 ) -> tuple[RawMesh, tuple[str, ...]]:
     """Return a mesh without the faults that can be repaired, and a note on each fault.
@@ -141,8 +144,8 @@ def mend(
     flat = flat_triangles(mesh.positions, mesh.triangles)
     if flat.mean() > _MAX_FLAT:
         return mesh, ()
-    mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
-    return _move_uv(mended if mended is mesh else mended.compact(), materials, notes), tuple(notes)
+    repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
+    return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
 
 
 def _counted(count: int, noun: str) -> str:
@@ -235,7 +238,7 @@ def _label(count: int, links: NDArray[np.integer]) -> Index:
 def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with separate points for sheets that meet at non-manifold edges."""
     count = int((mesh.sides.counts > 2).sum())
-    if not 0 < count <= _MAX_CROWDED_EDGES:
+    if not 0 < count <= _MAX_NON_MANIFOLD_EDGES:
         return mesh
     notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
     links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
@@ -338,7 +341,9 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
     surface = _Surface(piece, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normals(mesh))
-    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (agreement < _OPPOSED)
+    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (
+        agreement < _MAX_OPPOSITE_COSINE
+    )
     if doubtful.any():
         turned = _inside_out(surface, doubtful, agreement)
         reverse ^= turned[piece]
@@ -348,7 +353,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
-    inwards = np.unique(mesh.triangles[(agreement < _OPPOSED)[piece]])
+    inwards = np.unique(mesh.triangles[(agreement < _MAX_OPPOSITE_COSINE)[piece]])
     if len(inwards):
         notes.append(f"turned {_counted(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
@@ -448,7 +453,7 @@ class _Surface:
         cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # of an isolated convex component
         alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(own)) / 2)
         front, back = seen
-        is_seen = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)
+        is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
 
@@ -472,8 +477,8 @@ def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
     agreement : mean cosine between the file's normals and the triangles' normals, by component
     """
     balance, backs_prevail = surface.visible_balance(doubtful)
-    opposed = (agreement < _OPPOSED) & (balance <= _SEEN_BALANCE)
-    return np.asarray((balance < -_SEEN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
+    opposed = (agreement < _MAX_OPPOSITE_COSINE) & (balance <= _MIN_BALANCE)
+    return np.asarray((balance < -_MIN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:

@@ -344,10 +344,10 @@ class _ElementReader:
                 skipped = []
         if not steps:
             return []
-        rest, count = self._fixed_size(skipped), self.element.count
-        lengths, end = self._walk(position, steps, rest, 1)
+        trailing_bytes, count = self._fixed_size(skipped), self.element.count
+        lengths, end = self._walk(position, steps, trailing_bytes, 1)
         if not self._is_uniform(position, end - position, steps, lengths[0]):
-            lengths, _ = self._walk(position, steps, rest, count)
+            lengths, _ = self._walk(position, steps, trailing_bytes, count)
         return list(np.broadcast_to(lengths, (count, len(steps))).T)
 
     def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
@@ -366,10 +366,12 @@ class _ElementReader:
             start = start + step.length.itemsize + length * step.item_size
         return True
 
-    def _walk(self, position: int, steps: Sequence[_ListStep], rest: int, rows: int) -> tuple[Index, int]:
+    def _walk(
+        self, position: int, steps: Sequence[_ListStep], trailing_bytes: int, rows: int
+    ) -> tuple[Index, int]:
         """Read rows in sequence; return the lengths of their lists (rows, lists), and the next position.
 
-        rest : size of the properties after the last list [bytes]
+        trailing_bytes : size of the properties after the last list [bytes]
         """
         lengths, data, end = [], memoryview(self.data.tobytes()), len(self.data)
         readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in steps]
@@ -384,7 +386,7 @@ class _ElementReader:
                     (length,) = unpack(data, position)
                     lengths.append(length)
                     position += length_size + int(length) * item_size
-                position += rest
+                position += trailing_bytes
         except struct.error:
             position = end + 1
         self._check_end(end + 1 if lengths and min(lengths) < 0 else position)

@@ -43,15 +43,15 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
     found = [layer for number, part in enumerate(parts) for layer in _layers(number, *part, len(parts) > 1)]
     if found:
         chosen = min(found, key=_rank)
-        colours = [_shown(layer.name) for layer in found if len(layer.channels) > 1]
+        colours = [_display_name(layer.name) for layer in found if len(layer.channels) > 1]
         if len(colours) < 2:
             return chosen, None
         listed = ", ".join(colours[:_MAX_LISTED]) + ", ..." * (len(colours) > _MAX_LISTED)
-        return chosen, f"of its layers, {listed}, only {_shown(chosen.name)} is read"
+        return chosen, f"of its layers, {listed}, only {_display_name(chosen.name)} is read"
     names = [name for _, channels in parts for name in channels]
     if len(names) == 1:
         return ExrLayer(0, "", (names[0],)), None
-    listed = ", ".join(map(_shown, names[:20]))
+    listed = ", ".join(map(_display_name, names[:20]))
     raise UnsupportedError(f"it has channels {listed}, and no layer with R, G and B or Y")
 
 
@@ -81,5 +81,5 @@ def _rank(layer: ExrLayer) -> tuple[bool, int]:
     return len(layer.channels) == 1, by_name
 
 
-def _shown(name: str) -> str:
+def _display_name(name: str) -> str:
     return shorten("".join(one for one in name if one.isprintable()), _MAX_NAME) or "the one without a name"

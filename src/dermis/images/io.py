@@ -108,7 +108,7 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
     header = _header(path, data)
     _note(path, header, colours=True, upright=upright)
     image = _pixels(path, data, convert_tables=not embedded)
-    return _turned(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
+    return _oriented(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
 
 
 def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
@@ -131,7 +131,7 @@ def _note(path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bo
         notify(f"{path}: {'; '.join(notes)}")
 
 
-def mended_radiance(name: object, radiance: Floats) -> Floats:
+def repaired_radiance(name: object, radiance: Floats) -> Floats:
     """Return radiance (H, W, C) without infinite, NaN and negative values, with a note of their number.
 
     Infinite values become the largest finite one, other values 0.
@@ -176,7 +176,7 @@ def _pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: boo
     return image
 
 
-def _turned(image: Pixels, orientation: int) -> Pixels:
+def _oriented(image: Pixels, orientation: int) -> Pixels:
     """Return a picture (H, W, C) rotated and mirrored according to its EXIF orientation, 1 to 8."""
     upright = image.swapaxes(0, 1) if orientation >= 5 else image
     upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright

@@ -130,7 +130,7 @@ def monte_carlo_profile(
 
 
 def _unfinished_warnings(runs: Sequence[SlabResult]) -> list[str]:
-    lost = max(run.per_entering.unfinished for run in runs)
+    lost = max(run.relative_to_entering.unfinished for run in runs)
     if lost < _REPORTED_LOSS:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
@@ -329,7 +329,7 @@ class SlabResult:
     unfinished: float
 
     @property
-    def per_entering(self) -> SlabResult:
+    def relative_to_entering(self) -> SlabResult:
         """Return all fractions relative to the power that enters the stack, as in diffusion profiles."""
         names = [field.name for field in fields(self)][3:]
         entering_fraction = 1.0 - self.specular

@@ -91,9 +91,9 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
         return None
     # where a piece overlaps itself, gutters must read only the layer that has texels
     piece = np.where(hidden_triangles(surface, piece, packing, size), -1, piece)
-    own = np.flatnonzero(piece >= 0)
-    border = find_border(surface, piece, own)
-    coverage = compute_coverage(surface, piece, own, border, packing, width, (size, size))
+    members = np.flatnonzero(piece >= 0)
+    border = find_border(surface, piece, members)
+    coverage = compute_coverage(surface, piece, members, border, packing, width, (size, size))
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 

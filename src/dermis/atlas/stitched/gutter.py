@@ -53,15 +53,15 @@ class GutterWidth(NamedTuple):
     max_texels: float
 
 
-def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
+def find_border(surface: FlatSurface, piece: Index, members: Index) -> Border:
     """Return the triangle sides at which pieces of charts end.
 
     piece : (f,) piece of each triangle, -1 for none
-    own : (t,) indices of the triangles whose sides are examined, each in a piece
+    members : (t,) indices of the triangles whose sides are examined, each in a piece
     """
-    neighbour = surface.uv_neighbour[own]
-    row, index = np.nonzero((neighbour == own[:, None]) | (piece[own, None] != piece[neighbour]))
-    triangle = own[row]
+    neighbour = surface.uv_neighbour[members]
+    row, index = np.nonzero((neighbour == members[:, None]) | (piece[members, None] != piece[neighbour]))
+    triangle = members[row]
     across = surface.adjacency.neighbour[triangle, index]
     return Border(triangle, index, (across >= 0) & surface.adjacency.passable[across])
 
@@ -81,7 +81,7 @@ def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: 
 
 def needed_texels(
     surface: FlatSurface,
-    own: Index,
+    members: Index,
     border: Border,
     packing: Packing,
     width: GutterWidth,
@@ -89,11 +89,11 @@ def needed_texels(
 ) -> Mask:
     """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
 
-    own : (t,) indices of the triangles of the pieces
+    members : (t,) indices of the triangles of the pieces
     shape : height and width of the grid of texels
     """
     found = np.zeros(shape, np.bool_)
-    found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
+    found.ravel()[covered_texels(packing.corners[members], shape)[0]] = True
     found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
     return found
 

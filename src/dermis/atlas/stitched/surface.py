@@ -72,10 +72,10 @@ class FlatSurface:
         """
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
-    def subset(self, own: Index) -> FlatSurface:
+    def subset(self, members: Index) -> FlatSurface:
         """Return the triangles with the given indices; their adjacency is not valid for geodesics."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
-        return replace(self, **{name: getattr(self, name)[own] for name in names})
+        return replace(self, **{name: getattr(self, name)[members] for name in names})
 
 
 def interpolate_corners(
@@ -184,11 +184,11 @@ def _uv_steps(
     # projected to the triangle's plane, with the length preserved
     uv_steps = np.einsum("fksi,fai->fksa", steps, axes)
     uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
-    own = _triangle_steps(flat, uv)[:, None]
+    members = _triangle_steps(flat, uv)[:, None]
     # the mean over triangles of very different normals may be meaningless: use the triangle's own steps there
     area = cross_2d(uv_steps[..., 0, :], uv_steps[..., 1, :])
     bad = area * np.sign(area_uv)[:, None] >= -0.05 * product
-    uv_steps = np.where(bad[..., None, None], own, uv_steps)
+    uv_steps = np.where(bad[..., None, None], members, uv_steps)
     return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
 
 

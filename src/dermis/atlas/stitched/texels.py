@@ -87,23 +87,23 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
     return first[apart], first[apart] + step
 
 
-def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
+def anchors_diverge(first: AnchoredTexels, second: AnchoredTexels) -> Mask:
     """Return the mask of texel pairs whose anchors are farther apart than either texel is from its anchor.
 
     The anchor of a texel is the nearest point of its chart.
     """
     distance2 = np.maximum(
-        _squared_length(one.texels - one.anchors), _squared_length(other.texels - other.anchors)
+        _squared_length(first.texels - first.anchors), _squared_length(second.texels - second.anchors)
     )
-    return np.asarray(_squared_length(one.anchors - other.anchors) > distance2)
+    return np.asarray(_squared_length(first.anchors - second.anchors) > distance2)
 
 
-def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
+def gap_limit_mm(first: AnchoredTexels, second: AnchoredTexels, axis: int) -> Doubles:
     """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """
-    return _GAP_STEPS * np.maximum(one.step_mm[:, axis], other.step_mm[:, axis]) + _GAP_SLACK_MM
+    return _GAP_STEPS * np.maximum(first.step_mm[:, axis], second.step_mm[:, axis]) + _GAP_SLACK_MM
 
 
 def _squared_length(offset: Doubles) -> Doubles:

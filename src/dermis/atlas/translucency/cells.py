@@ -78,15 +78,15 @@ class Cells:
         return -(-self.side // TILE_CELLS)
 
 
-def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -> Cells:
+def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
     """Divide an atlas into cells for the light that Gaussians spread through thin parts.
 
     max_sigma_mm : standard deviation of the widest Gaussian, clipped so that pairs are at most 32 mm apart
         [mm]
-    coarser : cell size relative to the default [-]
+    relative_cell_size : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
-    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * coarser)))
+    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * relative_cell_size)))
     side = min(max(side, 1), atlas.size)
     stride = max(1, atlas.size // max(_MAX_TEXELS, side))
     tiles = -(-side // TILE_CELLS)

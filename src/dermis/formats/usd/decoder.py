@@ -75,7 +75,7 @@ class _SceneReader:
         )
         self.path, self.stage = path, stage
         self.time = self.usd.TimeCode.EarliestTime()
-        self.places = self.geom.XformCache(self.time)
+        self.transform_cache = self.geom.XformCache(self.time)
         self.material_reader = MaterialReader(path, folder, self.time)
         self.material_index: dict[str, int] = {}
         self.materials: list[Tree] = []
@@ -124,7 +124,7 @@ class _SceneReader:
 
     def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
         """Add the arrays of a mesh to the answer, and return its names and materials."""
-        prim, matrix = mesh.GetPrim(), np.array(self.places.GetLocalToWorldTransform(mesh.GetPrim()))
+        prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._geometry(mesh)
         materials, group = self._material_groups(prim, len(faces.counts))
         uv = self._uv(prim, faces, materials)

@@ -118,10 +118,10 @@ def _parts(
     return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
 
 
-def _selected(counts: Index, corners: Index, kept: Mask) -> tuple[Index, Index]:
+def _selected(counts: Index, corners: Index, mask: Mask) -> tuple[Index, Index]:
     """Return the polygons that a mask (n,) selects: their numbers of corners, and their corners."""
-    corner = expand_runs((np.cumsum(counts) - counts)[kept], counts[kept])[1]
-    return counts[kept], corners[corner]
+    corner = expand_runs((np.cumsum(counts) - counts)[mask], counts[mask])[1]
+    return counts[mask], corners[corner]
 
 
 class _Pictures:
@@ -145,7 +145,7 @@ class _Pictures:
         for role, one in tree["textures"].items():
             picture = self._find(one["file"])
             if picture is None:
-                missing[role] = f"its picture {one['file']!r} is not in the {self._place()}"
+                missing[role] = f"its picture {one['file']!r} is not in the {self._picture_location()}"
             else:
                 textures[role] = Texture(
                     picture, 0, tuple(one["transform"]), tuple(one["wrap"]), one["channel"]
@@ -156,7 +156,7 @@ class _Pictures:
             values[name] = tuple(values.get(name, ())) or getattr(FileMaterial(), name)
         return FileMaterial(textures=textures, missing=missing, unused=tuple(tree["unused"]), **values)
 
-    def _place(self) -> str:
+    def _picture_location(self) -> str:
         return "folder of the file" if self.package is None else "package"
 
     def _find(self, name: str) -> PathLike | None:

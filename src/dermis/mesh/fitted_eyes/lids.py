@@ -44,12 +44,12 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return the distances (n,) before the ball's centre at which rays meet the ball [mm]; 0 for misses."""
+        """Return the distances (n,) before the ball's centre at which rays meet it [mm]; 0 for misses."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return the distances (n,) before the ball's centre at which rays meet the first lid or skin [mm].
+        """Return the distances (n,) before the ball's centre at which rays first meet lid or skin [mm].
 
         The distance is -inf for rays that meet none.
         """

@@ -113,10 +113,10 @@ def start_readback(
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
-def _check_size(device: Device, size: int, limit: int, pixels: int, what: str = "") -> None:
+def _check_size(device: Device, size: int, limit: int, pixels: int, contents: str = "") -> None:
     if size > limit:
-        expected = f"{what}at most {limit * pixels // size} pixels at once from {device.adapter.name}"
-        advice = "Ask for fewer outputs, or a smaller size" if what else "Choose a smaller one"
+        expected = f"{contents}at most {limit * pixels // size} pixels at once from {device.adapter.name}"
+        advice = "Ask for fewer outputs, or a smaller size" if contents else "Choose a smaller one"
         refuse("size", expected, f"there are {pixels}", advice)
 
 

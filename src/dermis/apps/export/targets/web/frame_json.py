@@ -108,16 +108,16 @@ def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame_json(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
-    records = [(struct, packer.add(record.tobytes())) for struct, record in one.captured.records]
+def _frame_json(frame: NamedFrame, picture: list[int], packer: Packer) -> Json:
+    records = [(struct, packer.add(record.tobytes())) for struct, record in frame.captured.records]
     return {
-        "name": one.name,
-        "size": one.size,
-        "moving": one.merged_hairs > 0,
+        "name": frame.name,
+        "size": frame.size,
+        "moving": frame.merged_hairs > 0,
         "picture": picture[0],
         "linear": picture[1],
-        "views": {stage: _view_record(one.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes_json(one.captured, packer),
+        "views": {stage: _view_record(frame.captured, stage) for stage in ("visibility", "shadows")},
+        "passes": _passes_json(frame.captured, packer),
         "records": records,
     }
 
@@ -138,8 +138,11 @@ def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
     return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
 
 
-def _program_json(one: Json) -> Json:
-    return {**one, "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in one["bindings"]]}
+def _program_json(program: Json) -> Json:
+    return {
+        **program,
+        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program["bindings"]],
+    }
 
 
 def _struct_json(dtype: np.dtype[Any]) -> Json:
@@ -199,32 +202,36 @@ def base_resource(capture: FrameCapture, number: int) -> int:
     return int(capture.resources[number].get("of", number))
 
 
-def resources_read_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
-    one : the pass
+    captured_pass : pass that reads
     """
-    yield from (k for k, entry in _bound_entries(capture, one) if _reads(entry))
-    if one.raster and one.raster["indices"] >= 0:
-        yield int(one.raster["indices"])
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _reads(entry))
+    if captured_pass.raster and captured_pass.raster["indices"] >= 0:
+        yield int(captured_pass.raster["indices"])
 
 
-def resources_written_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
-    one : the pass
+    captured_pass : pass that writes
     """
-    if one.written:
-        yield one.written[0]
-    yield from (k for k, entry in _bound_entries(capture, one) if _writes(entry))
-    if one.raster:
-        yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
+    if captured_pass.written:
+        yield captured_pass.written[0]
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _writes(entry))
+    if captured_pass.raster:
+        yield from (
+            int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
+        )
 
 
-def _bound_entries(capture: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
-    if one.program is not None:
-        bindings = capture.programs[one.program]["bindings"]
-        yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
+def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
+    if captured_pass.program is not None:
+        bindings = capture.programs[captured_pass.program]["bindings"]
+        yield from (
+            (k, entry) for k, (_, _, entry) in zip(captured_pass.bound, bindings, strict=True) if k >= 0
+        )
 
 
 def _reads(entry: Json) -> bool:

@@ -102,8 +102,8 @@ def _float_word_mask(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
     return is_float
 
 
-def _written_floats(one: CapturedPass) -> Floats:
-    return np.frombuffer(one.written[1] if one.written else b"", "<f4")
+def _written_floats(captured_pass: CapturedPass) -> Floats:
+    return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
 def _differences(
