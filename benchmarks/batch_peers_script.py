@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-with suppress(ImportError):  # which only Blender's Python has
+with suppress(ImportError):  # only Blender's Python has this module
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Vector  # type: ignore[import-not-found,unused-ignore]
 
-_RADIUS_M = (0.0037, 0.0014, 0.0007)  # of Blender's own default for skin, in proportion
-_LIGHTS = (((-0.8, -1.0, 0.5), 12.0), ((0.9, -0.8, 0.2), 5.0), ((0.3, 0.9, 0.8), 8.0))  # places [m], watts
+_RADIUS_M = (0.0037, 0.0014, 0.0007)  # in the proportions of Blender's default subsurface radius
+_LIGHTS = (((-0.8, -1.0, 0.5), 12.0), ((0.9, -0.8, 0.2), 5.0), ((0.3, 0.9, 0.8), 8.0))  # position [m], W
 _LIGHT_M, _LENS_MM, _FAR_M = 0.5, 120.0, 0.95
-_MIDDLE_M = 0.02  # of the face, below the middle between the eyes
+_MIDDLE_M = 0.02  # distance of the face's centre below the midpoint of the eyes
 
 
 def main(folder: Path) -> None:
@@ -96,7 +96,7 @@ def set_render(size: list[int]) -> None:
 def written_as(kind: str) -> None:
     """Set the file format of the pictures."""
     settings = bpy.context.scene.render.image_settings
-    if hasattr(settings, "media_type"):  # since Blender 5.0
+    if hasattr(settings, "media_type"):  # required since Blender 5.0
         settings.media_type = "MULTI_LAYER_IMAGE" if kind.endswith("MULTILAYER") else "IMAGE"
     settings.file_format = kind
 

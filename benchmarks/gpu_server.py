@@ -77,7 +77,7 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
             actual = f"expected it to end within {longest_s:g} s, but it did not. Last words: {last[0]}"
             raise DermisError(f"{name}: {actual}") from fault
         finally:
-            with suppress(ProcessLookupError):  # and what it has started
+            with suppress(ProcessLookupError):  # and its child processes
                 os.killpg(program.pid, signal.SIGKILL)
             listener.join()
     if failed:
@@ -290,8 +290,8 @@ def _consume_s(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
 
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
-"""What matters most first; lobes while the device is at work, for an idle one is three times as slow."""
-_NEEDED_S = {"bench": 0, "film": 120, "viewer": 120}  # that a part may take on a slow server
+"""Parts by importance; lobes early, because an idle device is three times as slow."""
+_NEEDED_S = {"bench": 0, "film": 120, "viewer": 120}  # duration of a part on a slow server [s]
 _DIGITS = 5
 
 
@@ -328,7 +328,7 @@ def main(
 
 
 def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonObject], None]) -> JsonObject:
-    """Return all figures; call `keep` with those known so far after each part."""
+    """Return all figures; after each part, call `keep` with the figures so far."""
     began = time.perf_counter()
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
     figures = _about(plan, renderer)

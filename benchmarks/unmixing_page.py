@@ -19,7 +19,7 @@ RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
 FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
 
-_TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting.py has them
+_TRUE_STRENGTH = 1.0  # specular strength of all fitted faces, as in fitting.py
 
 
 def main() -> None:

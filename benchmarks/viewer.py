@@ -112,7 +112,7 @@ def _memory(memory: JsonObject) -> str:
 
 RESULTS = Path(__file__).resolve().parent / "results" / "viewer.json"
 _PACKAGES = ("dermis", "wgpu", "rendercanvas", "numpy", "pillow")
-_SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # of the time that is left
+_SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # fractions of the remaining time
 
 
 def main(
@@ -205,7 +205,7 @@ class Results:
                 figures[name] = figure
                 self._log(f"{section}, {name}")
                 self.write()
-        except Exception as fault:  # whatever ends one section leaves the others
+        except Exception as fault:  # an error of a section does not affect the others
             figures["ended"] = f"{type(fault).__name__}: {fault}"
             self.ended.append(section)
             self._log(f"{section} ended: {figures['ended']}")

@@ -54,12 +54,12 @@ class Clock:
 
 
 Change = Callable[[ViewerState, int], ViewerState]
-_SETTLING = 2  # frames before any is counted
-PIGMENTED = "light"  # a profile that sliders of pigments move
+_SETTLING = 2  # frames before the first that is counted
+PIGMENTED = "light"  # profile with pigment sliders
 _TARGETS = 52
-STEP = 0.02  # of turns [rad]
-_REST_S = 30.0  # at most, which some tenths of a second are enough for
-FEWEST = 3  # that a median is made of, however little time is left
+STEP = 0.02  # rotation per frame [rad]
+_REST_S = 30.0  # time limit; usually tenths of a second suffice
+FEWEST = 3  # least number of values of a median, regardless of the remaining time
 
 
 @dataclass(frozen=True)

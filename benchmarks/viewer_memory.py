@@ -20,8 +20,8 @@ from dermis.gpu.memory import allocated_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.lights import light_presets
 
-_PATIENCE = 100  # frames
-_PIXELS = 6.0  # of a drag between two frames
+_PATIENCE = 100  # largest number of frames to wait
+_PIXELS = 6.0  # distance of a drag between two frames
 
 
 def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, float]]]:
@@ -59,7 +59,7 @@ def _delay(driver: InputDriver, x: float, y: float) -> float:
     driver.rest()
     before, began = driver.frame(), time.perf_counter()
     driver.event("pointer_move", x, y)
-    for _ in range(_PATIENCE):  # quick frames show the camera when it has hardly begun to glide
+    for _ in range(_PATIENCE):  # fast frames show the camera when it has hardly moved
         picture, now = driver.frame(), time.perf_counter()
         if not np.array_equal(before, picture):
             return now - began
@@ -87,7 +87,7 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
 
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
-_SAMPLES = 60  # of the memory, over all the time
+_SAMPLES = 60  # memory samples over the whole measurement
 _ACTIONS = ("split", "undo", "redo", "size", "panel", "preset", "start again")
 
 
@@ -128,7 +128,7 @@ KINDS: dict[str, Kind] = {
         _one(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")
     ),
 }
-"""Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
+"""Changes of a state; combinations that cannot be rendered leave the last picture, as for users."""
 
 
 def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
@@ -136,7 +136,7 @@ def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int
     chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
     counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
-    for kind in counts:  # all that is ever compiled and loaded, before anything is counted
+    for kind in counts:  # compile and load everything before the first sample
         _change(driver, kind, chance, plan)
         driver.frame()
     session.change(driver.first)

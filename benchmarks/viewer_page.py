@@ -74,9 +74,9 @@ def _ended(server: subprocess.Popen[str], patience_s: float = 10.0) -> None:
 
 
 _QUIET_S, _PATIENCE_S = 0.6, 120.0
-_MOVES_PER_S = 50.0  # what rendercanvas' page sends at most
+_MOVES_PER_S = 50.0  # maximum of rendercanvas' page
 _WATCHED_S = 8.0
-_FIRST_S = 30.0  # until a motion is seen: what it is made of may have to be found first
+_FIRST_S = 30.0  # time limit for the first picture of a motion, whose data may have to be computed
 _REPEATS = 20
 _PIXELS = 6.0
 Place = tuple[float, float]
@@ -107,8 +107,8 @@ class Page:
         self.size, self.clock = size, clock
         self._last: Picture | None = None
         self.send("resize", width=size[0], height=size[1], pwidth=size[0], pheight=size[1], ratio=1.0)
-        self.next_picture(self.patience_s)  # there is no panel before
-        self.send("key_down", key="Tab", modifiers=[])  # hides it
+        self.next_picture(self.patience_s)  # the panel exists from then on
+        self.send("key_down", key="Tab", modifiers=[])  # hides the panel
 
     def send(self, kind: str, **fields: Any) -> None:
         """Send an event."""

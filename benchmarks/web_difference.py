@@ -24,7 +24,7 @@ from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.capture import capture_renderer
 
-ATLAS, MAP = 512, 1024  # as exported
+ATLAS, MAP = 512, 1024  # sizes of the exported page
 SHOWN = ("software", 512), ("gpu", 256)
 LINEAR = """async () => {
   const page = dermis, frame = page.player.frame, device = page.gpuScene.device, [width, height] = frame.size;

@@ -18,11 +18,11 @@ from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 ROOTS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.48, 0.56, 0.64, 0.72, 0.8, 0.8945)
-"""sqrt(1 - albedo); Cycles takes no albedo below 0.2."""
+"""Values of sqrt(1 - albedo); Cycles accepts no albedo below 0.2."""
 RADII = np.concatenate([[0.0], np.geomspace(0.03, 200.0, 32)])
-"""Within which light is counted [mean free paths]."""
+"""Radii within which light is counted [mean free paths]."""
 MOST = 256
-"""Steps after which Cycles gives a walk up."""
+"""Number of steps after which Cycles ends a walk."""
 ETA = 1.4
 ENTRIES = ("straight", "skin")
 PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
@@ -43,7 +43,7 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
     """Return the initial direction of a walk, with z downwards."""
     if not skin:
         return 0.0, 0.0, 1.0
-    facing = math.sqrt(random_uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
+    facing = math.sqrt(random_uniform(rng))  # for facets of roughness 1 and diffuse light
     turn = 2.0 * math.pi * random_uniform(rng)
     angle = math.acos(facing)
     if random_uniform(rng) >= 0.5:

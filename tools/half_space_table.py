@@ -28,8 +28,8 @@ KINDS = {"skin": (1.4, False), "matched": (1.0, False), "walk": (1.0, True)}
 ABSORBED = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])
 EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 3e3, 96)])
 PHOTONS, BATCHES = 3_000_000, 40
-DARK, MORE = 0.2, 8  # what is absorbed at least where few photons count, and how many times more are traced
-EVENTS, FEW_EVENTS = 200_000, 200  # after which a photon counts next to nothing, or a seventh at 1e-5
+DARK, MORE = 0.2, 8  # least absorption at which few photons count, and factor of their number
+EVENTS, FEW_EVENTS = 200_000, 200  # then weights are negligible, or 1/7 for absorption 1e-5
 HEAD = """\
 # quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that
 #   leaves; total is that of what enters; kind skin has a smooth surface of index 1.4 lit at right angles,
@@ -85,7 +85,7 @@ def _walk(
     for _ in range(photons):
         x = y = z = ux = uy = 0.0
         uz = math.sqrt(random_uniform(rng)) if diffuse else 1.0
-        ux = math.sqrt(1.0 - uz * uz)  # rings are round: one azimuth stands for all
+        ux = math.sqrt(1.0 - uz * uz)  # rings are symmetric, so one azimuth suffices
         scatterings = 0
         path = -math.log(random_uniform(rng))
         for _event in range(events):

@@ -23,28 +23,28 @@ Index = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "human.npz"
-MM = 100.0  # in a unit of the published positions
+MM = 100.0  # length of a unit of the published positions
 MEAN = {
     f"macrodetails/{people}-{sex}-young": 1 / 6
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
-"""Weights of the targets of the person that edges, seams and densities are chosen on."""
-BONES = {  # what each stands for: bones of the file by the beginning of their names
+"""Target weights of the mean person, on whom edges, seams and densities are defined."""
+BONES = {  # bones of the file, by the beginning of their names, that each bone replaces
     "spine": ("spine", "breast"),
     "clavicle.L": ("clavicle.L", "shoulder01.L", "upperarm01.L", "upperarm02.L", "lowerarm01.L"),
     "clavicle.R": ("clavicle.R", "shoulder01.R", "upperarm01.R", "upperarm02.R", "lowerarm01.R"),
     "neck01": ("neck01",),
     "neck02": ("neck02",),
     "neck03": ("neck03",),
-    "head": (),  # all others
+    "head": (),  # all other bones
     "jaw": ("jaw", "tongue", "special04", "oris05", "oris07"),
     "eye.L": ("eye.L",),
     "eye.R": ("eye.R",),
 }
-CORNER_MM = 25.0  # radius, roughly, of the cut's corners
-RELAXING = 40  # rounds of smoothing along the edge of the cut: it crosses the folds of the armpits
-ACROSS = 4  # quads of the cap from front to back
+CORNER_MM = 25.0  # approximate radius of the cut's corners
+RELAXING = 40  # smoothing steps along the edge of the cut, which crosses the folds of the armpits
+ACROSS = 4  # number of quads of the cap from front to back
 
 
 def main(folder: Path) -> None:
@@ -126,7 +126,7 @@ def clip_to_bust(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_
     kept = inside[quads].any(axis=1) | (group > 0)
     quads = quads[kept]
     into, share, least = np.arange(len(places)), np.zeros(len(places)), np.full(len(places), np.inf)
-    for steps in (1, 2, 3):  # along sides; across quads for corners that have no side into the bust
+    for steps in (1, 2, 3):  # along sides, or across quads for corners without a side into the bust
         pairs = np.stack([quads, np.roll(quads, -steps, axis=1)], axis=-1).reshape(-1, 2)
         for outer, inner in pairs[inside[pairs[:, 1]] & ~inside[pairs[:, 0]]].tolist():
             part = crossing(places[outer], places[inner])
@@ -157,10 +157,10 @@ def capped(quads: Index, group: Index, mix: Any, places: Doubles) -> Shape:
     """Return the bust with its opening closed by a strip of quads from front to back."""
     loop = border(quads[group == 0])
     where = mix[loop] @ places
-    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back part
+    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back separate
     loop = np.roll(loop, -top)
     mix, half = relaxed(mix, loop), len(loop) // 2
-    # points of its own: normals are not smooth around the edge
+    # separate points, as normals are not smooth around the edge
     copies = np.arange(mix.shape[0], mix.shape[0] + len(loop))
     mix, loop = vstack([mix, mix[loop]]).tocsr(), copies
     front, back = loop[: half + 1], np.r_[loop[0], loop[: half - 1 : -1]]

@@ -20,14 +20,14 @@ Doubles = NDArray[np.float64]
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "detail.png"
 PORES_A_SIDE = 30
 PORE_MM = (0.06, 0.19)
-"""Radius of the smallest and the largest [mm], artist's values: 0.05 to 0.3 across, and a little over."""
+"""Radius of the smallest and the largest pore [mm], an artist's choice."""
 PORE_DEPTH_MM = (0.03, 0.085)
 CELLS_A_SIDE, FINE_CELLS_A_SIDE = 44, 92
-"""Of the two nets of furrows: cushions of 0.7 and of 0.35 mm."""
+"""Cells per side of the coarse and the fine net of furrows, 0.7 and 0.35 mm wide."""
 FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016
 FINE_SHARE = 0.4
 SOFT = 0.6
-"""Standard deviation of the blur over all [texels]."""
+"""Standard deviation of the final blur [texels]."""
 
 
 def main() -> None:

@@ -17,13 +17,13 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 LEVELS = 3
-STEPS = 8  # places along a side of a quad
+STEPS = 8  # candidates along a side of a quad
 _UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from corner to corner
 _EDGE, _CREST = 1, 2  # columns of lid_rings.csv
 _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
 _CORNER_MM = 22.2
-_AHEAD = 0.4  # how much of the way ahead counts as height, where the edge of a lip is sought
-_NEAR_MM = 1.2  # of a place in the front plane
+_AHEAD = 0.4  # weight of z relative to height in the search for the edge of a lip
+_NEAR_MM = 1.2  # search radius around a position in the front plane
 # Artist's values on the average human, seen from the front and the side: the outline of the face from in
 # front of the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
 _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42, -50], [61.6, -52, -45],

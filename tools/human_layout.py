@@ -17,11 +17,11 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CHART_PADDING = 1 / 256
-_CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # of the seam over the crown, on the mean person [mm]
-_LOOSE = 0.05  # weight of what fills holes while a sheet is laid flat
+_CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # seam over the crown of the mean person [mm]
+_LOOSE = 0.05  # weight of the triangles that fill holes during flattening
 FACE, SCALP, EARS, TRUNK, HIDDEN, PLAIN = 1.0, 0.35, 0.7, 0.26, 0.14, 0.06
-"""Texels per mm relative to the face: of the back of the head, ears, neck and chest, mouth and sockets, and
-what is no skin."""
+"""Texels per mm relative to the face: face, back of the head, ears, neck and chest, mouth and eye sockets,
+and parts that are not skin."""
 
 
 def human_layout(
@@ -62,7 +62,7 @@ def _flattened(places: Doubles, quads: Index, corner: Index, uv: Doubles, group:
     points = np.zeros((len(used), 3))
     points[local.ravel()] = places[quads.ravel()]
     middle = points[triangles].mean(axis=1)
-    if group or middle[:, 2].min() > 40.0:  # plain things; mouth and sockets
+    if group or middle[:, 2].min() > 40.0:  # parts that are not skin; mouth and sockets
         is_cap = used.max() >= len(uv)
         flat = _unrolled(points) if is_cap else uv[used]
         stretch = np.median(singular_values(points[triangles], flat[triangles] * [1, -1]).prod(axis=1))
@@ -105,7 +105,7 @@ def _head_density(middle: Doubles) -> Doubles:
 
 
 def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
-    """Return the sheet with each hole filled by a fan of triangles, and its points with their centres."""
+    """Return the triangles with each hole filled by a fan, and the points with the centres of the fans."""
     sides, _ = border_edges(triangles)
     _, loop = connected_components(
         coo_array((np.ones(len(sides)), sides.T), shape=(len(points),) * 2), directed=False

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent.parent / "docs" / "images"
 SIZE = 1100, 760
 SCENE = ("--atlas", "1024", "--samples", "4")
 PATIENCE_S = 300.0
-REFINED_S = 45.0  # without a change: a software adapter takes long for a still picture
+REFINED_S = 45.0  # time without a change; software adapters render still pictures slowly
 ANSWERED_S = 2.0
 VIEW_LIST, IRRADIANCE = (30, 168), (30, 251)
 COMPARE, FREEZE = (100, 243), (30, 268)
@@ -89,7 +89,7 @@ def screen() -> Iterator[str]:
 
 @contextmanager
 def running(process: subprocess.Popen[Any]) -> Iterator[subprocess.Popen[Any]]:
-    """Yield a process that is ended with the block."""
+    """Yield a process, which is terminated at the end of the block."""
     try:
         yield process
     finally:

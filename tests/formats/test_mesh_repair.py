@@ -189,7 +189,7 @@ def test_many_sheets_at_one_edge_are_separated(tmp_path: Path) -> None:
 
 
 def test_too_many_crowded_edges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.formats.mesh_repair._MAX_CROWDED_EDGES", 1)
+    monkeypatch.setattr("dermis.formats.mesh_repair._MAX_NON_MANIFOLD_EDGES", 1)
     with pytest.raises(DermisError, match="non-manifold"):
         load(tmp_path, with_points([[0, 0, 0.3]], [[0, 25, COUNT], [60, 61, COUNT], [80, 81, COUNT]]))
 
