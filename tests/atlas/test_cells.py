@@ -28,7 +28,7 @@ def test_cells_are_as_large_as_the_widest_gaussian_allows(divided: Divided) -> N
     _, atlas, cells = divided
     assert 0.9 * 0.36 * WIDEST_MM < cells.cell_mm <= 0.36 * WIDEST_MM
     assert cells.radius_mm == pytest.approx(3.2 * WIDEST_MM)
-    assert divide_into_cells(atlas, WIDEST_MM, coarser=2.0).side == pytest.approx(cells.side / 2, abs=1)
+    assert divide_into_cells(atlas, WIDEST_MM, relative_cell_size=2.0).side == pytest.approx(cells.side / 2, abs=1)
     assert divide_into_cells(atlas, 0.01).side == atlas.size
     assert divide_into_cells(atlas, 100.0).radius_mm == divide_into_cells(atlas, 10.0).radius_mm == 32.0
 

@@ -86,7 +86,7 @@ def test_a_new_field_is_a_key_of_scene_files(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_new_field_is_a_row_of_the_docs() -> None:
-    found = importlib.util.spec_from_file_location("made_from_code", ROOT / "docs" / "made_from_code.py")
+    found = importlib.util.spec_from_file_location("generated_pages", ROOT / "docs" / "generated_pages.py")
     assert found and found.loader
     pages = importlib.util.module_from_spec(found)
     found.loader.exec_module(pages)
