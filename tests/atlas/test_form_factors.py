@@ -50,7 +50,7 @@ def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
     return 4 * x // side + 4 * (2 * y // side)
 
 
-def test_the_faces_of_a_room() -> None:
+def test_form_factors_between_faces_of_a_room() -> None:
     form_factors = found(room())
     given = np.zeros((6, 6))
     y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
@@ -89,7 +89,7 @@ def test_parts_that_are_cut_out_do_not_block_light() -> None:
     assert len(found(solid).cell_factor) != len(without.cell_factor)
 
 
-def test_places_lie_on_their_patch() -> None:
+def test_sample_points_are_on_their_patch() -> None:
     mesh = room()
     form_factors = found(mesh)
     w = np.stack([form_factors.sample_weights & 0xFFFF, form_factors.sample_weights >> 16], axis=1) / 65535.0
@@ -104,7 +104,7 @@ def test_places_lie_on_their_patch() -> None:
 
 
 @pytest.mark.parametrize("outside", [True, False])
-def test_a_ball_sees_all_of_itself_from_within_and_nothing_from_without(outside: bool) -> None:
+def test_only_the_inside_of_a_ball_faces_itself(outside: bool) -> None:
     ball = uv_sphere(10.0, 24, 12)
     form_factors = found(ball if outside else inside_out(ball))
     if outside:
