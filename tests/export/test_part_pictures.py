@@ -151,7 +151,7 @@ def test_only_needed_pictures_are_written(plain: Subject, tmp_path: Path) -> Non
     assert shirt["pbrMetallicRoughness"]["metallicFactor"] == 0.0
 
 
-def test_parts_that_state_no_roughness_keep_the_usual_one() -> None:
+def test_parts_without_roughness_use_the_default() -> None:
     mesh = uv_sphere(100.0, 8, 4)
     colour, surface = np.ones((4, 4, 4), np.float32), np.zeros((4, 4, 4), np.float32)
     pictures = PartPictures.of(Head("ball", mesh, Maps(parts=PartMaps(colour, surface))))
@@ -254,7 +254,7 @@ def picture(path: Path) -> Any:
     return np.asarray(Image.open(path))
 
 
-def test_pictures_have_the_values_of_the_maps(avatar: Subject, tmp_path: Path) -> None:
+def test_pictures_equal_the_maps(avatar: Subject, tmp_path: Path) -> None:
     """Colour is sRGB, and roughness is the width alpha of pbrt's distribution."""
     with pytest.warns(DermisWarning, match="do not emit light"):
         export_skin(avatar, "pbrt", tmp_path / "out.pbrt")
@@ -327,7 +327,7 @@ def test_mitsuba_reads_the_pictures(avatar: Subject, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("target", ["unity", "unreal", "arnold", "renderman", "maps"])
-def test_targets_without_parts_say_so(avatar: Subject, plain: Subject, target: str) -> None:
+def test_targets_without_parts_add_a_note(avatar: Subject, plain: Subject, target: str) -> None:
     own = TARGETS[target].with_variant(None)
     report = evaluate_export(avatar, own, own.versions[-1])
     assert report.limitations == f"{own.limitations} {own.part_limitations}"

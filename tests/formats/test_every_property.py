@@ -357,7 +357,7 @@ def test_a_property_of_a_material_is_treated_as_declared(which: str, case: Chang
     assert_treatment(case, expected, tmp_path)
 
 
-def test_all_rows_are_exercised() -> None:
+def test_all_table_rows_are_exercised() -> None:
     rows = {row_named(PROPERTIES, one.row).name for one in CHANGES}
     assert rows | EXERCISED_ELSEWHERE.keys() == names_of(PROPERTIES)
     assert {row_named(GLTF_MATERIALS, one.row).name for _, one in MATERIAL_CHANGES} == names_of(
@@ -365,7 +365,7 @@ def test_all_rows_are_exercised() -> None:
     )
 
 
-def test_pictures_of_skin_and_cloth_are_not_exchanged(tmp_path: Path) -> None:
+def test_pictures_of_skin_and_cloth_are_not_swapped(tmp_path: Path) -> None:
     head = load_quietly(Egg().write(tmp_path / "a.glb"))
     kinds = {one.name: one.kind for one in head.mesh.materials}
     assert kinds == {"face": "skin", "shirt": "opaque"}

@@ -126,11 +126,11 @@ def test_each_statement_of_an_obj_is_treated_as_declared(tmp_path: Path, stateme
     assert found == row_named(OBJ_PROPERTIES, statement.row).treatment, notes
 
 
-def test_all_rows_of_obj_files_are_exercised() -> None:
+def test_all_obj_table_rows_are_exercised() -> None:
     assert {one.row for one in STATEMENTS} == names_of(OBJ_PROPERTIES)
 
 
-def test_a_statement_that_is_left_out_is_named(tmp_path: Path) -> None:
+def test_ignored_statements_are_named(tmp_path: Path) -> None:
     text = before_faces("csh rm\nl 1 2")(obj_text())
     _, notes = treatment_of(tmp_path / "a.obj", obj_text().encode(), text.encode())
     assert "statements are left out: csh, l (lines)" in notes
@@ -230,12 +230,12 @@ def test_each_property_of_a_ply_is_treated_as_declared(tmp_path: Path, change: P
     assert found == row_named(PLY_PROPERTIES, change.row).treatment, notes
 
 
-def test_all_rows_of_ply_files_are_exercised() -> None:
+def test_all_ply_table_rows_are_exercised() -> None:
     rows = {row_named(PLY_PROPERTIES, one.row).name for one in PLY_CHANGES}
     assert rows == names_of(PLY_PROPERTIES)
 
 
-def test_a_property_that_is_left_out_is_named(tmp_path: Path) -> None:
+def test_ignored_properties_are_named(tmp_path: Path) -> None:
     changed = ply(", float ambient_red", [RAMP], more={"edge": ("int vertex1", [(1,)])})
     _, notes = treatment_of(tmp_path / "a.ply", ply(), changed)
     assert "these are left out: edge, vertex ambient_red" in notes

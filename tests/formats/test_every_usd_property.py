@@ -210,7 +210,7 @@ def test_each_property_of_a_usd_material_is_treated_as_declared(
     assert_treatment(folder, change, row.treatment if which == "face" else row.other_parts or row.treatment)
 
 
-def test_all_rows_are_exercised() -> None:
+def test_all_table_rows_are_exercised() -> None:
     assert {row_named(USD_PROPERTIES, one.row).name for one in CHANGES} == names_of(USD_PROPERTIES)
     assert {row_named(USD_MATERIALS, one.row).name for _, one in MATERIAL_CHANGES} == names_of(USD_MATERIALS)
 
@@ -232,7 +232,7 @@ STL_CHANGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("row", STL_PROPERTIES, ids=lambda row: row.name)
-def test_each_property_of_a_stl_file_is_treated_as_declared(row: FileProperty, tmp_path: Path) -> None:
+def test_each_stl_property_is_treated_as_declared(row: FileProperty, tmp_path: Path) -> None:
     path = write_stl(tmp_path / "a.stl")
     before = loaded(path)
     STL_CHANGES[row.name](path)

@@ -40,7 +40,7 @@ def found(rigged: RiggedMesh) -> list[str]:
 
 
 @AXES
-def test_a_scan_is_turned_to_the_viewer(tmp_path: Path, up: Axis, front: Axis) -> None:
+def test_scan_is_rotated_to_face_the_viewer(tmp_path: Path, up: Axis, front: Axis) -> None:
     path = write_obj(tmp_path / "a.obj", in_file(person(), up, front))
     rigged, usual = load_rigged(path, up=up), Axes(up).face
     np.testing.assert_allclose(np.ptp(rigged.mesh.positions, axis=0), person().size_mm, rtol=1e-4)
@@ -60,7 +60,7 @@ def test_a_front_that_the_user_states_is_kept(tmp_path: Path) -> None:
     ("options", "radius_mm"),
     [({}, 12), ({"names": ("a", "b"), "joints": ("Head", "LeftEye", "RightEye")}, 0)],
 )
-def test_eyes_are_found_by_the_names_of_groups_and_bones(
+def test_eyes_are_recognised_by_group_and_bone_names(
     tmp_path: Path, options: dict, radius_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     received = list[np.ndarray]()
@@ -72,7 +72,7 @@ def test_eyes_are_found_by_the_names_of_groups_and_bones(
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_the_front_of_an_avatar_is_stated(
+def test_avatar_format_defines_the_front(
     tmp_path: Path, version: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dermis.formats.load.face_direction", lambda *_: "x")
@@ -81,7 +81,7 @@ def test_the_front_of_an_avatar_is_stated(
 
 
 @AXES
-def test_the_axis_of_a_file_is_named(up: Axis, front: Axis) -> None:
+def test_note_names_the_axis_of_the_file(up: Axis, front: Axis) -> None:
     axes = Axes(up, front)
     assert [file_axis(one, axes) for one in ("y", "z")] == [up, front]
     assert file_axis("-z", axes) == front.removeprefix("-") if "-" in front else f"-{front}"

@@ -102,19 +102,19 @@ def test_each_statement_is_treated_as_declared(which: str, change: Change, tmp_p
     assert treatment(*results) == expected, results[1].notes + results[1].error
 
 
-def test_all_rows_are_exercised_and_all_statements_that_are_read_have_one() -> None:
+def test_all_table_rows_are_exercised_and_all_read_statements_have_a_row() -> None:
     assert {row_named(MTL_PROPERTIES, one.row).name for one in CHANGES} == names_of(MTL_PROPERTIES)
     assert {key.lower() for key in keys_of(MTL_PROPERTIES)} >= {*NUMBERS, *TEXTURE_ROLES}
 
 
-def test_face_and_shirt_have_their_own_pictures(tmp_path: Path) -> None:
+def test_face_and_shirt_have_separate_pictures(tmp_path: Path) -> None:
     head = load_quietly(write_heads(tmp_path, "map_Kd skin.png", "map_Kd cloth.png"), unit_mm=1.0)
     assert {one.name: one.kind for one in head.mesh.materials} == {"face": "skin", "shirt": "opaque"}
     assert head.maps.colour is not None and head.maps.parts is not None
     assert head.maps.colour[..., 0].mean() > 0.3 > head.maps.parts.colour[..., 2].mean()
 
 
-def test_udim_tiles_are_pictures_of_their_own(tmp_path: Path) -> None:
+def test_udim_tiles_are_separate_pictures(tmp_path: Path) -> None:
     for shift, udim in ((0.0, 1001), (1.0, 1002)):
         (tmp_path / "face.1002.png").unlink(missing_ok=True)
         write_png(tmp_path / f"face.{udim}.png", SKIN)

@@ -84,7 +84,7 @@ def test_a_frame_timed_as_a_whole_is_not_divided(
     assert times is not None and set(times) == {"one", "two", "total"} and stamps == 4
 
 
-def test_software_adapters_time_stages_even_so(device: Device, scale: ComputeProgram) -> None:
+def test_software_adapters_time_stages(device: Device, scale: ComputeProgram) -> None:
     if device.adapter.kind != "CPU":
         pytest.skip("a GPU")
     times, _ = staged_times(device, scale, "whole")
