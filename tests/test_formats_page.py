@@ -15,7 +15,7 @@ from dermis.formats.obj import read_obj
 ROOT = Path(__file__).parents[1]
 
 
-def test_the_page_is_that_of_its_template_and_the_readers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_page_equals_the_generated_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Updated by python tools/formats_page.py."""
     monkeypatch.syspath_prepend(ROOT / "tools")
     from formats_page import PAGE, page_text
@@ -23,12 +23,12 @@ def test_the_page_is_that_of_its_template_and_the_readers(monkeypatch: pytest.Mo
     assert PAGE.read_text(encoding="utf-8") == page_text()
 
 
-def test_formats_are_found_by_their_suffix() -> None:
+def test_formats_are_identified_by_suffix() -> None:
     assert find_format("HEAD.USDZ") is MESH_FORMATS["usd"] and find_format("head.fbx") is None
     assert len(set(mesh_suffixes())) == len(mesh_suffixes()) == 10
 
 
-def test_a_format_of_another_package_is_read(tmp_path: Path) -> None:
+def test_plugin_format_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.egg"
     path.write_text(obj_text())
     with MESH_FORMATS.including("egg", MeshFormat((".egg",), read_obj, ())):
@@ -38,6 +38,6 @@ def test_a_format_of_another_package_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MESH_FORMATS)
-def test_each_property_has_a_name_of_its_own(name: str) -> None:
+def test_property_names_are_unique(name: str) -> None:
     for rows in (MESH_FORMATS[name].properties, MESH_FORMATS[name].materials):
         assert len({row.name for row in rows}) == len(rows)

@@ -258,7 +258,7 @@ def test_each_property_is_treated_as_declared(rows: Any, change: Change, tmp_pat
     assert treatment(*results) == row_named(rows, change.row).treatment, results[1].notes + results[1].error
 
 
-def test_all_rows_are_exercised() -> None:
+def test_all_table_rows_are_exercised() -> None:
     for rows, changes in TABLES.values():
         exercised = {row_named(rows, change.row).name for change in changes}
         assert names_of(rows) - exercised <= EXERCISED_ELSEWHERE.keys()

@@ -39,7 +39,7 @@ def test_the_face_of_a_person_is_found_by_its_shape(seed: int, quarters: int) ->
 
 
 @TURNS
-def test_size_and_place_have_no_effect(quarters: int) -> None:
+def test_size_and_position_have_no_effect(quarters: int) -> None:
     mesh = person(0)
     for moved in (1e-3 * mesh.positions, mesh.positions + np.array([1000, 500, 2000])):
         assert face_direction(turned(moved, quarters), mesh.triangles, NONE) == DIRECTIONS[quarters]
@@ -53,7 +53,7 @@ def test_a_mesh_without_a_face_has_no_direction(name: str, quarters: int) -> Non
 
 
 @pytest.mark.parametrize("part", ["below", "behind", "left"])
-def test_a_part_of_a_head_is_never_turned(part: str) -> None:
+def test_partial_head_is_not_turned(part: str) -> None:
     mesh = person(0)
     x, y, z = mesh.positions[mesh.triangles].mean(axis=1).T
     kept = {"below": y < y.max() - 240, "behind": z < z.mean(), "left": x > 5}[part]
@@ -88,7 +88,7 @@ def test_eyes_show_the_direction_of_a_smooth_head(kind: str, quarters: int) -> N
     ],
     ids=["one", "in the middle", "oblique", "with a target", "beside", "elsewhere"],
 )
-def test_eyes_at_odd_places_show_nothing(eyes: np.ndarray) -> None:
+def test_eyes_at_implausible_positions_give_no_direction(eyes: np.ndarray) -> None:
     assert face_direction(*skin(), eyes) is None
 
 
