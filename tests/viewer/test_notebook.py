@@ -95,6 +95,11 @@ def test_other_subjects_are_refused_by_name() -> None:
         dermis.view([1, 2])  # type: ignore[arg-type]
 
 
+def test_old_keyword_of_the_subject_warns() -> None:
+    with pytest.warns(DeprecationWarning, match="subject"), pytest.raises(dermis.DermisError):
+        dermis.view(shown=[1, 2])  # type: ignore[call-arg]
+
+
 def test_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(dermis.DermisError, match=r'pip install "dermis\[notebook\]"'):
