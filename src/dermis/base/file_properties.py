@@ -40,7 +40,7 @@ class FileProperty:
 def _property(
     treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
 ) -> FileProperty:
-    """Return a property; `drawn`, `noted` and others are this function with their treatment."""
+    """Return a property; `drawn`, `noted` and so on call this function with their treatment."""
     return FileProperty(treatment, name, detail, keys, other_parts)
 
 

@@ -17,9 +17,9 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 class Axes(NamedTuple):
     """Axes of a file.
 
-    up : axis that points upwards; None if it is not stated, for Y
-    front : axis along which the face looks, across `up`; "auto" if it is not stated, for -Y with Z up, as in
-        Blender, else Z
+    up : axis that points upwards; None if the file does not state it, which means Y
+    front : axis along which the face looks, perpendicular to `up`; "auto" if it is not stated, which means -Y
+        if Z is up, as in Blender, and Z otherwise
     """
 
     up: Axis | None = None

@@ -72,7 +72,7 @@ def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
 
 
 def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
-    """Join one further set of uv coordinates of all parts; 0 for parts without it."""
+    """Join an additional uv set of all parts, with zeros for parts that lack it."""
     return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
 
 

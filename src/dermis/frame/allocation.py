@@ -117,7 +117,7 @@ def _shade_record(
 ) -> UniformRecord:
     """Return the uniform record of the shading pass, with all members except those of the camera.
 
-    own : tables and textures of the technique, None for none
+    own : tables and textures of the technique; None if it has none
     """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.split)

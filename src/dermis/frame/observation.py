@@ -110,7 +110,7 @@ def _landmarks(camera: OpenCvCamera, names: tuple[str, ...], rows: NDArray[np.fl
 def pair_with_previous(
     scenes: Iterable[Scene], previous: Scene | Iterable[Scene | None] | None
 ) -> Iterator[tuple[Scene, Scene | None]]:
-    """Yield each scene with the previous scene from which its motion is computed, None for none.
+    """Yield each scene with the previous scene, relative to which its motion is computed, or None.
 
     previous : one scene or None, which precedes the first scene; each later scene then follows the one before
         it unless the head changes. Or an iterable with the previous scene of each scene

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Profile split into a narrow Gaussian that is relit in the picture, and Gaussians that blur light.
+    """Profile split into a narrow Gaussian, evaluated per pixel, and Gaussians that blur the atlas.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
@@ -35,12 +35,12 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return (o, 3) differences of the relit weights: each of the o other profiles minus this one [-]."""
+        """Return (o, 3) relit weights of the o other profiles minus those of this profile [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return for each other profile its (k, 3) blurring weights minus those of this profile [-]."""
+        """Return, for each other profile, the (k, 3) weights of its blurs minus those of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 

@@ -179,7 +179,7 @@ class CommandList(Recorder):
     ) -> Untyped:
         """Begin a render pass with cleared targets, pipeline and bind group, and return its encoder.
 
-        depth : wgpu's description of the depth attachment; None for none
+        depth : wgpu's description of the depth attachment; None for a pass without depth
         """
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
         self._end_pass()

@@ -160,7 +160,7 @@ class Graph(Recorder):
 
     recordings : cache of the recordings of `repeat`
     executed_stages : stages of the passes that ran in the last frame, in order
-    listing : listing that receives the passes of the next frame; None for none
+    listing : listing that records the passes of the next frame; None to record nothing
     """
 
     def __init__(self, device: Device) -> None:

@@ -85,7 +85,7 @@ def adobe_rgb() -> ColourSpace:
 
 
 def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
-    """Return the colour space of code points of ITU-T H.273, as in AVIF, HEIC and PNG; None for unknown ones.
+    """Return the colour space of ITU-T H.273 code points, as in AVIF, HEIC and PNG; None for unknown codes.
 
     Raises ValueError for the transfer functions of HDR displays.
     """

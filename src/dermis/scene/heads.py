@@ -80,23 +80,23 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the unit of the file [mm]; by default 1000 for glTF, and as stated for USD. For OBJ, PLY and
-        STL, which state none, 1 if the mesh is then 100 to 1000 mm large, else a guess from the size, with a
-        note.
+        Length of the unit of the file [mm]; by default 1000 for glTF, and as stated for USD. OBJ, PLY and STL
+        state no unit: 1 if the mesh is then 100 to 1000 mm large, else guessed from the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
         Upward axis of the file; by default that stated by USD, else y.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of the file along which the face looks; "auto" for that stated by VRM, else the one that eyes or
-        the shape of the head show, with a note, else -y with z up, as in Blender, or z.
+        Axis of the file along which the face looks; "auto" uses, in this order: the axis that VRM states, the
+        axis indicated by eyes or by the shape of the head (with a note), -y if z is up, as in Blender, and z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     skin_groups : str or sequence of str
         Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
-        own materials. By default they are found by their names, or by what covers the head.
+        own materials. By default skin is recognised by names, or by the groups that cover the head.
     opaque : str or sequence of str
-        Groups of the file that are not skin, where those found are wrong. Two balls in groups named as eyes
+        Groups of the file that are not skin, to correct the automatic choice. Two balls in groups named as
+        eyes
         become the package's eyes and need not be listed.
     eyes : {"fitted", "plain"}
         "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
@@ -107,8 +107,8 @@ def load_head(
         Overrides of the look of the eyes: fields of `EyeLook`.
     subdivide : int, "auto" or callable
         Levels of subdivision, 0 to 3: Catmull-Clark for meshes of quads, else Loop; at least 1 for the human.
-        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024, `SmoothIn(camera,
-        size)` in another picture.
+        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024 pixels; for other
+        pictures pass `SmoothIn(camera, size)`.
     regions : {"auto", "none"}
         "auto" sets roughness and strength by region of the face if the regions are known and the head has no
         roughness map; "none" keeps them uniform.

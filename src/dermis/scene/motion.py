@@ -38,16 +38,17 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file, of the head or with nodes or targets of the same names, "file.glb#clip" for one of
-        several clips; a CSV file of Live Link Face; results of MediaPipe's face landmarker in JSON; or files
+        A glTF file, which is that of the head or has nodes or targets of the same names, with "file.glb#clip"
+        for one of several clips; a CSV file of Live Link Face; results of MediaPipe's face landmarker in
+        JSON; or files
         of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head
         Head that moves.
     clip : str, optional
         Name of the clip in a glTF file.
     fps : float, optional
-        Frame rate of a sequence, by default 30; of a CSV file whose timecode does not tell it; of results
-        without time.
+        Frame rate of a sequence (by default 30), of a CSV file whose timecode does not imply it, or of
+        results without times.
     unit_mm : float, optional
         Length of the unit of a sequence's files [mm]; by default one that makes them as large as the head.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
@@ -58,12 +59,14 @@ def load_motion(
     Returns
     -------
     Clip
-        Motion of the head; `Clip.pose_at` gives the pose at any time, `Clip.note` lists what the head lacks.
+        Motion of the head; `Clip.pose_at` returns the pose at any time, and `Clip.note` lists targets and
+        bones that the head lacks.
 
     Raises
     ------
     DermisError
-        For files that cannot be read, with the line, and for motion that no part of the head matches.
+        For files that cannot be read, naming the line, and for motion that matches no target or bone of the
+        head.
 
     Examples
     --------

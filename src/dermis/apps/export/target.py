@@ -123,7 +123,7 @@ class Target(ABC):
     """Whether the exported files have not been tested in the program."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """Return the target with one of its variants; None selects the first.
+        """Return this target with a variant selected; None selects the first.
 
         Parameters
         ----------

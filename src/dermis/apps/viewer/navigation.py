@@ -121,7 +121,7 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
-    """Return the surface point under a position of the image [mm]; None beside the head.
+    """Return the surface point at a position in the image [mm]; None if the ray misses the head.
 
     The point is relative to the centre of the head.
 

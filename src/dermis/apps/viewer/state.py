@@ -138,7 +138,7 @@ class ViewerState:
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Return a copy with another environment; None for none."""
+        """Return a copy with another environment; None removes it."""
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:

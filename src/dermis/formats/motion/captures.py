@@ -172,7 +172,7 @@ def to_fractions(culprit: object, weights: Doubles) -> Doubles:
 
 
 def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doubles) -> None:
-    """Refuse blend shape weights (k, n) that are implausibly large; NaN for missing ones are accepted.
+    """Refuse implausibly large blend shape weights (k, n); NaN marks missing weights and is accepted.
 
     culprits, names : (k,) frames and (n,) blend shapes, for errors
     """

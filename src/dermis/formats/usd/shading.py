@@ -94,7 +94,7 @@ class MaterialReader:
             if (source := self._source(surface, name)) is not None:
                 self._add_source(tree, name, role, source)
         self._add_opacity(tree, surface, values)
-        self._add_unused(tree, surface)
+        self._list_unused_inputs(tree, surface)
         return _as_unlit(tree)
 
     def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
@@ -165,7 +165,7 @@ class MaterialReader:
         tree |= {"alpha": 1.0 if source is not None else values["opacity"]}
         tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
-    def _add_unused(self, tree: Tree, surface: UsdShade.Shader) -> None:
+    def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
         for name, (text, neutral) in _WITHOUT_EFFECT.items():
             value = self._value(surface, name, neutral)
             if value != neutral or self._source(surface, name) is not None:

@@ -1,4 +1,4 @@
-"""Planes: buffer of the outputs of a stage, one channel after the other, and the pass that fills it."""
+"""Planar buffer for the outputs of a stage, with one plane per channel, and the pass that fills it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer of the outputs of a stage, a plane of pixels for each channel.
+    """Planar buffer for the outputs of a stage: one plane of pixels per channel.
 
     stage : name of the shader that fills the planes
     channels : number of channels of each output, in the order of the planes

@@ -92,7 +92,7 @@ def make_translucency(
     shares_pairs: bool,
     owner: str,
 ) -> Translucency:
-    """Return the resources of the light through thin parts of a head.
+    """Return the resources for light that is transmitted through thin parts of a head.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface : the same resources for the shape in which pairs are searched

@@ -234,7 +234,7 @@ class Blender(Target):
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
-            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_meaning(version)),
+            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_description(version)),
             Parameter(_SCALE_NAME, _METRES_PER_MM, "m", "metres per millimetre"),
             Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]
@@ -244,7 +244,7 @@ class Blender(Target):
             parameters.append(Parameter("Subsurface IOR", SKIN_ETA, "-", "determines the mean free path"))
         return tuple(parameters)
 
-    def _radius_meaning(self, version: str) -> str:
+    def _radius_description(self, version: str) -> str:
         walk = "the mean free path" if _is_mfp(version) else "4 pi mean free paths"
         return {
             "random-walk": walk,

@@ -53,7 +53,7 @@ class Packer:
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """Add floats as integer multiples of a step for each column, and return the index of the run.
+        """Add a run of floats as integer multiples of one step per column; return its index in `runs`.
 
         values : (n, c) floats that are multiples of the steps
         steps : (c,) steps, powers of two
