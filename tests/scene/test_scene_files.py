@@ -196,3 +196,11 @@ def test_face_regions_are_read_from_a_table(folder: Path) -> None:
 def test_invalid_regions_are_refused(folder: Path, head: str, skin: str, said: str) -> None:
     with pytest.raises(DermisError, match=said):
         _load(folder, f'[head]\nname = "head.obj"\n{head}\n[skin]\n{skin}\n')
+
+
+def test_old_keyword_of_the_head_warns(tmp_path: Path) -> None:
+    head = load_head(write_head(tmp_path / "head.obj"))
+    (tmp_path / "scene.toml").write_text('[head]\nname = "absent.obj"\n')
+    with pytest.warns(DeprecationWarning, match="known is now head"):
+        scene, _ = load_scene(tmp_path / "scene.toml", known=head)  # type: ignore[call-arg]
+    assert scene.head is head

@@ -47,7 +47,7 @@ def check_arrays(
 ) -> None:
     """Refuse positions, uv and triangles from which no valid `Mesh` can be built.
 
-        positions : (v, 3) vertex positions [mm]
+    positions : (v, 3) vertex positions [mm]
     uv : (v, 2) vertex uv
     triangles : (f, 3) vertex indices
     culprit : source of the mesh for errors, usually its file
@@ -108,7 +108,7 @@ def check_uv_range(mesh: Mesh, culprit: object) -> None:
 def flat_triangles(positions: NDArray[np.floating], triangles: NDArray[np.integer]) -> Mask:
     """Return the mask (f,) of triangles without area in single precision.
 
-        positions : (v, 3) vertex positions [mm]
+    positions : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
     """
     columns = np.ascontiguousarray(positions.T, np.float64)

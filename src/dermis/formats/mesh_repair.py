@@ -54,7 +54,7 @@ _PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD
 class RawMesh:
     """Triangles of a file in the head's space, before they become a `Mesh`.
 
-        positions : (v, 3) vertex positions [mm]
+    positions : (v, 3) vertex positions [mm]
     normals : (v, 3) normals of the file, NaN where it has none
     uv : (v, 2) uv with v down
     point : (v,) index of the point at which each vertex is
@@ -156,8 +156,7 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
     """Return the mesh without the flat triangles of a mask (f,) and without duplicates.
 
     Among triangles of one material with the same three points, the first is kept. Among materials with
-    exactly
-    the same triangles, skin is kept, else the first one.
+    exactly the same triangles, skin is kept, else the first one.
     """
     if flat.any():
         notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
@@ -366,8 +365,7 @@ def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
     """Return each triangle's connected component (f,), and the mask (f,) of those to reverse.
 
     Reversing them makes the winding consistent. Of the two windings of a component, that of the larger area
-    is
-    kept. A component without a consistent winding, such as a Moebius strip, is unchanged.
+    is kept. A component without a consistent winding, such as a Moebius strip, is unchanged.
     """
     count, pairs = len(mesh.triangles), mesh.sides.pairs
     forward = mesh.sides.start < mesh.sides.end

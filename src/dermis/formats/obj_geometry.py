@@ -98,7 +98,7 @@ _Statement = tuple[int, str, str]
 class _Rows:
     """Statements of one kind without their first word.
 
-        line : (n,) line of each statement, counted from 0
+    line : (n,) line of each statement, counted from 0
     text : ASCII codes, with a line feed at the end of each statement
     start : (n,) position of each statement in the text
     """

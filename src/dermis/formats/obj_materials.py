@@ -284,12 +284,12 @@ def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
     return pieces
 
 
-def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMaterial:
+def _file_material(path: Path, name: str, material: MtlMaterial, udim: int) -> FileMaterial:
     """Return a material of an .mtl file."""
-    textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(own.unread)
+    textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(material.unread)
     skin_only = list[str]()
     row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
-    for role, texture in own.textures.items():
+    for role, texture in material.textures.items():
         written = picture_name(texture, udim)
         file = find_referenced_file(path, written)
         if file is None:
@@ -302,12 +302,12 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
                 c, f = c - column, f + row
             textures[_PART_ROLES[role]] = Texture(file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap))
         unused += [f"option {option} of {written}" for option in texture.unused]
-    numbers = {key: values[0] for key, values in own.numbers.items()}
+    numbers = {key: values[0] for key, values in material.numbers.items()}
     alpha = numbers.get("d", 1.0 - numbers.get("tr", 0.0))
     roughness = numbers.get("pr")
     if roughness is None and "ns" in numbers:
         roughness = (2.0 / (max(numbers["ns"], 0.0) + 2.0)) ** 0.25
-    colour = None if own.colour == GREY else own.colour
+    colour = None if material.colour == GREY else material.colour
     if "colour" in textures and colour is not None:
         unused += [] if len(set(colour)) == 1 and round(colour[0], 3) in _USUAL_KD else ["Kd beside map_Kd"]
         colour = None
@@ -319,8 +319,8 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
         alpha_mode="blend" if alpha < 1.0 or "opacity" in textures else "opaque",
         roughness=roughness,
         stated_metalness=numbers.get("pm", 1.0 if "metalness" in textures else 0.0),
-        emission=parse_colour(own.numbers.get("ke", [float("emission" in textures)] * 3)),
-        normal_scale=own.textures["normal"].factor if "normal" in own.textures else 1.0,
+        emission=parse_colour(material.numbers.get("ke", [float("emission" in textures)] * 3)),
+        normal_scale=material.textures["normal"].factor if "normal" in material.textures else 1.0,
         skin_only=tuple(skin_only),
         missing=missing,
         unused=tuple(dict.fromkeys(unused)),

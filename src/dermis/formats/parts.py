@@ -61,7 +61,7 @@ class MaterialGroup:
 class MeshPart:
     """Triangles of one group in the rest pose, with the units and the v direction of the file.
 
-        positions : (v, 3) vertex positions
+    positions : (v, 3) vertex positions
     uv : (v, 2) uv of the vertices, or None
     normals : (v, 3) normals of the vertices, or None
     triangles : (f, 3) vertex indices

@@ -58,8 +58,7 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
 
     It is the millimetre if the mesh is then 100 to 1000 mm large and no standing figure. Otherwise it is the
     unit of `UNITS_MM` for which the size is closest to that of an adult or a head, or of a hand if the mesh
-    is
-    flat or slender.
+    is flat or slender.
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices

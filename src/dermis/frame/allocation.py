@@ -71,7 +71,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         _make_layout(memo, device, request, technique, atlas, shapes, bindings, k)
         for k, atlas in enumerate(atlases)
     )
-    own = technique.make(memo, device, settings, request.profile)
+    resources = technique.make(memo, device, settings, request.profile)
     thin = [layout.translucency for layout in layouts]
     scattered = layouts[0].scattered
     if len(layouts) > 1:
@@ -84,14 +84,14 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         shadow_maps=shadow_maps,
         diffusion=diffusion.make(memo, device, request, technique, [textures for _, textures in atlases]),
         scattered=scattered,
-        technique=own,
+        technique=resources,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
         sky=_cached_sky_visibility(memo, device, request, layouts[0], shapes)
         if request.occlusion_follows_shape
         else None,
         hair=strands,
         visibility=cached(_visibility_layers, device, settings.size, settings.samples),
-        view=_shade_record(device, request, technique, own),
+        view=_shade_record(device, request, technique, resources),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
         post=post.make(memo, device, request),
         outputs=outputs.make(memo, device, request, shapes.tables, thin),
@@ -113,15 +113,15 @@ def _shade_constants(request: FrameRequest) -> Constants:
 
 
 def _shade_record(
-    device: Device, request: FrameRequest, technique: Technique, own: TechniqueResources | None
+    device: Device, request: FrameRequest, technique: Technique, resources: TechniqueResources | None
 ) -> UniformRecord:
     """Return the uniform record of the shading pass, with all members except those of the camera.
 
-    own : tables and textures of the technique; None if it has none
+    resources : tables and textures of the technique; None if it has none
     """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.split)
-    technique.write_view_record(view, program, own)
+    technique.write_view_record(view, program, resources)
     return view
 
 

@@ -76,14 +76,14 @@ class CapturedFrame:
     records: list[tuple[str, UniformRecord]] = field(default_factory=list)
     _record_index: dict[int, int] = field(default_factory=dict)
 
-    def add(self, one: CapturedPass, unit: int | None) -> None:
+    def add(self, captured_pass: CapturedPass, unit: int | None) -> None:
         """Append a pass.
 
         unit : index of the recording to which it belongs; None for a pass that is a unit by itself
         """
         last = self.passes[-1].unit if self.passes else -1
-        one.unit = last + 1 if unit is None else unit
-        self.passes.append(one)
+        captured_pass.unit = last + 1 if unit is None else unit
+        self.passes.append(captured_pass)
 
     def record(self, struct: str, record: UniformRecord) -> int:
         """Return the index of a uniform record in `records`, appending it on first use."""

@@ -66,7 +66,7 @@ ODD_PIXELS = (
 class EmbeddedPicture:
     """Picture file of a glTF file or of a USD package, whose colours are sRGB whatever profile it has.
 
-        name : name of the picture in error messages
+    name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
     """
 

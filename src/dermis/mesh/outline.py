@@ -108,7 +108,7 @@ def rig_outline(
 ) -> RigOutline:
     """Return the outline of a rig that consists of the given points, with their targets and weights.
 
-        positions : (p, 3) positions of all control points at rest [mm]
+    positions : (p, 3) positions of all control points at rest [mm]
     points : (s,) indices of the outline points
     """
     rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])

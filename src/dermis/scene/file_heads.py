@@ -49,15 +49,15 @@ class MapOptions:
     normal_y: NormalY = "up"
 
     @property
-    def chosen(self) -> dict[str, MapFile]:
+    def user_files(self) -> dict[str, MapFile]:
         """Return the files that the user has chosen, by role."""
         return {role: file for role, file in self.files.items() if file is not None}
 
     @property
-    def replaced(self) -> set[str]:
+    def replaced_roles(self) -> set[str]:
         """Return the roles for which the user's files replace pictures of the mesh file."""
         relief = {"normal", "height", "bump"}
-        return {*self.chosen, *(relief if relief & self.chosen.keys() else ())}
+        return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 
     def load(self, files: Mapping[str, Any]) -> Maps:
         """Load the user's files and, for all other roles, the pictures of the mesh.
@@ -95,7 +95,7 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     )
     check_uv_range(mesh, path)
     check_relief(options.height_mm, maps.height, f"{name}: height_mm")
-    maps, tone_note = (maps, "") if "colour" in options.chosen else with_skin_tone(mesh, maps)
+    maps, tone_note = (maps, "") if "colour" in options.user_files else with_skin_tone(mesh, maps)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
         notify(f"{path}: {note}")
     return Head(name, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
@@ -129,28 +129,28 @@ def _with_materials(
 ) -> tuple[Mesh, Maps, list[str]]:
     """Return mesh and maps of a file with materials, and notes on properties that are not drawn."""
     direct = direct_material(rigged, materials)
-    pack_skin = direct is None and not options.chosen
+    pack_skin = direct is None and not options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
     loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
     roles = [one.name for one in fields(Maps)]
     maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
-    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced, pack_skin)
+    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced_roles, pack_skin)
     return mesh, maps, [*notes, *faults, unused]
 
 
 def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tuple[Maps, list[str]]:
     """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
     if path.suffix.lower() != ".obj" or not material.name:
-        return with_factors(options.load(material.skin_pictures()), material, options.chosen), []
+        return with_factors(options.load(material.skin_pictures()), material, options.user_files), []
     own, faults = obj_maps(
         path,
         material.name,
-        overridden=options.chosen,
+        overridden=options.user_files,
         height_mm=options.height_mm,
         normal_y=options.normal_y,
     )
     loaded = options.load({})
-    chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in options.chosen}
+    chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in options.user_files}
     return with_factors(
-        replace(own, **chosen_maps), material, {*options.chosen, "normal", "roughness"}
+        replace(own, **chosen_maps), material, {*options.user_files, "normal", "roughness"}
     ), faults

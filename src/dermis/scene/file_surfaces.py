@@ -58,20 +58,24 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
-def with_factors(maps: Maps, material: FileMaterial, replaced: Collection[str]) -> Maps:
+def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
     """Return the maps of a skin material, multiplied by its factors; roughness is squared.
 
-    replaced : roles of maps that the user replaces, to which the factors do not apply
+    user_roles : roles of maps that the user replaces, to which the factors do not apply
     """
     changed: dict[str, Any] = {}
-    if material.maps is None and "colour" not in replaced and material.colour not in (None, (1.0, 1.0, 1.0)):
+    if (
+        material.maps is None
+        and "colour" not in user_roles
+        and material.colour not in (None, (1.0, 1.0, 1.0))
+    ):
         white = np.ones((1, 1, 3), np.float32)
         changed["colour"] = (white if maps.colour is None else maps.colour) * np.array(
             material.colour, np.float32
         )
-    if maps.normal is not None and "normal" not in replaced and material.normal_scale != 1.0:
+    if maps.normal is not None and "normal" not in user_roles and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
-    if material.maps is None and "roughness" not in replaced and "roughness" in material.textures:
+    if material.maps is None and "roughness" not in user_roles and "roughness" in material.textures:
         values = read_role(material.textures["roughness"], "roughness")[..., 0]
         changed["roughness"] = (values * np.float32(material.roughness)) ** 2
     return replace(maps, **changed)
@@ -195,13 +199,13 @@ def unused_properties(
     mesh: Mesh,
     materials: Sequence[FileMaterial],
     in_file: Sequence[int],
-    replaced: Collection[str],
+    user_roles: Collection[str],
     is_packed: bool,
 ) -> str:
     """Return a note on properties of a file's materials that are not drawn; empty if there are none.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
-    replaced : roles of skin maps that the user replaces
+    user_roles : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
@@ -210,7 +214,7 @@ def unused_properties(
     for material, index in zip(mesh.materials, in_file, strict=True):
         own, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
         unused = list(own.unused)
-        unused += [text for role, text in own.missing.items() if not (is_skin and role in replaced)]
+        unused += [text for role, text in own.missing.items() if not (is_skin and role in user_roles)]
         if is_skin and own.maps is None:
             unused += _replaced_by_skin(own)
         if not is_skin or is_packed:

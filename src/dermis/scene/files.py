@@ -11,6 +11,7 @@ from pydantic import Field
 
 from dermis.base.errors import error_context, refuse
 from dermis.base.reading import checked_path, is_file, read_toml
+from dermis.base.renamed import renamed_keywords
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
@@ -76,9 +77,10 @@ def load_camera(name: str | Path, head: Head) -> Camera:
     return _build_settings(Camera, name, "camera", table)
 
 
+@renamed_keywords(known="head")
 def load_scene(
     path: str | Path,
-    known: Head | None = None,
+    head: Head | None = None,
     *,
     camera: str | None = None,
     size: tuple[int, int] | None = None,
@@ -95,8 +97,8 @@ def load_scene(
     ----------
     path : str or path
         The TOML file.
-    known : Head, optional
-        Head of the file's [head] table, if it is already loaded.
+    head : Head, optional
+        Head to use instead of loading the head of the file's [head] table.
     camera : str, optional
         Name of the camera that determines the subdivision levels of the head, instead of the file's camera.
     size : (int, int), optional
@@ -140,7 +142,8 @@ def load_scene(
     resolve_camera = partial(_parse_camera, path, entry) if camera is None else partial(load_camera, camera)
     picture = SmoothIn(resolve_camera, size or settings.size)
     with error_context(path):
-        head, skin = (known, skin) if known else head_and_skin(head_entry, skin, path.parent, picture)
+        if head is None:
+            head, skin = head_and_skin(head_entry, skin, path.parent, picture)
     environment = _parse_environment(path, table["environment"]) if "environment" in table else None
     pose = _parse_pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")

@@ -31,7 +31,7 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     """
     s = blinn_phong_exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(angles, s)
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -49,7 +49,7 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
         * _power_of_n_h(angles, blinn_phong_exponent(m))
         / (np.pi * np.maximum(angles.n_l, 1e-6))
     )
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def _power_of_n_h(angles: Cosines, s: Floats) -> Floats:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.renamed import renamed_attribute
+
 Floats = NDArray[np.float64]
 
 
@@ -24,9 +26,11 @@ class Cosines:
     v_h: Floats
 
     @property
-    def above(self) -> NDArray[np.bool_]:
+    def is_above(self) -> NDArray[np.bool_]:
         """Return the mask of directions for which both light and view are above the surface."""
         return (self.n_l > 0.0) & (self.n_v > 0.0)
+
+    above = renamed_attribute("above", "is_above")
 
 
 def cosines(n: Floats, l: Floats, v: Floats) -> Cosines:

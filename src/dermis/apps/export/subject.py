@@ -100,8 +100,7 @@ class Subject:
         """Return a program's profile with its total energy expressed relative to the reference profile.
 
         A program may return more or less light than the albedo that it is given. The energy of the reference
-        is
-        multiplied by the ratio of the two.
+        is multiplied by the ratio of the two.
 
         curve : profile that the program renders, with the energy that it returns for the subject's albedo
         """

@@ -267,8 +267,7 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     `diffuse_albedo` within 1 %. The walk is therefore through this medium, but light enters and leaves
     through a Lambertian surface. The method "burley" is the profile of [ChristensenBurley2015] for this
     colour and radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
-    % by the
-    profile.
+    % by the profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)

@@ -33,8 +33,7 @@ def integrate_exitance(
     error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
 
     A node of the octree, a triangle or a part of a triangle is replaced by three points if Taylor's remainder
-    is
-    below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
+    is below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
     integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
     relation between the bound and `error` is measured.
 

@@ -123,20 +123,20 @@ def _mirrored_triangles(surface: FlatSurface, piece: Index, members: Index) -> M
     return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[members]))
 
 
-def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Index) -> None:
+def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge where the surface ends.
 
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
-    ended : (h, w) mask of texels beyond the end of the surface
+    beyond_end : (h, w) mask of texels beyond the end of the surface
     y, x : (n,) row and column of the gutter texels among them
     """
-    last = np.array(ended.shape) - 1
+    last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
         anchor = coverage.anchor_triangle[next_y, next_x]
-        same = (anchor >= 0) & ~ended[next_y, next_x] & (piece[anchor] == piece_of_texel)
+        same = (anchor >= 0) & ~beyond_end[next_y, next_x] & (piece[anchor] == piece_of_texel)
         from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
     for grid in (coverage.triangle, coverage.weights):
         grid[y, x] = grid[from_y, from_x]

@@ -42,9 +42,9 @@ class Geodesics(NamedTuple):
     direction: Complex
     orientation: Doubles
 
-    def select(self, chosen: Mask) -> Geodesics:
+    def select(self, selected: Mask) -> Geodesics:
         """Return the geodesics for which a mask is true."""
-        return Geodesics._make(part[chosen] for part in self)
+        return Geodesics._make(part[selected] for part in self)
 
 
 class GeodesicEnds(NamedTuple):

@@ -113,8 +113,7 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     weight : (f,) importance of each triangle's stretch [-]
 
     The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is
-    then
-    made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
+    then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
     [Rabinovich2017].
     """
     shapes = planar_triangles(points[triangles])

@@ -129,19 +129,19 @@ class _Reader:
             unused=tuple(self.unused),
         )
 
-    def _own_maps(self, own: Tree) -> dict[str, object]:
+    def _own_maps(self, extras: Tree) -> dict[str, object]:
         """Return keyword arguments of `load_maps` from the extras of a file that this package wrote."""
-        colour = own.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
+        colour = extras.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
             "baseColorTexture"
         )
-        references = {"colour": colour, **{role: own.get(role) for role in EMBEDDED_ROLES}}
+        references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_ROLES}}
         pictures = {
             role: self._picture(self.document.item("textures", reference["index"]))
             for role, reference in references.items()
             if reference is not None
         }
         maps: dict[str, object] = {role: picture for role, picture in pictures.items() if picture is not None}
-        height_mm = _checked_relief(own.get("height_mm"))
+        height_mm = _checked_relief(extras.get("height_mm"))
         return maps if height_mm is None else maps | {"height_mm": height_mm}
 
     def _from_glossiness(self, gloss: Tree) -> Tree:

@@ -146,8 +146,8 @@ def _expressions(version: Tree) -> Tree:
     return {**(expressions.get("preset") or {}), **(expressions.get("custom") or {})}
 
 
-def _notes(extensions: Tree, version: Tree, old: bool) -> Iterator[str]:
-    expressions = _groups(version) if old else list(_expressions(version).values())
+def _notes(extensions: Tree, version: Tree, is_vrm0: bool) -> Iterator[str]:
+    expressions = _groups(version) if is_vrm0 else list(_expressions(version).values())
     if any(one.get(key) for one in expressions for key in _MATERIAL_BINDS):
         yield "changes of materials by expressions are left out"
     present = {*version, *extensions}

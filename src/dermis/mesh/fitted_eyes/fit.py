@@ -65,8 +65,10 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     balls, reason = find_eyeballs(coarse or mesh)
     if balls is None:
         return replace(head, note=reason)
-    replaced = _ball_triangles(mesh, control.stencils, balls)
-    shapes = _eye_shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
+    replaced_points = _ball_triangles(mesh, control.stencils, balls)
+    shapes = _eye_shapes(
+        np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced_points), axis=0), balls
+    )
     points, quads = build_eyeball(_GRID_SIDE)
     pairs = list(zip(balls, shapes, strict=True))
     eyeballs = [
@@ -76,7 +78,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
         rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
-    new_mesh = _replace_eyeballs(mesh, replaced, [one.points for one in eyeballs], quads)
+    new_mesh = _replace_eyeballs(mesh, replaced_points, [one.points for one in eyeballs], quads)
     starts = np.array([begin, begin + count], np.int32)
     apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_GRID_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
@@ -167,8 +169,8 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
     remains[np.concatenate(balls)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
-    replaced = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
-    pairs = zip(_MATERIAL_NAMES, replaced, strict=True)
+    replaced_points = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
+    pairs = zip(_MATERIAL_NAMES, replaced_points, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
     new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)

@@ -107,16 +107,16 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
     return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
 
 
-def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
+def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    own : mask of the texels to count: those inside charts, gutters excluded
+    inside : mask of the texels to count: those inside charts, gutters excluded
 
     Non-negative half floats are ordered like their 16-bit patterns, so a histogram of these is faster than
     sorting.
     """
     words = stretch.view(np.uint16)
-    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[own], minlength=1 << 16)
+    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside], minlength=1 << 16)
     total = int(counts.sum())
     if total == 0:
         return 0.0
