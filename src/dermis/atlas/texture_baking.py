@@ -232,7 +232,7 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
 
 
 def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Sample a picture by bilinear interpolation at positions (..., 2) in [0, 1]: (..., k)."""
+    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
     left, right, across = _neighbours(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
     top, bottom, down = _neighbours(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
     x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)

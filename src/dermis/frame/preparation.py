@@ -248,7 +248,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights: UniformRecord) -> AtlasLayout:
-    """Return a copy of the layout whose shaders read the uniform record of these lights."""
+    """Return a copy of the layout with the uniform record of these lights in its shader bindings."""
     return replace(layout, bindings=layout.bindings | {"lights": lights})
 
 

@@ -93,7 +93,7 @@ class FrameRequest:
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; an environment without occlusion excludes it."""
+        """Return whether interreflection is computed; under an environment it requires occlusion."""
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property

@@ -57,7 +57,7 @@ class Binding:
 
     @property
     def has_content(self) -> bool:
-        """Return whether the resource has content, which all resources except samplers have."""
+        """Return whether the resource holds data; samplers do not."""
         return "sampler" not in self.entry
 
     @property

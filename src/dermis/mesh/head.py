@@ -41,7 +41,8 @@ class Head:
     eyes : Eyes, optional
         Eyeballs of realistic shape.
     strands, hair : Strands, optional
-        Brows and lashes; hair of head and beard in random order, so that the first ones can represent all.
+        Strands of brows and lashes, and of scalp and beard. The latter are in random order, so that the first
+        ones are a random sample.
     note : str, optional
         Parts of the file that are not used, with reasons; empty for none.
     levels : int, optional

@@ -223,7 +223,7 @@ def _covers_face(points_mm: Doubles) -> Mask:
 def _hair_paths(head: Head) -> tuple[Doubles, Doubles]:
     """Return the paths (n, k, 3) and outward directions of hair that falls to the shoulders from a parting.
 
-    Each step follows the surface below, at a clearance of its own, and turns downwards.
+    Each step follows the surface below, at a random clearance for each path, and turns downwards.
     """
     assert head.hair is not None
     rng, mesh = np.random.default_rng(3), head.mesh

@@ -142,8 +142,8 @@ def refine_patch(
 def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (f,) of triangles whose bounding balls are within reach of the centre.
 
-    Raises DermisError when there is none, or when those entirely within reach will become too many: a
-    triangle with edges of at most `edge_mm` has at most the area of the equilateral one.
+    Raises DermisError when there is none, or when splitting those entirely within reach would give too many
+    triangles. The estimate assumes equilateral triangles with edges of `edge_mm`, the largest ones possible.
 
     corners : (f, 3, 3) corner positions [mm]
     reach : distance from the centre [mm]

@@ -264,7 +264,7 @@ class Viewer:
     def _on_picture_event(self, event: Event) -> None:
         """Handle an event over the picture.
 
-        During a drag, positions stay relative to the left edge that the picture had at the press.
+        During a drag, positions are relative to the left edge of the picture at the start of the drag.
         """
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))

@@ -123,7 +123,7 @@ class Document:
             values = np.zeros(shape, kind)
         if "sparse" not in accessor:
             return values
-        return self._with_sparse(values, accessor["sparse"])
+        return self._substitute_sparse(values, accessor["sparse"])
 
     def read_floats(self, index: int) -> Doubles:
         """Return n elements of k components of an accessor as floats, (n, k).
@@ -135,7 +135,7 @@ class Document:
             return values.astype(np.float64)
         return to_floats(values)
 
-    def _with_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
+    def _substitute_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
         count = _checked_size(sparse["count"])
         if count > len(values):
             raise ValueError(f"{count} of {len(values)} values are listed as sparse")

@@ -44,7 +44,7 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return the distances (n,) before the ball's centre at which rays meet it [mm]; 0 for misses."""
+        """Return how far in front of the ball's centre rays hit the ball (n,) [mm]; 0 for misses."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property

@@ -281,7 +281,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
     """Return the directives of the material of a part that is not skin, with the pictures that it needs.
 
-    name : prefix of the names of materials that metal parts mix
+    name : prefix of the names of the two materials that are mixed for a metal part
     prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
