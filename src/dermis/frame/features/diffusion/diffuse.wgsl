@@ -22,7 +22,7 @@ struct Spread {
     resampling: f32, // part of variance_mm2 that resampling to this resolution and back adds [texel^2]
     pending: f32, // part of source_mm2 that interpolation of the final sum will add [texel^2]
     previous_resampling: f32, // variance that resampling added to the previous level [texel^2]
-    previous_mm2: f32, // variance that the previous blur added; what resampling exceeded it by is subtracted now
+    previous_mm2: f32, // variance that the previous blur added; if resampling added more, the excess is subtracted now
     truncation: f32, // half-width of the kernel in standard deviations
     clear: vec3f, // light of empty texels, scaled as in the levels
 }

@@ -6,7 +6,7 @@ const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
 //#fill const MIN_RAYS: u32 = {min_rays}u; // least number of rays per light
 const MIN_PROBES: u32 = 8u; // number of rays after which the others are skipped if all agree
-override RAY_STRIDE: u32 = 1u; // one in so many rays is traced, for passes that do not show edges of shadows
+override RAY_STRIDE: u32 = 1u; // number of rays of which one is traced, above 1 in passes that do not show edges of shadows
 
 const MIN_EDGE_TEXELS: f32 = 1.5; // half width of the sharpest edge of a soft shadow
 
