@@ -66,10 +66,10 @@ def make_scene(person: Path, size: list[int]) -> None:
     world.use_nodes = True
     world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.2
     middle = Vector((0.0, 0.0, -_MIDDLE_M))
-    for place, watts in _LIGHTS:
+    for location, watts in _LIGHTS:
         light = bpy.data.lights.new("light", "AREA")
         light.energy, light.size = watts, _LIGHT_M
-        aim(add("light", light), Vector(place), middle)
+        aim(add("light", light), Vector(location), middle)
     camera = bpy.data.cameras.new("camera")
     camera.lens, camera.clip_start = _LENS_MM, 0.01
     bpy.context.scene.camera = add("camera", camera)
@@ -129,10 +129,10 @@ def combined(path: Path) -> Any:
     return pixels.reshape(height, width, 4)
 
 
-def aim(thing: Any, place: Vector, target: Vector) -> None:
+def aim(item: Any, location: Vector, target: Vector) -> None:
     """Place an object and turn it towards a target."""
-    thing.location = place
-    thing.rotation_euler = (target - place).to_track_quat("-Z", "Y").to_euler()
+    item.location = location
+    item.rotation_euler = (target - location).to_track_quat("-Z", "Y").to_euler()
 
 
 def add(name: str, data: Any) -> Any:

@@ -69,7 +69,7 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
         words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as program:
         assert program.stderr is not None
-        listener = threading.Thread(target=_pass_on, args=(program.stderr, last))
+        listener = threading.Thread(target=_forward_output, args=(program.stderr, last))
         listener.start()
         try:
             failed = program.wait(longest_s)
@@ -85,8 +85,8 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
     return time.perf_counter() - started
 
 
-def _pass_on(said: IO[str], last: deque[str]) -> None:
-    for line in said:
+def _forward_output(stream: IO[str], last: deque[str]) -> None:
+    for line in stream:
         if line.strip():
             last.append(line.strip())
             note(line.rstrip())
@@ -324,7 +324,7 @@ def main(
     target = check_output(output, (".json",), "Choose such a name")
     name = ("lee_perry_smith" if is_available("lee_perry_smith") else "human") if head == "auto" else head
     plan = (quick_plan if quick else plan_of)(adapter, name)
-    measure(plan, _chosen(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
+    measure(plan, _parse_parts(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
 
 
 def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonObject], None]) -> JsonObject:
@@ -369,7 +369,7 @@ def _about(plan: Plan, renderer: Renderer) -> JsonObject:
     }
 
 
-def _chosen(parts: str) -> list[str]:
+def _parse_parts(parts: str) -> list[str]:
     names = parts.split(",")
     for name in names:
         if name not in PARTS:

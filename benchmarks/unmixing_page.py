@@ -37,7 +37,11 @@ def figures() -> tuple[JsonObject, JsonObject]:
 def page(results: JsonObject, widths: JsonObject) -> str:
     """Return the text of the page."""
     text = TEXT.read_text("utf-8")
-    tables = {"known": _known(results), "mistaken": _mistaken(results), "counted": _counted(results)}
+    tables = {
+        "known": _known_skin_table(results),
+        "mistaken": _mistaken(results),
+        "counted": _counted(results),
+    }
     tables["fitting"] = _fitting(json.loads(FITTED.read_text("utf-8")))
     tables |= {
         "shading": _shading(results["shading"]),
@@ -49,7 +53,7 @@ def page(results: JsonObject, widths: JsonObject) -> str:
     return text
 
 
-def _known(results: JsonObject) -> str:
+def _known_skin_table(results: JsonObject) -> str:
     heads = (
         "epidermis [mm]",
         "melanin",

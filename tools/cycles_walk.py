@@ -52,8 +52,8 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
 
 
 @compiled
-def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, found: Floats) -> None:
-    """Add the weights of photons that leave to their ring in `found` (albedos, radii + 1).
+def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, tally: Floats) -> None:
+    """Add the weights of photons that leave to their ring in `tally` (albedos, radii + 1).
 
     powers : (albedos, MOST) albedo^n
     """
@@ -65,7 +65,7 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomS
             if z + path * uz < 0.0:
                 path = -z / uz
                 ring = np.searchsorted(radii, math.hypot(x + path * ux, y + path * uy))
-                found[:, ring] += powers[:, step]
+                tally[:, ring] += powers[:, step]
                 break
             x, y, z = x + path * ux, y + path * uy, z + path * uz
             ux, uy, uz = scatter_direction(ux, uy, uz, 0.0, rng)
@@ -77,10 +77,10 @@ def main(photons: int = 4_000_000) -> None:
     powers = albedo[:, None] ** np.arange(MOST)
     lines = []
     for number, entry in enumerate(ENTRIES):
-        found = np.zeros((len(ROOTS), len(RADII) + 1))
+        tally = np.zeros((len(ROOTS), len(RADII) + 1))
         words = np.random.default_rng([7, number]).integers(0, 2**64, 4, np.uint64)
-        _walks(photons, entry == "skin", powers, RADII, words, found)
-        within = np.cumsum(found, axis=1)[:, 1:-1] / photons
+        _walks(photons, entry == "skin", powers, RADII, words, tally)
+        within = np.cumsum(tally, axis=1)[:, 1:-1] / photons
         for root, row in zip(ROOTS, within, strict=True):
             lines += [
                 f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)

@@ -48,8 +48,8 @@ def main(photons: int = PHOTONS) -> None:
         dark = ABSORBED >= DARK
         bright_left = trace_photons(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
         dark_left = trace_photons(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)
-        left = np.hstack([bright_left, dark_left])
-        total, within = left.sum(axis=0), np.cumsum(left[:-1], axis=0)
+        escaped = np.hstack([bright_left, dark_left])
+        total, within = escaped.sum(axis=0), np.cumsum(escaped[:-1], axis=0)
         for i, absorbed in enumerate(ABSORBED):
             shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
             lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
@@ -61,10 +61,10 @@ def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, eve
     """Return the (k, m) light that leaves through each ring and beyond the last, for each albedo [-]."""
 
     def batch(seeds: np.random.SeedSequence) -> Floats:
-        left = np.zeros((len(EDGES), len(absorbed)))
+        escaped = np.zeros((len(EDGES), len(absorbed)))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
-        _walk(photons // BATCHES, events, eta, diffuse, EDGES**2, np.log1p(-absorbed), rng, left)
-        return left
+        _walk(photons // BATCHES, events, eta, diffuse, EDGES**2, np.log1p(-absorbed), rng, escaped)
+        return escaped
 
     with ThreadPoolExecutor() as pool:
         parts = list(pool.map(batch, np.random.SeedSequence(0).spawn(BATCHES)))
@@ -80,7 +80,7 @@ def _walk(
     edges2: Floats,
     log_albedo: Floats,
     rng: Words,
-    left: Floats,
+    escaped: Floats,
 ) -> None:
     for _ in range(photons):
         x = y = z = ux = uy = 0.0
@@ -101,7 +101,7 @@ def _walk(
             if eta == 1.0 or random_uniform(rng) >= refract(-uz, eta)[0]:
                 ring = int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
                 for k in range(len(log_albedo)):
-                    left[ring, k] += math.exp(scatterings * log_albedo[k])
+                    escaped[ring, k] += math.exp(scatterings * log_albedo[k])
                 break
             uz = -uz
 

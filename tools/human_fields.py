@@ -53,7 +53,7 @@ def main(folder: Path) -> None:
     found = {
         "lips": signed(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
         "mouth": -signed(mesh, skin, inside),
-        "lids": away(mesh, lash_roots(folder, mesh, skin)),
+        "lids": distance_to(mesh, lash_roots(folder, mesh, skin)),
     }
     assert tuple(found) == BORDER_FIELDS
     values = np.stack([np.clip(one, -FARTHEST_MM, FARTHEST_MM) for one in found.values()], axis=1)
@@ -98,12 +98,12 @@ def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] |
     a, b = a[crosses], b[crosses]
     part = ((0.5 - share[a]) / (share[b] - share[a]))[:, None]
     border = mesh.positions[a] + part * (mesh.positions[b] - mesh.positions[a])
-    return np.asarray(np.where(share > 0.5, 1.0, -1.0) * away(mesh, border))
+    return np.asarray(np.where(share > 0.5, 1.0, -1.0) * distance_to(mesh, border))
 
 
-def away(mesh: Mesh, places: Doubles) -> Doubles:
+def distance_to(mesh: Mesh, points: Doubles) -> Doubles:
     """Return the (v,) distance of each vertex from the nearest position [mm]."""
-    return np.asarray(cKDTree(places).query(mesh.positions)[0])
+    return np.asarray(cKDTree(points).query(mesh.positions)[0])
 
 
 def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:

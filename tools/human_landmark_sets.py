@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from human_landmark_places import Doubles, Surface, arcs
+from human_landmark_candidates import Doubles, Surface, arcs
 
 from dermis.mesh.eyeball import CORNEA_MM, IRIS_BEHIND_MM, SCLERA_MM, apex_mm
 

@@ -62,15 +62,15 @@ def page(head: str) -> Image.Image:
         tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         tab.goto(url)
 
-        def shown() -> Image.Image:
+        def screenshot() -> Image.Image:
             return Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
 
-        wait_until_still(shown)
-        for place in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
-            tab.mouse.click(*place)
-            wait_until_still(shown, ANSWERED_S)
+        wait_until_still(screenshot)
+        for position in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
+            tab.mouse.click(*position)
+            wait_until_still(screenshot, ANSWERED_S)
         tab.mouse.move(SIZE[0] - 5, 5)
-        taken = wait_until_still(shown)
+        taken = wait_until_still(screenshot)
         browser.close()
     return taken
 
