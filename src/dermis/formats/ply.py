@@ -345,9 +345,9 @@ class _ElementReader:
         if not steps:
             return []
         trailing_bytes, count = self._fixed_size(skipped), self.element.count
-        lengths, end = self._walk(position, steps, trailing_bytes, 1)
+        lengths, end = self._read_rows(position, steps, trailing_bytes, 1)
         if not self._is_uniform(position, end - position, steps, lengths[0]):
-            lengths, _ = self._walk(position, steps, trailing_bytes, count)
+            lengths, _ = self._read_rows(position, steps, trailing_bytes, count)
         return list(np.broadcast_to(lengths, (count, len(steps))).T)
 
     def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
@@ -366,7 +366,7 @@ class _ElementReader:
             start = start + step.length.itemsize + length * step.item_size
         return True
 
-    def _walk(
+    def _read_rows(
         self, position: int, steps: Sequence[_ListStep], trailing_bytes: int, rows: int
     ) -> tuple[Index, int]:
         """Read rows in sequence; return the lengths of their lists (rows, lists), and the next position.

@@ -134,7 +134,7 @@ def profile_space(icc: bytes) -> ColourSpace | None:
         return None
     if kind == b"GRAY":
         return _space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
-    columns = [_fixed(tags[b"%cXYZ" % one], 3) for one in channels]
+    columns = [_fixed_point_numbers(tags[b"%cXYZ" % one], 3) for one in channels]
     curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
     to_rec709 = np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
     return _space(profile_name(icc), to_rec709, np.array(curves))
@@ -186,7 +186,7 @@ def _profile_curve(tag: bytes) -> Doubles:
     if kind != b"para" or count >> 16 > 4:
         raise ValueError("a curve is of an unknown kind")
     function = count >> 16
-    numbers = _fixed(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
+    numbers = _fixed_point_numbers(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
     if function <= 2:  # constant up to -b / a
         (g, a, b), offset = numbers[:3], sum(numbers[3:])
         c, d, e, f = 0.0, -b / a, offset, offset
@@ -198,6 +198,6 @@ def _profile_curve(tag: bytes) -> Doubles:
     return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
 
 
-def _fixed(tag: bytes, count: int, offset: int = 8) -> list[float]:
+def _fixed_point_numbers(tag: bytes, count: int, offset: int = 8) -> list[float]:
     """Return numbers of a tag of an ICC profile, in signed fixed point with 16 fractional bits."""
     return [value / 65536.0 for value in struct.unpack_from(f">{count}i", tag, offset)]

@@ -157,7 +157,7 @@ def _gltf_mesh(
 
 
 def _mesh_name(head: Head) -> str:
-    """Return the name of the exported mesh, which no bone may have."""
+    """Return a name for the exported mesh that differs from the names of all bones."""
     name = Path(head.name).stem or "head"
     return f"{name} mesh" if name in head.bones else name
 

@@ -131,7 +131,7 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium whose profile under a surface is closest to `curve`, as bright as the lightest skin.
+    """Return the medium with the profile closest to `curve` under a surface, and the lightest skin's albedo.
 
     Heads are lit from all directions. Under an index-matched surface, skin returns up to a quarter more of
     oblique light than of light along the normal; under a refracting surface, both are equal.
