@@ -72,7 +72,7 @@ def besides_progress(notes: bytes) -> list[bytes]:
     return [line for line in notes.splitlines() if b" images/s, " not in line and b"note: " not in line]
 
 
-def test_a_run_continues_after_its_driver_was_killed(
+def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     small_folder: Path, undisturbed: Files, tmp_path: Path
 ) -> None:
     rng, skipped = random.Random(5), 0
@@ -92,7 +92,7 @@ def test_a_run_continues_after_its_driver_was_killed(
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_terminated_run_keeps_complete_shards(
+def test_one_that_is_asked_to_end_keeps_what_is_whole(
     small_folder: Path, undisturbed: Files, tmp_path: Path, number: signal.Signals
 ) -> None:
     driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "never")
@@ -105,9 +105,7 @@ def test_a_terminated_run_keeps_complete_shards(
     assert set(contents(tmp_path / "out")) < set(undisturbed)
 
 
-def test_a_hangup_under_nohup_does_not_end_the_run(
-    small_folder: Path, undisturbed: Files, tmp_path: Path
-) -> None:
+def test_under_nohup_a_hangup_ends_nothing(small_folder: Path, undisturbed: Files, tmp_path: Path) -> None:
     """Like Ctrl-C, which background jobs of a shell ignore; both signals reach the workers too."""
     with child_process.ignored_signals():
         driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "gate", subprocess.Popen)

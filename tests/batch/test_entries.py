@@ -32,7 +32,7 @@ def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
 
 @pytest.mark.parametrize("encoding", ["png", "exr", "npy"])
 @pytest.mark.parametrize("name", ALL)
-def test_outputs_round_trip_with_the_documented_precision(name: str, encoding: Encoding) -> None:
+def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encoding) -> None:
     values = observation(4, outputs=(name,)).outputs[name]
     kind, output = file_format(name, encoding), OUTPUTS[name]
     found = decode_output(name, kind, encode_output(name, values, encoding))
@@ -48,7 +48,7 @@ def test_outputs_round_trip_with_the_documented_precision(name: str, encoding: E
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_background_round_trips_exactly(name: str) -> None:
+def test_the_background_comes_back_exactly(name: str) -> None:
     output = OUTPUTS[name]
     values = np.full((3, 4, output.channels or 2), output.background, output.kind)
     values = values[..., 0] if output.channels == 1 else values
@@ -61,14 +61,14 @@ def test_equal_observations_give_equal_bytes_and_others_do_not() -> None:
     assert image(3)[1]["png"] != image(4)[1]["png"]
 
 
-def test_files_have_documented_names_and_order() -> None:
+def test_names_and_order_of_the_files() -> None:
     _, files = image(1, outputs=("depth", "triangle"))
     assert set(files) == {"png", "depth.png", "triangle.exr", "json"}
     assert set(image(1, outputs=("depth",), encoding="npy")[1]) == {"png", "depth.npy", "json"}
     assert set(image(1, outputs=("depth",), encoding="exr")[1]) == {"png", "depth.exr", "json"}
 
 
-def test_records_round_trip() -> None:
+def test_all_that_is_known_comes_back() -> None:
     seen, files = image(1)
     found = decode_image(files)
     assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
@@ -84,7 +84,7 @@ def test_records_round_trip() -> None:
     assert set(OUTPUT_NAMES) < set(found)
 
 
-def test_unknown_values_are_none_and_missing_positions_nan() -> None:
+def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
     spec, seen = small_spec(), observation(2)
     seen.landmarks["ibug-68"].pixels[1] = np.nan
     found = decode_image(encode_record(2, seen, spec.parameters(2), spec))
@@ -100,7 +100,7 @@ def test_records_are_plain_json_without_minus_zero() -> None:
     assert b"-0.0," not in record and json.loads(record)["camera"]["t"] == [0.0, 0.0, 5.0]
 
 
-def test_numbers_that_are_not_finite_are_refused() -> None:
+def test_numbers_that_are_none_are_refused() -> None:
     spec, seen = small_spec(outputs=("depth",)), observation(1)
     seen.outputs["depth"][2, 3] = np.nan
     with pytest.raises(DermisError, match="output depth: expected finite numbers"):

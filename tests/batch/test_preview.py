@@ -30,7 +30,7 @@ at = {choice = ["camera", "angles"]}
 """
 
 
-def test_rows_contain_distributions_and_statistics() -> None:
+def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
     rows = {row["parameter"]: row for row in parameter_rows(parse_spec(tomllib.loads(SPEC) | {"count": 400}))}
     assert set(rows) == {"camera.yaw_deg", "camera.distance_mm", "gaze.at"}
     distance, gaze = rows["camera.distance_mm"], rows["gaze.at"]
@@ -52,7 +52,7 @@ def test_rows_contain_distributions_and_statistics() -> None:
     ] or f"camera {gaze['counts']['camera']}" in "".join(lines)
 
 
-def test_the_contact_sheet_shows_the_first_images_at_reduced_size() -> None:
+def test_the_contact_sheet_shows_the_first_images_small() -> None:
     rows, sheet = dry_run(parse_spec(tomllib.loads(SPEC)), ADAPTER)
     assert rows and sheet.dtype == np.uint8 and sheet.shape == (96, 3 * 192 + 2 * 4, 3)
     pictures: list[Any] = [sheet[:, k * 196 : k * 196 + 192] for k in range(3)]

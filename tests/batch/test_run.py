@@ -33,7 +33,7 @@ def killing(moments: set[int], rng: random.Random) -> Callable[[Progress], None]
     return kill_worker
 
 
-def test_the_data_set_is_complete(undisturbed: Files) -> None:
+def test_the_set_has_all_that_it_should(undisturbed: Files) -> None:
     shards = [name for name in undisturbed if name.startswith("shard-")]
     assert len(shards) == SHARDS
     assert {"spec.toml", "index.parquet", "README.md"} <= undisturbed.keys()
@@ -52,9 +52,7 @@ def test_two_workers_that_have_encoders_write_the_same(
     assert progress[-1] == (COUNT, COUNT)
 
 
-def test_parts_in_any_order_form_the_complete_data_set(
-    small_spec: Spec, undisturbed: Files, tmp_path: Path
-) -> None:
+def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     first = drawn(small_spec, tmp_path, part=(1, 2))
     assert not first.is_complete and "index.parquet" not in contents(tmp_path)
     second = drawn(small_spec, tmp_path, part=(0, 2))
@@ -62,7 +60,7 @@ def test_parts_in_any_order_form_the_complete_data_set(
     assert contents(tmp_path) == undisturbed
 
 
-def test_complete_shards_are_not_rendered_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     put(undisturbed, tmp_path)
     (tmp_path / "index.parquet").unlink()
     report = drawn(small_spec, tmp_path)
@@ -70,7 +68,9 @@ def test_complete_shards_are_not_rendered_again(small_spec: Spec, undisturbed: F
     assert contents(tmp_path) == undisturbed
 
 
-def test_damaged_shards_are_rendered_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+def test_a_shard_that_was_damaged_is_drawn_again(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
     put(undisturbed, tmp_path)
     name = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
     data = bytearray(undisturbed[name])
@@ -81,7 +81,7 @@ def test_damaged_shards_are_rendered_again(small_spec: Spec, undisturbed: Files,
     assert contents(tmp_path) == undisturbed
 
 
-def test_killed_workers_lose_no_shard(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     rng = random.Random(1)
     moments = set(rng.sample(range(1, COUNT - 1), 2))
     with pytest.warns(UserWarning, match=r"SIGKILL; its shard is rendered again"):
@@ -89,7 +89,7 @@ def test_killed_workers_lose_no_shard(small_spec: Spec, undisturbed: Files, tmp_
     assert report.is_complete and contents(tmp_path) == undisturbed
 
 
-def test_a_shard_that_kills_every_worker_fails_the_run(
+def test_a_shard_that_no_worker_survives_is_given_up(
     small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", 2)
@@ -112,7 +112,7 @@ def test_another_data_set_is_refused(small_spec: Spec, undisturbed: Files, tmp_p
     assert contents(tmp_path) == undisturbed
 
 
-def test_a_bad_head_is_refused_and_complete_shards_are_kept(tmp_path: Path) -> None:
+def test_a_bad_head_is_refused_and_what_is_whole_stays(tmp_path: Path) -> None:
     spec = read(write_spec(tmp_path, "bad.obj"))
     with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
         drawn(spec, tmp_path / "out")
@@ -120,7 +120,7 @@ def test_a_bad_head_is_refused_and_complete_shards_are_kept(tmp_path: Path) -> N
     assert all(name == "spec.toml" or name.startswith("shard-") for name in left)
 
 
-def test_all_workers_omit_the_same_bad_heads(tmp_path: Path) -> None:
+def test_bad_heads_are_left_out_the_same_by_all(tmp_path: Path) -> None:
     spec = read(write_spec(tmp_path, "bad.obj"))
     bad = [k for k in range(COUNT) if spec.parameters(k)["person.head"] == "bad.obj"]
     assert bad and len(bad) < COUNT - SHARD_SIZE
@@ -135,7 +135,7 @@ def test_all_workers_omit_the_same_bad_heads(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits of files are POSIX's")
-def test_complete_shards_survive_a_full_disk(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     import resource
 
     lost = [name for name in undisturbed if name.startswith("shard-00003")]

@@ -22,7 +22,7 @@ def spec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_spec(tmp_path)
 
 
-def test_a_data_set_is_rendered_and_reported(run: Run, spec: Path) -> None:
+def test_a_set_is_drawn_and_reported(run: Run, spec: Path) -> None:
     words = "--count 3 --size 24x16 --seed 9 --adapter cpu --workers 1 --encoders 0 --format folder"
     ended = run("batch", "spec.toml", "-o", "out", *words.split(), "--json")
     assert ended.code == 0 and "Traceback" not in ended.stderr
@@ -35,7 +35,7 @@ def test_a_data_set_is_rendered_and_reported(run: Run, spec: Path) -> None:
     assert again.code == 0 and "0 images in 0 shards (2 reused)" in again.stdout
 
 
-def test_a_part_reports_missing_parts(run: Run, spec: Path) -> None:
+def test_a_part_says_that_others_are_missing(run: Run, spec: Path) -> None:
     last = COUNT // SHARD_SIZE - 1
     ended = run(
         "batch", spec, "-o", "out", "--shard", f"{last}/{last + 1}", "--adapter", "cpu", "--workers", 1
@@ -86,14 +86,14 @@ def test_the_example_is_a_spec(run: Run, tmp_path: Path) -> None:
         ("spec.toml -o spec.toml --workers 1 --adapter cpu", "spec.toml: expected a writable path"),
     ],
 )
-def test_impossible_options_are_refused(run: Run, spec: Path, words: str, says: str) -> None:
+def test_what_cannot_be_is_refused(run: Run, spec: Path, words: str, says: str) -> None:
     before = set(spec.parent.iterdir())
     ended = run("batch", *words.split())
     assert (ended.code, ended.stdout) == (2, "") and says in ended.stderr, ended.stderr
     assert ended.stderr.count("\n") == 1 and set(spec.parent.iterdir()) == before
 
 
-def test_the_rate_is_averaged_over_the_last_minute() -> None:
+def test_pace_is_that_of_the_last_minute() -> None:
     clock = iter([0.0, *range(10, 200, 10)])
     pace = ImageRate(lambda: float(next(clock)))
     slow = [pace.update(done) for done in range(1, 10)]
@@ -101,7 +101,7 @@ def test_the_rate_is_averaged_over_the_last_minute() -> None:
     assert slow[-1] == pytest.approx(0.1) and fast[-1] == pytest.approx(1.0)
 
 
-def test_logs_get_a_line_every_thirty_seconds() -> None:
+def test_logs_get_a_line_now_and_then() -> None:
     now, written = [0.0], list[str]()
     lines = ProgressLog(written.append, lambda: now[0])
     for done in range(1, 101):

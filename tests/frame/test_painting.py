@@ -71,7 +71,7 @@ def grey(maps: Maps) -> Floats:
     return np.asarray(maps.colour.mean(axis=-1))
 
 
-def test_equal_appearances_are_painted_identically(device: Device, surface: PaintedSurface) -> None:
+def test_the_same_look_is_the_same_paint_to_the_bit(device: Device, surface: PaintedSurface) -> None:
     first, second = painted(device, surface), painted(device, surface)
     for role in ("colour", "height", "specular", "roughness"):
         assert np.array_equal(getattr(first, role), getattr(second, role)), role
@@ -93,7 +93,7 @@ def test_colours_are_those_of_the_pigments(device: Device, surface: PaintedSurfa
     assert away.max() < 0.012
 
 
-def test_mean_colour_is_that_of_the_appearance(device: Device, surface: PaintedSurface, head: Head) -> None:
+def test_its_mean_is_that_of_the_look(device: Device, surface: PaintedSurface, head: Head) -> None:
     for look in (BARE, replace(BARE, melanin=0.2), replace(BARE, melanin=0.004, blood=0.005)):
         maps = painted(device, surface, look)
         assert maps.colour is not None
@@ -101,7 +101,7 @@ def test_mean_colour_is_that_of_the_appearance(device: Device, surface: PaintedS
         np.testing.assert_allclose(mean, mean_colour(look), rtol=0.16)
 
 
-def test_lips_are_redder_than_their_surroundings(device: Device, surface: PaintedSurface, head: Head) -> None:
+def test_lips_are_redder_than_what_is_around(device: Device, surface: PaintedSurface, head: Head) -> None:
     maps, lips = painted(device, surface), fields(head, surface, "lips")
     mouth = fields(head, surface, "mouth")
     assert maps.colour is not None
@@ -110,13 +110,13 @@ def test_lips_are_redder_than_their_surroundings(device: Device, surface: Painte
     assert ratio[(lips > 1) & (mouth > 1)].mean() > 1.15 * around
 
 
-def test_gutter_texels_are_neither_black_nor_raised(device: Device, surface: PaintedSurface) -> None:
+def test_no_texel_beside_a_chart_is_black_or_high(device: Device, surface: PaintedSurface) -> None:
     maps = painted(device, surface, SkinLook(age=1.0))
     assert grey(maps).min() > 0.02
     assert maps.height is not None and np.isfinite(maps.height).all() and np.abs(maps.height).max() < 2.0
 
 
-def test_each_mark_changes_the_paint(device: Device, surface: PaintedSurface, head: Head) -> None:
+def test_what_is_asked_for_shows(device: Device, surface: PaintedSurface, head: Head) -> None:
     on = covered(head)
     plain = painted(device, surface)
 
@@ -139,7 +139,7 @@ def test_age_deepens_folds(device: Device, surface: PaintedSurface, head: Head) 
     assert depths[0] < 0.6 * depths[1] < 0.6 * depths[2]
 
 
-def test_larger_maps_show_the_same_skin(device: Device, surface: PaintedSurface, head: Head) -> None:
+def test_finer_maps_show_the_same_skin(device: Device, surface: PaintedSurface, head: Head) -> None:
     coarse, fine = painted(device, surface), painted(device, surface, side=2 * SIDE)
     assert coarse.colour is not None and fine.colour is not None
     halved = fine.colour.reshape(SIDE, 2, SIDE, 2, 3).mean(axis=(1, 3))
@@ -147,7 +147,7 @@ def test_larger_maps_show_the_same_skin(device: Device, surface: PaintedSurface,
     assert np.abs(halved - coarse.colour)[inner].mean() < 0.01
 
 
-def test_given_maps_are_kept_and_others_painted(device: Device, head: Head) -> None:
+def test_given_maps_stay_and_others_are_painted(device: Device, head: Head) -> None:
     own = np.full((16, 16), 0.4, np.float32)
     mixed = replace(head, maps=replace(head.maps, roughness=own))
     found = with_painted_maps(device, mixed, SIDE).maps
@@ -156,7 +156,9 @@ def test_given_maps_are_kept_and_others_painted(device: Device, head: Head) -> N
     assert with_painted_maps(device, other, SIDE) is other
 
 
-def test_painting_does_not_depend_on_subdivision(device: Device, surface: PaintedSurface, head: Head) -> None:
+def test_the_finest_mesh_is_painted_as_the_coarsest(
+    device: Device, surface: PaintedSurface, head: Head
+) -> None:
     """The finest mesh has the largest number of triangles."""
     fine = Human().head(subdivide=3)
     finest = painted_surface(fine.mesh, fine.control.stencils)
@@ -167,7 +169,7 @@ def test_painting_does_not_depend_on_subdivision(device: Device, surface: Painte
     assert apart.mean() < 0.005 and (apart > 0.1).mean() < 0.01
 
 
-def test_too_many_triangles_are_refused(
+def test_more_triangles_than_have_numbers_are_refused(
     device: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(given, "_MAX_TRIANGLES", surface.count)
@@ -176,12 +178,12 @@ def test_too_many_triangles_are_refused(
 
 
 @pytest.mark.parametrize("side", [100, 128, 8192])
-def test_invalid_map_sizes_are_refused(device: Device, head: Head, side: int) -> None:
+def test_sides_that_cannot_be_are_refused(device: Device, head: Head, side: int) -> None:
     with pytest.raises(DermisError, match="a power of two from 256 to 4096"):
         with_painted_maps(device, head, side)
 
 
-def test_rest_pose_is_painted_like_no_pose(renderer: Renderer, head: Head) -> None:
+def test_a_face_at_rest_is_the_one_without_a_pose(renderer: Renderer, head: Head) -> None:
     still = renderer.draw(Scene(head, lights=studio()), settings_of(atlas=256)).linear()
     posed = renderer.draw(
         Scene(head, lights=studio(), pose={"jawOpen": 0.0}), settings_of(atlas=256)
@@ -209,7 +211,7 @@ def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer,
     assert (change[y < -20] > 1e-3).mean() < 1e-3  # but where charts meet in the map
 
 
-def test_wrinkle_movements_follow_their_targets() -> None:
+def test_movements_are_those_of_their_targets() -> None:
     names = ("jawOpen", "browInnerUp", "mouthPressLeft")
     made = dict(zip(MOVEMENTS, movement_weights(names, np.array([0, 1, 0.5], np.float32)), strict=True))
     assert made["raised-brows"] == pytest.approx(0.8) and made["pressed"] == pytest.approx(0.25)
@@ -217,7 +219,7 @@ def test_wrinkle_movements_follow_their_targets() -> None:
     assert not movement_weights((), np.zeros(0, np.float32)).any()
 
 
-def test_all_people_share_the_painted_positions() -> None:
+def test_unposed_people_share_the_painted_places() -> None:
     """Positions and fields are those of the average person for all people."""
     one, other = (
         painted_surface(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head())
@@ -226,7 +228,7 @@ def test_all_people_share_the_painted_positions() -> None:
     assert np.array_equal(one.triangles, other.triangles)
 
 
-def test_appearances_out_of_range_are_refused() -> None:
+def test_looks_out_of_range_are_refused() -> None:
     with pytest.raises(DermisError, match="freckles"):
         SkinLook(freckles=1.5)
     with pytest.raises(DermisError, match="seed"):
@@ -239,7 +241,7 @@ def test_mean_colour_of_painted_maps_is_known_before_they_are_painted(head: Head
     assert red > green > blue
 
 
-def test_wrong_gamma_applies_to_painted_skin(renderer: Renderer, head: Head) -> None:
+def test_the_wrong_gamma_is_wrong_for_painted_skin_too(renderer: Renderer, head: Head) -> None:
     right, wrong = (
         renderer.draw(Scene(head, lights=studio()), settings_of(atlas=256, gamma=gamma)).linear()
         for gamma in ("right", "wrong")

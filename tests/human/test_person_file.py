@@ -15,7 +15,7 @@ from dermis.human.person_file import read_person, write_person_json
 
 
 @pytest.mark.parametrize("seed", [0, 7, 12])
-def test_person_survives_a_round_trip(tmp_path: Path, seed: int) -> None:
+def test_the_same_person_comes_back(tmp_path: Path, seed: int) -> None:
     person = Human.drawn(seed)
     write_person_json(tmp_path / "one.json", person)
     found = read_person(tmp_path / "one.json")
@@ -23,12 +23,12 @@ def test_person_survives_a_round_trip(tmp_path: Path, seed: int) -> None:
     assert (found.look, found.iris) == (person.look, person.iris)
 
 
-def test_missing_keys_have_defaults(tmp_path: Path) -> None:
+def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
     (tmp_path / "old.json").write_text('{"person": {"age": 70}}')
     assert read_person(tmp_path / "old.json") == Human(age=70)
 
 
-def test_person_file_loads_as_a_head(tmp_path: Path) -> None:
+def test_it_is_a_head(tmp_path: Path) -> None:
     write_person_json(tmp_path / "one.json", Human(age=70))
     head = load_head(tmp_path / "one.json")
     assert np.array_equal(head.positions_mm, Human(age=70).positions_mm)
@@ -44,14 +44,14 @@ def test_person_file_loads_as_a_head(tmp_path: Path) -> None:
         '{"person": {"targets": 4}}', '{"person": {"eyes": {"seed": "x"}}}', "\x00\x01", "[" * 5000,
     ],
 )  # fmt: skip
-def test_invalid_person_files_are_refused(tmp_path: Path, text: str) -> None:
+def test_what_is_no_person_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.json"
     path.write_text(text)
     with pytest.raises(DermisError):
         read_person(path)
 
 
-def test_numbers_are_written_as_plain_numbers(tmp_path: Path) -> None:
+def test_numbers_are_plain(tmp_path: Path) -> None:
     write_person_json(tmp_path / "one.json", Human.drawn(3))
     told: dict[str, Any] = json.loads((tmp_path / "one.json").read_text())["person"]
     assert told["skin"]["melanin"] == Human.drawn(3).look.melanin and isinstance(told["targets"], dict)

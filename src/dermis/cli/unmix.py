@@ -54,8 +54,8 @@ def unmix(
     Parameters
     ----------
     colour_map:
-        Albedo of the skin: PNG, JPEG, HEIC, TIFF, WebP or AVIF, rotated by its EXIF orientation and converted
-        by its colour profile; or EXR (linear, 0 to 1).
+        Albedo of the skin: PNG, JPEG, HEIC, TIFF, WebP or AVIF, turned by its EXIF and converted by its
+        colour profile; or EXR (linear, 0 to 1).
     output:
         Folder of the maps, created if necessary.
     melanin:
