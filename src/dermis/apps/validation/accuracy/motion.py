@@ -72,7 +72,8 @@ def motion(adapter: str = "auto") -> None:
     in_checkout(PAGE)
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    head = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
+    person = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
+    head = replace(person, hair=None, strands=None, eyes=None)
     persons = {name: person.positions_mm for name, person in PEOPLE.items()}
     fill_page(
         PAGE,
