@@ -117,12 +117,18 @@ def picture_error(
     rebuilt = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = LIGHT_AND_CAMERA[view]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
-    posed_head = replace(head)
-    vars(posed_head)["centre_mm"] = rebuilt.centre_mm  # lights and cameras are relative to it
+    posed_head = _with_centre(replace(head), rebuilt)
     pose = Pose(weights, positions_mm=person)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
+
+
+def _with_centre(head: Head, shape: Head) -> Head:
+    """Return a head after setting its centre to that of a shape; lights and cameras are relative to it."""
+    for one in (head, head.bare):
+        vars(one)["centre_mm"] = shape.centre_mm
+    return head
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -181,7 +187,7 @@ def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose
     for where in (blur.neck_points, blur.back_points):
         sides = blur.seam_side_points(shape, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        vars(scene.head)["centre_mm"] = shape.centre_mm  # the stripes of light are relative to it
+        _with_centre(scene.head, shape)
         errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"
