@@ -14,7 +14,7 @@ from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
-from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone, is_head_sized
+from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone
 from dermis.mesh.strands import Strands
 
 _HEAD_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
@@ -133,7 +133,7 @@ class Head:
 
         The skull of a body is at its head bone, if it has one.
         """
-        skeleton = None if is_head_sized(self.mesh.positions) or self.rig is None else self.rig.skeleton
+        skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:
             return self.mesh.skull_mm

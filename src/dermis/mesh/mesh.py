@@ -96,9 +96,14 @@ class Mesh(ShortRepr):
         return convex_hull(self.positions)
 
     @cached_property
+    def is_head_sized(self) -> bool:
+        """Return whether the mesh has the size and proportions of a head or bust."""
+        return is_head_sized(self.positions)
+
+    @cached_property
     def skull_mm(self) -> Point | None:
         """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm]."""
-        if is_head_sized(self.positions):
+        if self.is_head_sized:
             return skull_below(self.positions, float(self.positions[:, 1].max()))
         is_eye = np.array([one.eye for one in self.materials])[self.material]
         return body_skull(self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()])
