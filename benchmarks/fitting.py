@@ -29,6 +29,7 @@ from dermis.environment.panorama import directions, solid_angles
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.hdr import encode_exr
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
@@ -193,10 +194,11 @@ def main(
 def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     """Return the estimates of a case together with the true values.
 
-    The fit knows only the true eumelanin, oxygenation and kind of surface.
+    The fit knows only the true eumelanin, oxygenation, epidermal thickness and kind of surface.
     """
     began = time.process_time()
-    held = Pigments(eumelanin=one.person.look.eumelanin, oxygen=one.person.look.oxygen)
+    look = one.person.look
+    held = Pigments(eumelanin=look.eumelanin, oxygen=look.oxygen, epidermis_mm=DEFAULT_SKIN.epidermis_mm)
     skin = one.scene.skin.model_copy(update={"pigments": held, "roughness": 0.3, "rho_s": 0.5})
     given = replace(one.scene, skin=skin, lights=(), environment=None)
     found = fit(image, given, robust=_NO_LIMIT, adapter=adapter)

@@ -146,9 +146,10 @@ def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
 def model_error_cases() -> JsonObject:
     """Return the estimates of melanin and blood if the skin differs from the assumed model."""
     cases: dict[str, dict[str, float]] = {
-        "oxygen 0.6 for 0.75": {"oxygen": 0.6},
+        "oxygen 0.6 for 0.85": {"oxygen": 0.6},
         "eumelanin 0.5 for 0.7": {"eumelanin": 0.5},
-        "epidermis of 0.07 mm for 0.05": {"epidermis_mm": 0.07},
+        "epidermis of 0.08 mm for 0.055": {"epidermis_mm": 0.08},
+        "bloodless tissue as in [Jacques1998]": {"baseline": 1.0},
     }
     m, b = skins(SEED + 1)
     prior_mean = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
@@ -197,7 +198,7 @@ def supplied(folder: Path) -> list[JsonObject]:
     )
     m, b = (table[name].astype(np.float64) for name in ("f_mel", "f_blood"))
     colours = np.stack([table[f"lin_{channel}"] for channel in "RGB"], axis=-1)
-    model = skin_model(replace(DEFAULT_SKIN, eumelanin=1.0, epidermis_mm=0.06))
+    model = skin_model(SkinParameters(eumelanin=1.0, oxygen=0.75, epidermis_mm=0.06, baseline=1.0))
     found, forward = solve_pigments(model, colours, NOISE), delta_e_2000(model.colours(m, b), colours)
     left = delta_e_2000(colours / found.residual, colours)
     results = []

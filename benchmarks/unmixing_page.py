@@ -191,10 +191,10 @@ def _stated(cases: Sequence[JsonObject]) -> str:
     """Return the errors of the pigments relative to the standard deviations stated by the fits."""
     words = []
     for name in ("melanin", "blood"):
-        over = [math.log(a / b) / one[name]["relative_sd"] for one in cases for a, b in [_pair(one[name])]]
-        within = sum(abs(x) < 2.0 for x in over) / len(over)
+        over = [math.log(a / b) / case[name]["relative_sd"] for case in cases for a, b in [_pair(case[name])]]
+        one, two = (_percent(sum(abs(x) < limit for x in over) / len(over)) for limit in (1.0, 2.0))
         rms = math.sqrt(statistics.fmean(x * x for x in over))
-        words.append(f"{name} {rms:.1f} (RMS; within two deviations for {_percent(within)} of the faces)")
+        words.append(f"{name} {rms:.2f} (RMS; within one deviation for {one} of the faces, two for {two})")
     return f"Errors of path-traced faces relative to the stated standard deviations: {', '.join(words)}.\n"
 
 

@@ -13,6 +13,8 @@ from tolerances import UNMIXED
 
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.images.io import read_image, write_image
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+from dermis.optics.skin_spectra import skin_reflectance
 
 Run = Callable[..., Any]
 
@@ -56,11 +58,13 @@ def test_help_prints_the_default_skin(run: Run) -> None:
     shown = {
         name: " ".join(run(name, "--help").stdout.replace("│", " ").split()) for name in ("profile", "unmix")
     }
-    assert "[default: 0.05, light 0.25, medium 0.25, dark 0.25]" in shown["profile"]
+    assert "[default: 0.055, light 0.25, medium 0.25, dark 0.25]" in shown["profile"]
     assert "[default: 0.018, light 0.005, medium 0.15, dark 0.5]" in shown["profile"]
-    assert "[default: 0.75]" in shown["profile"] and "[default: dj2006]" in shown["profile"]
-    assert "Thickness of the epidermis [mm]. [default: 0.05]" in shown["unmix"]
-    assert "[default: 0.75]" in shown["unmix"] and "[default: 0.7]" in shown["unmix"]
+    assert "[default: 0.85, light 0.75, medium 0.75, dark 0.75]" in shown["profile"]
+    assert "[default: 0.5, light 1, medium 1, dark 1]" in shown["profile"]
+    assert "[default: dj2006]" in shown["profile"]
+    assert "Thickness of the epidermis [mm]. [default: 0.055]" in shown["unmix"]
+    assert "[default: 0.85]" in shown["unmix"] and "[default: 0.7]" in shown["unmix"]
 
 
 def test_medians_are_printed_as_text(run: Run, picture: Path) -> None:
@@ -87,3 +91,51 @@ def test_invalid_options_are_refused(
     ended = run("unmix", *words, "--adapter", "cpu")
     assert ended.code == 2 and told in ended.stderr and ended.stderr.count("\n") == 1
     assert not list(folder.rglob("*.exr"))
+
+
+def spectra_table(folder: Path) -> None:
+    """Write two spectra of known skins with the reflection of the surface, and one with a missing value."""
+    known = {"oxygen": 0.8, "eumelanin_fraction": 0.7, "epidermis_mm": 0.055, "baseline": 0.5}
+    spectra = 0.0278 + skin_reflectance([0.03, 0.15], [0.008, 0.02], **known)
+    rows = [",".join(["name", *(f"r{nm:.0f}" for nm in WAVELENGTHS_NM)])]
+    rows += [",".join([name, *map(str, row)]) for name, row in zip(("pale", "dark"), spectra, strict=True)]
+    rows.append(f"lost,,{','.join(map(str, spectra[0, 1:]))}")
+    (folder / "spectra.csv").write_text("# measured\n" + "\n".join(rows) + "\n")
+
+
+def test_prints_pigments_and_residuals_of_each_spectrum(run: Run, folder: Path) -> None:
+    spectra_table(folder)
+    ended = run("unmix", "--spectra", "spectra.csv", "--find", "oxygen", "--json")
+    told = json.loads(ended.stdout)
+    assert ended.code == 0 and "1 of 3 spectra have missing values" in ended.stderr
+    assert (told["spectra"], told["missing"]) == (2, 1)
+    assert [row["labels"] for row in told["rows"]] == [{"name": n} for n in ("pale", "dark", "lost")]
+    pale, dark, lost = told["rows"]
+    assert [pale[name] for name in ("melanin", "blood", "oxygen")] == pytest.approx(
+        [0.03, 0.008, 0.8], rel=1e-3
+    )
+    assert [dark[name] for name in ("melanin", "blood", "oxygen")] == pytest.approx(
+        [0.15, 0.02, 0.8], rel=1e-3
+    )
+    assert pale["rms"] < 1e-5 and len(pale["residual"]) == 31 and "melanin" not in lost
+    lines = run("unmix", "--spectra", "spectra.csv").stdout.splitlines()
+    assert lines[0].split() == ["row", "melanin", "blood", "rms", "delta_e"]
+    assert lines[1].split()[-1] == "pale" and lines[3].split() == ["3", "-", "-", "-", "-", "lost"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["skin.png", "--spectra", "spectra.csv"], "--spectra: expected a table of spectra or a colour map"),
+        (["--spectra", "spectra.csv", "--melanin", "x2"], "--melanin: expected a colour map"),
+        (["--spectra", "spectra.csv", "--surface", "2"], "--surface: expected"),
+        (["skin.png", "--find", "all"], "--find: expected none or oxygen"),
+        ([], "colour map: expected a file, or --spectra"),
+    ],
+)
+def test_refuses_mixtures_of_spectra_and_maps(
+    run: Run, picture: Path, folder: Path, words: list[str], told: str
+) -> None:
+    spectra_table(folder)
+    ended = run("unmix", *words)
+    assert ended.code == 2 and told in ended.stderr

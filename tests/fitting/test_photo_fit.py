@@ -17,12 +17,15 @@ from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
 from dermis.apps.inverse.fitting.light_basis import solve_strengths
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
+from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
+from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.files import load_scene
 from dermis.scene.people import skin_of
+from dermis.scene.skin import Pigments, Skin
 
 SIZE = (48, 56)
 CAMERA = Camera(position=(150.0, 20.0, 1100.0), target=(0.0, -10.0, 30.0), frame_mm=240.0)
@@ -158,3 +161,19 @@ def test_invalid_arguments_are_refused(
 ) -> None:
     with pytest.raises(DermisError, match=message):
         fit(photo, person, **given)
+
+
+def test_deviations_include_errors_of_the_renderer_and_what_is_assumed(fitted: FitResult) -> None:
+    """Oxygen and thickness of the person are not stated, and differ between people."""
+    assumed = unknown_skin_sd(fitted.values["melanin"], fitted.values["blood"])
+    for name in ("melanin", "blood"):
+        least = np.hypot(SYSTEMATIC_SD[name], assumed[name])
+        assert 0.9 * least < fitted.uncertainty.sd[name] < 2.0 * least, name
+    assert fitted.subject.known == ()
+    assert any("spread of measured people: oxygen, epidermis_mm" in one for one in fitted.summary()["priors"])
+
+
+def test_stated_pigments_are_known() -> None:
+    skin = Skin(profile="spectral", pigments=Pigments(oxygen=0.9, epidermis_mm=0.06))
+    subject = fit_subject(Scene(Human().head(subdivide=0), skin=skin))
+    assert subject.known == ("oxygen", "epidermis_mm")

@@ -18,7 +18,7 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.skin_colours import colour_table
 from dermis.optics.tissue import load_tissue
 
-WORST, WORST_LIVING = 0.004, 0.0015
+WORST, WORST_LIVING = 0.006, 0.0015
 """What the table's docstring promises: anywhere, and for skin with at least 0.001 of melanin and blood."""
 
 

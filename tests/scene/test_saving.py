@@ -61,6 +61,7 @@ PIGMENTS = Pigments(
     oxygen=0.5,
     epidermis_mm=0.1,
     epidermal_blood=0.02,
+    baseline=0.8,
 )
 LAYERS = (
     TissueLayer(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_json, print_lines, progress_bar
+from dermis.base.errors import refuse
 from dermis.cli.options import AdapterOption, FlagOption, JsonOption, Options, OutputPath, drop_none
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 
@@ -15,18 +17,20 @@ if TYPE_CHECKING:
 
 
 def unmix(
-    colour_map: Path,
+    colour_map: Path | None = None,
     /,
     *,
+    spectra: Path | None = None,
     output: OutputPath = Path("maps"),
     melanin: str | None = None,
     blood: str | None = None,
     oxygen: float | None = None,
     eumelanin: float | None = None,
-    find: Literal["none", "oxygen"] = "none",
+    find: Literal["none", "oxygen", "all"] = "none",
     model_oxygen: float = DEFAULT_SKIN.oxygen,
     model_eumelanin: float = DEFAULT_SKIN.eumelanin,
     epidermis_mm: float = DEFAULT_SKIN.epidermis_mm,
+    surface: float = 0.0278,
     noise: float = 0.01,
     shading: FlagOption = False,
     widths: FlagOption = False,
@@ -38,6 +42,8 @@ def unmix(
     The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), their standard
     deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the ratio of the colour map to the model
     colour, which contains paint, hair and everything else that is not such skin.
+
+    With --spectra it prints the pigments of each measured reflectance spectrum of a table instead.
 
     Examples:
 
@@ -51,11 +57,16 @@ def unmix(
 
         dermis unmix photographed.png --shading --find oxygen -o maps --json
 
+        dermis unmix --spectra measured.csv --find all --json
+
     Parameters
     ----------
     colour_map:
         Albedo of the skin: PNG, JPEG, HEIC, TIFF, WebP or AVIF, turned by its EXIF and converted by its
         colour profile; or EXR (linear, 0 to 1).
+    spectra:
+        Table of measured reflectance spectra (CSV, also .gz), instead of a colour map: wavelengths from 400
+        to 700 nm as headings (400, r400, 400 nm) or in the first column, values from 0 to 1 or in percent.
     output:
         Folder of the maps, created if necessary.
     melanin:
@@ -67,14 +78,18 @@ def unmix(
     eumelanin:
         Recolour: new fraction of the melanin that is eumelanin, 0 to 1.
     find:
-        oxygen: estimate the oxygen saturation too, with a prior of standard deviation 0.1 around
-        --model-oxygen.
+        oxygen: estimate the oxygen saturation too, with a prior around --model-oxygen as wide as the
+        distribution of measured people; all: also the level of scattering and the thickness of the epidermis,
+        of spectra only.
     model_oxygen:
         Oxygen saturation of the skin in the colour map, 0 to 1.
     model_eumelanin:
         Eumelanin fraction of the skin in the colour map, 0 to 1.
     epidermis_mm:
         Thickness of the epidermis [mm].
+    surface:
+        Reflection of the surface that the spectra contain and that is subtracted; 0 for spectra without
+        specular reflection [-].
     noise:
         Relative standard deviation of the colour channels, which determines the uncertainty of the result
         [-].
@@ -83,7 +98,7 @@ def unmix(
     widths:
         Also write three diffusion profiles and their mixing map, for `dermis render --profile-map`.
     as_json:
-        Print one JSON object with statistics of the maps.
+        Print one JSON object with statistics of the maps, or with all spectra.
     """
     from dermis.apps.inverse.unmixing.profile_widths import profile_mixture, save_mixture
     from dermis.apps.inverse.unmixing.unmix import UNMIX_SUMMARY_FILE, save_maps
@@ -91,9 +106,22 @@ def unmix(
     from dermis.base.atomic_write import check_folder
 
     started = time.perf_counter()
+    skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
+    if spectra is not None:
+        if colour_map is not None:
+            refuse("--spectra", "a table of spectra or a colour map", "got both", "Give one of them")
+        of_maps = drop_none(melanin=melanin, blood=blood, oxygen=oxygen, eumelanin=eumelanin)
+        of_maps |= {name: True for name, given in (("shading", shading), ("widths", widths)) if given}
+        if of_maps:
+            option = f"--{next(iter(of_maps))}"
+            refuse(option, "a colour map", "got --spectra, which writes no maps", "Leave it out")
+        return _unmix_spectra(spectra, find, skin, surface, as_json)
+    if colour_map is None:
+        refuse("colour map", "a file, or --spectra with a table", "got neither", "Give one of them")
+    if find == "all":
+        refuse("--find", "none or oxygen for a colour map", "got all", "Colours do not determine more")
     check_folder(output, UNMIX_SUMMARY_FILE)
     change = _parse_change(melanin, blood, oxygen, eumelanin)
-    skin = SkinParameters(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
     with progress_bar("unmixing") as report_progress:
         options: Options = {"third": find, "noise": noise, "shading": shading, "adapter": adapter}
         result = unmixed(colour_map, skin=skin, progress=report_progress, **options)
@@ -102,6 +130,30 @@ def unmix(
     if widths:
         written += save_mixture(output, profile_mixture(result))
     _print_report(result, written, time.perf_counter() - started, as_json)
+    return 0
+
+
+def _unmix_spectra(
+    path: Path, find: Literal["none", "oxygen", "all"], skin: SkinParameters, surface: float, as_json: bool
+) -> int:
+    """Print the pigments and residuals of each spectrum of a table."""
+    from dermis.apps.inverse.unmixing.spectra_file import unmix_spectra
+    from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+
+    found = unmix_spectra(path, find, skin, surface)
+    summary = found.summary()
+    if as_json:
+        wavelengths = {"wavelength_nm": WAVELENGTHS_NM.tolist()}
+        print_json(summary | wavelengths | {"rows": found.rows()})
+        return 0
+    columns = (*found.names, "rms", "delta_e")
+    lines = ["".join([f"{'row':>6}", *(f"{name:>14}" for name in columns)])]
+    for row in found.rows():
+        numbers = (f"{row[name]:14.4f}" if name in row else f"{'-':>14}" for name in columns)
+        labels = " ".join(row["labels"].values())
+        lines.append(f"{row['row']:6d}{''.join(numbers)}  {labels}".rstrip())
+    medians = (f"{summary[name]['median']:14.4f}" for name in columns)
+    print_lines(*lines, f"median{''.join(medians)}")
     return 0
 
 
@@ -132,7 +184,8 @@ def _print_report(result: UnmixResult, written: list[Path], seconds: float, as_j
             values = summary[name]
             lines.append(
                 f"  {name:8} median {values['median']:.4f}, 5 to 95 %: {values['p5']:.4f} to "
-                f"{values['p95']:.4f}, standard deviation {values['sd']:.4f}"
+                f"{values['p95']:.4f}, standard deviation {values['sd']:.4f}, with unknown oxygen and "
+                f"thickness of the epidermis {hypot(values['sd'], values['skin_sd']):.4f}"
             )
         error = summary["delta_e"]
         lines.append(f"  colour error CIEDE2000 {error['median']:.2f} (median), {error['p95']:.2f} (95 %)")

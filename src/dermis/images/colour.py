@@ -81,6 +81,24 @@ def lab(linear: ArrayLike) -> Doubles:
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
 
 
+def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
+    """Return linear Rec. 709 colours (..., 3) of X, Y and Z over those of white (..., 3), under any light.
+
+    The colours have the same L*a*b* under D65 as the given ones have under their light.
+    """
+    xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
+    return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)
+
+
+def linear_of_lab(colour: ArrayLike) -> Doubles:
+    """Return linear Rec. 709 colours (..., 3) of CIE L*a*b* under D65 (..., 3), not clipped."""
+    L, a, b = np.moveaxis(np.asarray(colour, np.float64), -1, 0)
+    y = (L + 16.0) / 116.0
+    f = np.stack([y + a / 500.0, y, y - b / 200.0], axis=-1)
+    linear_part = 3.0 * _CIELAB_DELTA**2 * (f - 4.0 / 29.0)
+    return linear_of_xyz(np.where(f > _CIELAB_DELTA, f**3, linear_part))
+
+
 def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
     """Return the CIEDE2000 colour difference (...) of two arrays of linear Rec. 709 colours (..., 3).
 

@@ -36,7 +36,7 @@ class ColourTable:
         melanin, blood : (k,) fractions of the epidermal and of the dermal volume, 0 to 1 [-]
 
         Interpolation is bilinear in the square roots, in which reflectance is nearly linear. The error is at
-        most 0.0015 for fractions of at least 0.001, and at most 0.004 for less blood.
+        most 0.0015 for fractions of at least 0.001, and at most 0.006 for less blood.
         """
         n = len(self.colours)
         (i, u), (j, v) = (_cell_and_offset(fraction, n) for fraction in (melanin, blood))

@@ -56,6 +56,8 @@ class Pigments(FrozenModel):
     """Thickness of the epidermis [mm]."""
     epidermal_blood: Annotated[_Fraction, Field(json_schema_extra=slider(0, 0.1))] = None
     """Volume fraction of blood in the epidermis, for "donner2008" only."""
+    baseline: _Fraction = None
+    """Absorption of tissue without blood and melanin, relative to that of [Jacques1998]."""
 
     def overrides(self) -> dict[str, float]:
         """Return the overriding pigment fractions and thicknesses by name, without fields that are None."""

@@ -24,6 +24,7 @@ from adversity.kinds import (
     pictures,
     scenes,
     specs,
+    spectra,
 )
 
 _PARTS = (
@@ -32,6 +33,7 @@ _PARTS = (
     pictures,
     scenes,
     specs,
+    spectra,
     clips,
     caches,
     machine_code,

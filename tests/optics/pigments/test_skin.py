@@ -61,7 +61,7 @@ def test_layers_from_top_to_bottom() -> None:
 
 def test_dj2006_by_hand_at_550_nm() -> None:
     epidermis, dermis = spectral_medium("dj2006", SKIN, np.array([550.0])).layers
-    tissue = 0.0244 + 8.53 * np.exp(-396.0 / 66.2)
+    tissue = 0.5 * (0.0244 + 8.53 * np.exp(-396.0 / 66.2))  # half of Jacques' law, after [Lu2025]
     melanin = 0.6 * 6.6e10 / 550**3.33 + 0.4 * 2.9e14 / 550**4.75
     haemoglobin = np.log(10.0) * 150.0 / 64500.0 * (0.8 * 43016.0 + 0.2 * 53412.0) / 10.0
     assert epidermis.sigma_a == pytest.approx(0.02 * melanin + 0.98 * tissue)
@@ -83,7 +83,7 @@ def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
 def test_blood_in_the_epidermis() -> None:
     bloody = replace(SKIN, epidermal_blood=0.01)
     added = layer("donner2008", "epidermis", bloody).sigma_a - layer("donner2008", "epidermis", SKIN).sigma_a
-    assert np.allclose(added, 0.01 * (blood(WAVELENGTHS_NM, 0.8) - baseline_absorption(WAVELENGTHS_NM)))
+    assert np.allclose(added, 0.01 * (blood(WAVELENGTHS_NM, 0.8) - 0.5 * baseline_absorption(WAVELENGTHS_NM)))
     for structure in ("dj2006", "biospec"):
         same = layer(structure, "epidermis", bloody), layer(structure, "epidermis", SKIN)
         assert np.array_equal(same[0].sigma_a, same[1].sigma_a)
@@ -91,10 +91,21 @@ def test_blood_in_the_epidermis() -> None:
 
 def test_biospec_has_bare_corneum_and_less_blood_below() -> None:
     corneum, epidermis, papillary, reticular = spectral_medium("biospec", SKIN).layers
-    tissue = baseline_absorption(WAVELENGTHS_NM)
+    tissue = 0.5 * baseline_absorption(WAVELENGTHS_NM)
     assert np.array_equal(corneum.sigma_a, tissue)
     assert [corneum.thickness_mm, epidermis.thickness_mm, papillary.thickness_mm] == [0.01, 0.1, 0.2]
     assert np.allclose((reticular.sigma_a - tissue) / (papillary.sigma_a - tissue), 0.0091 / 0.012)
+
+
+def test_tissue_without_blood_and_melanin_absorbs_as_in_measured_people() -> None:
+    bare = replace(SKIN, melanin=0.0, blood=0.0)
+    measured, published = (
+        spectral_medium("dj2006", replace(bare, baseline=factor)) for factor in (bare.baseline, 1.0)
+    )
+    assert bare.baseline == 0.5
+    assert np.allclose(published.layers[1].sigma_a, baseline_absorption(WAVELENGTHS_NM))
+    assert np.allclose(measured.layers[1].sigma_a, 0.5 * published.layers[1].sigma_a)
+    assert "Lu2025" in measured.sources and "Lu2025" not in published.sources
 
 
 def test_another_law_of_scattering() -> None:
@@ -139,17 +150,20 @@ def test_oil_changes_nothing_below_the_surface(structure: Structure) -> None:
 
 def test_examples_are_the_published_rows() -> None:
     rows = {
-        n: (p.melanin, p.eumelanin, p.blood, p.oiliness, p.oxygen, p.epidermis_mm) for n, p in SKINS.items()
+        n: (p.melanin, p.eumelanin, p.blood, p.oiliness, p.oxygen, p.epidermis_mm, p.baseline)
+        for n, p in SKINS.items()
     }
     assert list(rows) == ["spectral", "light", "medium", "dark"]
-    assert rows["light"] == (0.005, 0.7, 0.005, 0.3, 0.75, 0.25)
-    assert rows["medium"] == (0.15, 0.0, 0.01, 0.3, 0.75, 0.25)
-    assert rows["dark"] == (0.5, 0.7, 0.05, 0.3, 0.75, 0.25)
+    assert rows["light"] == (0.005, 0.7, 0.005, 0.3, 0.75, 0.25, 1.0)
+    assert rows["medium"] == (0.15, 0.0, 0.01, 0.3, 0.75, 0.25, 1.0)
+    assert rows["dark"] == (0.5, 0.7, 0.05, 0.3, 0.75, 0.25, 1.0)
     colours = [colour(layer("dj2006", "epidermis", SKINS[n])) for n in ("light", "medium", "dark")]
     assert (np.diff(colours, axis=0) < 0.0).all()
 
 
-@pytest.mark.parametrize("name", ["melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"])
+@pytest.mark.parametrize(
+    "name", ["melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "baseline", "oiliness"]
+)
 @pytest.mark.parametrize("value", [-0.01, 1.01, np.nan])
 def test_shares_beyond_one_are_refused_by_their_option(name: str, value: float) -> None:
     with pytest.raises(DermisError, match=f"--{name.replace('_', '-')}: expected a number from 0 to 1"):

@@ -69,7 +69,7 @@ def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_fold
     )
     sigma_s_prime = jacques_1998(WAVELENGTHS_NM)
     for row in table[::6]:
-        skin = SkinParameters(melanin=row["f_mel"], eumelanin=1.0, blood=row["f_blood"], epidermis_mm=0.06)
+        skin = SkinParameters(row["f_mel"], 1.0, row["f_blood"], oxygen=0.75, epidermis_mm=0.06, baseline=1.0)
         epidermis, dermis = spectral_medium("dj2006", skin, scattering=jacques_1998).layers
         medium = Medium("skin", (epidermis, replace(dermis, sigma_s_prime=sigma_s_prime)))
         total = diffusion_profile(medium, rgb=rgb_weights()).total

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from dermis.optics.media import Floats, Layer, Medium
 
 Source = Literal["beam", "point"]
+_TOTAL_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals the total reflectance [1/mm]
 
 
 class _Sublayer(NamedTuple):
@@ -77,6 +78,20 @@ def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: So
     source : "beam" or "point", the distribution of first scattering, see `solve`
     """
     return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
+
+
+def solve_two_layers(upper: Layer, thickness_mm: ArrayLike, lower: Layer, A: float) -> Floats:
+    """Return the total reflectance of upper layers on half-spaces per power that enters (n, c) [-].
+
+    upper, lower : layers with coefficients (n, c), or (c,) where all stacks have the same
+    thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
+    A : boundary mismatch with air [-]
+    """
+    d = np.asarray(thickness_mm, dtype=np.float64)
+    ones = np.ones(np.shape(upper.sigma_a)[-1])
+    beam = np.exp(-upper.sigma_t_prime * d)
+    sublayers = [_Sublayer(upper, d, ones, 0.0 * ones), _Sublayer(lower, np.inf, beam, 0.0 * ones)]
+    return _solve_upwards(_TOTAL_FREQUENCY, sublayers, len(ones), A)[0] / (2.0 * A)
 
 
 def solve_thicknesses(

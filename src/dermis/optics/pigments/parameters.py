@@ -15,7 +15,7 @@ from dermis.base.quantities import checked_number
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
 DEFAULT_STRUCTURE: Final[Structure] = "dj2006"
-_FRACTION_FIELDS = "melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"
+_FRACTION_FIELDS = "melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "baseline", "oiliness"
 _EPIDERMIS_RANGE_MM = 1e-3, 2.0
 """Accepted thickness of the epidermis: from less than a cell to a callous heel [mm]."""
 
@@ -28,20 +28,25 @@ class SkinParameters:
     eumelanin : fraction of melanosomes with eumelanin; the rest have pheomelanin, 0 to 1 [-]
     blood : fraction of the dermal volume that is blood, 0 to 1 [-]
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
-    epidermis_mm : thickness of the epidermis; the default is an artist's choice, measured values are 0.05 to
-        0.1 [mm]
+    epidermis_mm : thickness of the epidermis; measured values are 0.05 to 0.1 [mm]
     epidermal_blood : fraction of the epidermal volume that is blood, in "donner2008" only, 0 to 1 [-]
+    baseline : absorption of tissue without blood and melanin over that of [Jacques1998], 0 to 1 [-]
     oiliness : specular strength rho_s of the surface, 0 to 1; it does not affect light below the surface [-]
 
-    Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis.
+    The defaults of baseline, epidermis_mm and oxygen fit the spectra of measured people best, see
+    docs/measured.md.
+
+    Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis; [Lu2025] for the
+    defaults.
     """
 
     melanin: float = 0.018
     eumelanin: float = 0.7
     blood: float = 0.01
-    oxygen: float = 0.75
-    epidermis_mm: float = 0.05
+    oxygen: float = 0.85
+    epidermis_mm: float = 0.055
     epidermal_blood: float = 0.0
+    baseline: float = 0.5
     oiliness: float = 0.3
 
     def __post_init__(self) -> None:
@@ -61,7 +66,7 @@ def _option_name(name: str) -> str:
 
 def _donner_jensen_skin(melanin: float, eumelanin: float, blood: float) -> SkinParameters:
     """Return a skin of [DonnerJensen2006a], with oxygenation and epidermal thickness from public code."""
-    return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25)
+    return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25, baseline=1.0)
 
 
 SPECTRAL_PRESET: Final = "spectral"

@@ -29,6 +29,7 @@ _MELANIN_SHEET_MM = 0.001
 _STRATUM_CORNEUM_MM, _PAPILLARY_DERMIS_MM = 0.01, 0.2
 _RETICULAR_BLOOD_RATIO = 0.0091 / 0.012
 _UNIFORM_INDEX_NOTE = f"all layers have the index {SKIN_ETA:g}, without reflection between them"
+_BASELINE_NOTE = "what was measured on rats; 0.5 fits the spectra of measured people"
 _THIN_NOTE = "the multipole is inaccurate for so thin a layer: use layered diffusion"
 _LayerBuilder = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
@@ -52,7 +53,8 @@ def spectral_medium(
 
     Raises DermisError for an unknown structure and for wavelengths out of range.
 
-    Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
+    Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004]; [Lu2025] for the default absorption
+    of tissue without blood and melanin.
     """
     if structure not in _STRUCTURES:
         known = ", ".join(get_args(Structure))
@@ -60,7 +62,11 @@ def spectral_medium(
     wavelengths = visible_wavelengths(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
-    return Medium(structure, stack, SKIN_ETA, (note, _UNIFORM_INDEX_NOTE), sources)
+    notes: tuple[str, ...] = (note, _UNIFORM_INDEX_NOTE)
+    if parameters.baseline != 1.0:
+        notes += (f"tissue without blood and melanin absorbs {parameters.baseline:g} of {_BASELINE_NOTE}",)
+        sources = (*sources, "Lu2025")
+    return Medium(structure, stack, SKIN_ETA, notes, sources)
 
 
 def _dj2006(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
@@ -84,7 +90,7 @@ def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) ->
     """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
     reticular = replace(p, blood=_RETICULAR_BLOOD_RATIO * p.blood)
     return (
-        Layer(baseline_absorption(wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
+        Layer(_bloodless(p, wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
         _epidermis(p, wavelength_nm, sigma_s_prime),
         replace(
             _dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_DERMIS_MM
@@ -104,7 +110,7 @@ def _epidermis(
 def _epidermal_absorption(
     p: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, blood_fraction: float = 0.0
 ) -> Floats:
-    tissue = (1.0 - melanin - blood_fraction) * baseline_absorption(wavelength_nm)
+    tissue = (1.0 - melanin - blood_fraction) * _bloodless(p, wavelength_nm)
     pigment = melanin * melanosome(wavelength_nm, p.eumelanin)
     return np.asarray(pigment + blood_fraction * blood(wavelength_nm, p.oxygen) + tissue)
 
@@ -117,7 +123,12 @@ def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, nam
 
 def _dermal_absorption(p: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats) -> Floats:
     vessels = blood_fraction * blood(wavelength_nm, p.oxygen)
-    return np.asarray(vessels + (1.0 - blood_fraction) * baseline_absorption(wavelength_nm))
+    return np.asarray(vessels + (1.0 - blood_fraction) * _bloodless(p, wavelength_nm))
+
+
+def _bloodless(p: SkinParameters, wavelength_nm: Floats) -> Floats:
+    """Return the absorption of tissue without blood and melanin [1/mm]."""
+    return p.baseline * baseline_absorption(wavelength_nm)
 
 
 def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:

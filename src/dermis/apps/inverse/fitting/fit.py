@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.inputs import Photograph, fit_subject, read_photograph
+from dermis.apps.inverse.fitting.inputs import FitSubject, Photograph, fit_subject, read_photograph
 from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_normal_equations, squared_residual
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
@@ -27,12 +27,14 @@ from dermis.apps.inverse.fitting.solve import (
     solve_fit,
 )
 from dermis.apps.inverse.fitting.unknowns import FitPoint, prior_point, tangents
+from dermis.apps.inverse.unmixing.unknown_skin import FIXED_PARAMETERS, unknown_skin_sd
 from dermis.base.errors import format_value, notify, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
 from dermis.human.skin.painted import skin_colour_table
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.scene.settings import Settings
 
 _SUN_COUNT = 28
@@ -246,7 +248,7 @@ def fit(
         white_point * light_tint(state.point),
         exposure,
         photograph.size,
-        fit_uncertainty(problem, state, derivatives),
+        fit_uncertainty(problem, state, derivatives, _assumed_sd(subject, state.point)),
         small.linear,
         picture,
         frames.mask,
@@ -254,6 +256,16 @@ def fit(
         frames.frame_count,
         time.perf_counter() - started,
     )
+
+
+def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
+    """Return standard deviations of the logarithms of pigments because parameters of the skin are assumed."""
+    pigments = subject.scene.skin.pigments
+    assert pigments is not None
+    fixed = {name: getattr(pigments, name) for name in ("eumelanin", *FIXED_PARAMETERS)}
+    skin = replace(DEFAULT_SKIN, **fixed)
+    values = point.values()
+    return unknown_skin_sd(values["melanin"], values["blood"], skin, subject.known)
 
 
 def note_residual(photo: object, residual: float) -> None:

@@ -116,11 +116,13 @@ class FitSubject:
     scene : head, camera, pose and surface
     person : parametric person whose skin is painted, None for other heads
     table : table [head] of the scene's file; empty for a head without a name or file, which cannot be saved
+    known : names of the pigments that the source states; the others are assumed
     """
 
     scene: Scene
     person: Human | None
     table: Mapping[str, object]
+    known: tuple[str, ...] = ()
 
 
 def fit_subject(source: object, camera: object = None) -> FitSubject:
@@ -143,7 +145,8 @@ def fit_subject(source: object, camera: object = None) -> FitSubject:
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
-    return FitSubject(_without_light(scene), person, table)
+    known = () if scene.skin.pigments is None else tuple(scene.skin.pigments.overrides())
+    return FitSubject(_without_light(scene), person, table, known)
 
 
 def _as_camera(source: object, head: Head) -> Camera | Callable[[Head], Camera]:

@@ -21,6 +21,7 @@ from dermis.apps.inverse.fitting.unknowns import (
     sun_lights,
     with_skin,
 )
+from dermis.apps.inverse.unmixing.unknown_skin import FIXED_PARAMETERS
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_attribute
@@ -84,8 +85,8 @@ class FitResult:
     def summary(self) -> dict[str, Any]:
         """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
 
-        Standard deviations are relative for the skin and in degrees for directions. They do not include
-        systematic errors of the renderer.
+        Standard deviations are relative for the skin and in degrees for directions. Those of melanin and
+        blood include errors of the renderer and of assumed oxygen and thickness.
         """
         uncertainty, sd = self.uncertainty, self.uncertainty.sd
         skin = {}
@@ -122,6 +123,8 @@ class FitResult:
         white = f"neutral within {100 * WHITE_SD:.0f} %"
         if "white red" not in self.uncertainty.sd:
             white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
+        assumed = [name for name in FIXED_PARAMETERS if name not in self.subject.known]
+        spread = f"; assumed, with the spread of measured people: {', '.join(assumed)}" if assumed else ""
         fixed = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
         return [
             *(
@@ -131,7 +134,7 @@ class FitResult:
             *([sun] if self.suns else []),
             f"colour of the light: {white}",
             f"exposure: given, {self.exposure:g}; the strength of the light is free",
-            f"fixed: {fixed}",
+            f"fixed: {fixed}{spread}",
         ]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ _NOISE_FLOOR = 0.03
 weight of dark pixels is limited."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
+NO_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
 _MAX_STEPS = 8
 _STEP_TOLERANCE = 0.01
@@ -201,6 +203,9 @@ def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
 
 _BLOCKS_PER_SIDE = 16
 """Number of blocks along the longer side of the picture; residuals are correlated within a block."""
+SYSTEMATIC_SD = {"melanin": 0.11, "blood": 0.1}
+"""Standard deviations of the logarithms of pigments due to errors of the renderer, so that 68 % of the errors
+of path-traced faces are within one stated standard deviation, see docs/fit.md."""
 _LIMIT_TOLERANCE = 1e-6
 _MIN_PRIOR_RATIO = 0.5
 _MIN_CORRELATION = 0.95
@@ -212,7 +217,8 @@ class Uncertainty:
 
     Skin and colour of the light are logarithms, directions are angles [rad].
 
-    sd : standard deviations, from residuals that are correlated within blocks of the picture
+    sd : standard deviations, from residuals that are correlated within blocks of the picture, from errors of
+        the renderer, and from parameters of the skin that are assumed
     undetermined : unknowns with a standard deviation of more than half of their prior's, and unknowns at a
         limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
@@ -226,10 +232,13 @@ class Uncertainty:
     held = renamed_attribute("held", "undetermined")
 
 
-def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -> Uncertainty:
+def fit_uncertainty(
+    problem: FitProblem, state: FitState, derivatives: Floats, assumed_sd: Mapping[str, float] = NO_SD
+) -> Uncertainty:
     """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance by the unknowns
+    assumed_sd : standard deviations of the logarithms of pigments due to assumed parameters of the skin
     """
     sun_angles = 2 * len(state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
@@ -242,6 +251,10 @@ def fit_uncertainty(problem: FitProblem, state: FitState, derivatives: Floats) -
     block = np.repeat(_pixel_blocks(problem.frames), 3)
     sums = np.stack([np.bincount(block, column) for column in (J * r[:, None]).T], axis=-1)
     covariance = H @ (sums.T @ sums + np.diag(prior_sd**-2.0)) @ H
+    systematic = np.array(
+        [np.hypot(SYSTEMATIC_SD.get(name, 0.0), assumed_sd.get(name, 0.0)) for name in names]
+    )
+    covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     values, e = state.point.values(), _LIMIT_TOLERANCE

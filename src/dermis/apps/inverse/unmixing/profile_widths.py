@@ -96,7 +96,7 @@ def _fraction_axis(fractions: Pixels) -> Floats:
 
 
 def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
-    fixed = {name: getattr(skin, name) for name in ("eumelanin", "oxygen", "epidermis_mm")}
+    fixed = {name: getattr(skin, name) for name in ("eumelanin", "oxygen", "epidermis_mm", "baseline")}
     return load_tissue("spectral", pigments={"melanin": float(melanin), "blood": float(blood), **fixed})
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import format_value, refuse
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.priors import skin_prior
 from dermis.optics.skin_colours import colour_table
 
 ThirdUnknown = Literal["none", "oxygen", "shade"]
@@ -22,7 +23,7 @@ BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
 melanin hides the blood."""
 _TABLE_NODES = 129  # number of table nodes along melanin and along blood
 _OXYGEN_COUNT = 5
-_OXYGEN_SD, _SHADE_SD, _FIXED_SD = 0.1, 0.3, 1e-3
+_SHADE_SD, _FIXED_SD = 0.3, 1e-3
 _SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
 
 
@@ -113,7 +114,8 @@ def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: ThirdUnknown = "none"
 def _cached_skin_model(skin: SkinParameters, third: ThirdUnknown) -> SkinModel:
     if third == "oxygen":
         oxygens = np.linspace(0.0, 1.0, _OXYGEN_COUNT)
-        return SkinModel(_log_colour_tables(skin, oxygens), third, (0.0, 1.0), skin.oxygen, _OXYGEN_SD)
+        sd = skin_prior().moments("oxygen")[1]
+        return SkinModel(_log_colour_tables(skin, oxygens), third, (0.0, 1.0), skin.oxygen, sd)
     logs = _log_colour_tables(skin, [skin.oxygen])
     if third == "shade":
         return SkinModel(logs, third, _SHADE_RANGE, 0.0, _SHADE_SD)

@@ -122,17 +122,26 @@ fn eliminate_third(s: NormalEquations) -> array<f32, 5> {
     return array<f32, 5>(s.pp - a * s.pt, s.pq - a * s.qt, s.qq - b * s.qt, s.descent.x - a * s.descent.z, s.descent.y - b * s.descent.z);
 }
 
-// Return a Gauss-Newton step with Levenberg damping.
+// Return a Gauss-Newton step with Levenberg damping. A third unknown at its limit is fixed.
 fn damped_step(s: NormalEquations, x: vec3f, damping: f32) -> vec3f {
-    let r = eliminate_third(s);
+    let step = pair_step(eliminate_third(s), x, damping);
+    let third = (s.descent.z - s.pt * step.x - s.qt * step.y) / s.tt;
+    let range = model.third_range;
+    if ((x.z <= range.x && third < 0.0) || (x.z >= range.y && third > 0.0)) {
+        return vec3f(pair_step(array<f32, 5>(s.pp, s.pq, s.qq, s.descent.x, s.descent.y), x, damping), 0.0);
+    }
+    return vec3f(step, third);
+}
+
+// Return the damped step of melanin and blood from a system of two.
+fn pair_step(r: array<f32, 5>, x: vec3f, damping: f32) -> vec2f {
     let pp = r[0] * (1.0 + damping);
     let qq = r[2] * (1.0 + damping);
     var step = vec2f(qq * r[3] - r[1] * r[4], pp * r[4] - r[1] * r[3]) / max(pp * qq - r[1] * r[1], 1e-9 * pp * qq);
     // An unknown at its limit is fixed, and the other one is solved for without it.
     let at_limit = (x.xy + step < vec2f(0.0) & x.xy <= vec2f(0.0)) | (x.xy + step > vec2f(1.0) & x.xy >= vec2f(1.0));
     step = select(step, vec2f(0.0, r[4] / qq), at_limit.x);
-    step = select(step, vec2f(r[3] / pp, 0.0), at_limit.y & !at_limit.x);
-    return vec3f(step, (s.descent.z - s.pt * step.x - s.qt * step.y) / s.tt);
+    return select(step, vec2f(r[3] / pp, 0.0), at_limit.y & !at_limit.x);
 }
 
 // Solve for the unknowns of a colour from an initial guess.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, estimate_shading, recolour
 from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model
+from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
@@ -141,7 +142,8 @@ class UnmixResult:
         """Return medians of the pigments, colour differences, and the fraction of texels that are skin.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
-        skin.
+        skin. "sd" is due to noise, "skin_sd" to oxygen and epidermal thickness, which are assumed and vary as
+        among measured people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
@@ -157,6 +159,11 @@ class UnmixResult:
             for name, fraction in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
                 result[name] = _percentiles(fraction[skin]) | sd
+            median = {name: result[name]["median"] for name in ("melanin", "blood")}
+            found = self.third is not None
+            spread = unknown_skin_sd(**median, skin=self.skin, oxygen_found=found)
+            for pigment, relative in spread.items():
+                result[pigment]["skin_sd"] = relative * median[pigment]
         return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
@@ -218,8 +225,8 @@ def unmix(
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
-        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior of standard deviation 0.1
-        around that of `skin`; "none" keeps the fraction of `skin`.
+        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior around that of `skin` as
+        wide as the distribution of measured people; "none" keeps the fraction of `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool

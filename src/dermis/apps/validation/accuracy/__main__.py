@@ -22,6 +22,9 @@ COMMANDS = {
     f"{HERE}.slabs:slabs": "Print the tables of light through slabs.",
     f"{HERE}.thin:thin": "Print the tables of light through slabs, wedges and ears.",
     f"{HERE}.half_space:half_space": "Print the table of reflection by direction.",
+    f"{HERE}.measured.measure:measured": "Fit measured spectra of people, and write docs/measured.md.",
+    f"{HERE}.measured.priors:priors": "Fit the pigments of measured people, and write their table.",
+    f"{HERE}.measured.measure:measured_page": "Write docs/measured.md from the last measurement.",
 }
 """Functions that run as commands, with their descriptions."""
 

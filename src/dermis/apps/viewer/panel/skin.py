@@ -44,6 +44,7 @@ _PIGMENT_STYLES = _PERCENT_STYLES | {
     "oxygen": FieldStyle("oxygen saturation###oxygen", unit=0.01, number_format="%.2f %%"),
     "epidermis_mm": FieldStyle("thickness"),
     "epidermal_blood": FieldStyle("blood##epidermis", unit=0.01, number_format="%.2f %%"),
+    "baseline": FieldStyle("other tissue###baseline", unit=0.01, number_format="%.0f %%"),
 }
 _SKIN_PROFILES = (PUBLISHED_PRESET, "skin1", "skin2", "dj3", *SKINS)
 _NEW_LAYER_MM = 0.2

@@ -1,0 +1,215 @@
+"""Tables of measured reflectance spectra: their pigments by inversion of the spectral model of skin."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import math
+import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.spectral_inversion import (
+    FIVE_UNKNOWNS,
+    SPECULAR_INCLUDED,
+    THREE_UNKNOWNS,
+    TWO_UNKNOWNS,
+    SpectralFit,
+    fit_skin,
+)
+from dermis.base.errors import notify, refuse
+from dermis.base.quantities import checked_number
+from dermis.base.reading import open_regular_file, parsing
+from dermis.base.tables import column_separator
+from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+
+SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
+"""Unknowns of each spectrum by what is found besides melanin and blood."""
+_EXPECTED = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
+_WAVELENGTH = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
+_MAX_BYTES = 32 << 20
+_MIN_BANDS, _MAX_STEP_NM, _MAX_END_NM = 16, 21.0, 5.0
+_BATCH = 10_000  # spectra that are fitted together
+_PERCENT_FROM = 1.5  # largest reflectance above which a table is in percent
+_MAX_REFLECTANCE = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class SpectraTable:
+    """Reflectance spectra of a file.
+
+    labels : other columns of each spectrum, by heading
+    reflectance : (n, 31) reflectance factors at `WAVELENGTHS_NM`, NaN for spectra with missing values [-]
+    """
+
+    labels: list[dict[str, str]]
+    reflectance: Floats
+
+
+def read_spectra(path: str | Path) -> SpectraTable:
+    """Read a table of reflectance spectra, plain or compressed by gzip.
+
+    Headings or the first column are the wavelengths: r400, 400, 400 nm. Reflectance is interpolated linearly
+    to 400 to 700 nm by 10 nm; values in percent are recognised. Lines that start with # are comments.
+
+    Raises DermisError for files that are not such tables, and for wavelengths that do not cover the range.
+    """
+    rows = _read_cells(path)
+    columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _wavelength(cell)) is not None}
+    if len(columns) < _MIN_BANDS:
+        rows = [list(column) for column in zip(*rows, strict=True)]
+        columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _wavelength(cell)) is not None}
+    order = sorted(columns, key=lambda k: columns[k])
+    grid = np.array([columns[k] for k in order])
+    _check_grid(path, grid)
+    body = rows[1:]
+    values = np.array([[_number(row[k]) for k in order] for row in body]).reshape(len(body), len(grid))
+    if not np.isfinite(values).any():
+        refuse(path, _EXPECTED, "there are no numbers below the wavelengths", "Check the file")
+    if np.nanmedian(values) > _PERCENT_FROM:
+        notify(f"{path}: reflectances are read in percent")
+        values = values / 100.0
+    outside = np.nanmax(values) > _MAX_REFLECTANCE or np.nanmin(values) < -0.1
+    if outside:
+        actual = f"they are {np.nanmin(values):.3g} to {np.nanmax(values):.3g}"
+        refuse(path, "reflectances from 0 to 1, or in percent", actual, "Check the columns")
+    spectra = np.array([np.interp(WAVELENGTHS_NM, grid, row) for row in values])
+    spectra[~np.isfinite(values).all(axis=1)] = np.nan
+    heads = {k: cell or f"column {k + 1}" for k, cell in enumerate(rows[0]) if k not in columns}
+    return SpectraTable([{name: row[k] for k, name in heads.items()} for row in body], spectra)
+
+
+def _read_cells(path: str | Path) -> list[list[str]]:
+    """Return the cells of a table, all rows as long as the first one."""
+    with open_regular_file(path, _EXPECTED) as file:
+        packed = file.read(2) == b"\x1f\x8b"
+        file.seek(0)
+        with parsing(path, _EXPECTED, OSError, EOFError, UnicodeDecodeError, zlib.error):
+            data = (gzip.GzipFile(fileobj=file) if packed else file).read(_MAX_BYTES + 1)
+            if len(data) > _MAX_BYTES:
+                refuse(path, "at most 32 MB of text", "it has more", "Split the table")
+            text = data.decode("utf-8-sig")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        refuse(path, _EXPECTED, f"it has {len(lines)} rows", "Give headings and spectra")
+    separator = column_separator(lines[0])
+    with parsing(path, _EXPECTED, csv.Error):
+        rows = list(csv.reader(lines, delimiter=separator))
+    width = len(rows[0])
+    for number, row in enumerate(rows[1:], 2):
+        if len(row) != width:
+            refuse(path, f"{width} cells in each row", f"row {number} has {len(row)}", "Correct the row")
+    if separator != ",":
+        rows = [[cell.replace(",", ".") for cell in row] for row in rows]
+    return [[cell.strip() for cell in row] for row in rows]
+
+
+def _wavelength(cell: str) -> float | None:
+    """Return the wavelength of a heading [nm]; None for other headings."""
+    match = _WAVELENGTH.fullmatch(cell)
+    return float(match[1]) if match and 200.0 <= float(match[1]) <= 3000.0 else None
+
+
+def _number(cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+def _check_grid(path: str | Path, grid: Floats) -> None:
+    """Refuse wavelengths that do not cover 400 to 700 nm at steps of at most 20 nm."""
+    expected = "wavelengths from 400 to 700 nm, at most 20 nm apart, as headings or in the first column"
+    if len(grid) < _MIN_BANDS:
+        refuse(path, expected, f"it has {len(grid)}", "Write headings such as 400 or r400")
+    inside = grid[(grid > WAVELENGTHS_NM[0] - _MAX_STEP_NM) & (grid < WAVELENGTHS_NM[-1] + _MAX_STEP_NM)]
+    covered = len(inside) > 1 and inside[0] <= 400.0 + _MAX_END_NM and inside[-1] >= 700.0 - _MAX_END_NM
+    if not covered or np.diff(inside).max() > _MAX_STEP_NM or (np.diff(grid) <= 0.0).any():
+        refuse(path, expected, f"got {grid[0]:g} to {grid[-1]:g} nm", "Give the missing ones once each")
+
+
+@dataclass(frozen=True, eq=False)
+class UnmixedSpectra:
+    """Pigments of the spectra of a table.
+
+    labels : other columns of each spectrum, by heading
+    names : parameters that were found
+    fit : parameters of the complete spectra
+    complete : indices of these spectra in the table
+    """
+
+    labels: list[dict[str, str]]
+    names: tuple[str, ...]
+    fit: SpectralFit
+    complete: list[int]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return number, labels, parameters, RMS residual, CIEDE2000 and residual of each spectrum.
+
+        Spectra with missing values have only their number and labels.
+        """
+        rows: list[dict[str, Any]] = [
+            {"row": number, "labels": labels} for number, labels in enumerate(self.labels, 1)
+        ]
+        rms, delta_e, residual = self.fit.rms, self.fit.delta_e(), self.fit.residual
+        for k, index in enumerate(self.complete):
+            rows[index] |= {name: float(self.fit.values[name][k]) for name in self.names}
+            rows[index] |= {"rms": float(rms[k]), "delta_e": float(delta_e[k])}
+            rows[index]["residual"] = [round(float(one), 5) for one in residual[k]]
+        return rows
+
+    def summary(self) -> dict[str, Any]:
+        """Return the number of spectra, and percentiles of parameters and errors over them."""
+        values = self.fit.values | {"rms": self.fit.rms, "delta_e": self.fit.delta_e()}
+        percentiles = {}
+        for name in (*self.names, "rms", "delta_e"):
+            low, middle, high = (float(one) for one in np.percentile(values[name], (5.0, 50.0, 95.0)))
+            percentiles[name] = {"p5": low, "median": middle, "p95": high}
+        missing = len(self.labels) - len(self.complete)
+        return {"spectra": len(self.complete), "missing": missing, **percentiles}
+
+
+def unmix_spectra(
+    path: str | Path,
+    find: str = "none",
+    skin: SkinParameters = DEFAULT_SKIN,
+    surface: float = SPECULAR_INCLUDED,
+) -> UnmixedSpectra:
+    """Estimate the pigments of each reflectance spectrum of a table.
+
+    path : table, see `read_spectra`
+    find : key of `SPECTRAL_SETS`
+    skin : parameters that are not found
+    surface : reflection of the surface in the spectra, which is subtracted; 0 for spectra without it [-]
+
+    Raises DermisError as `read_spectra`, and for a surface reflectance out of range.
+    """
+    if find not in SPECTRAL_SETS:
+        refuse("--find", ", ".join(SPECTRAL_SETS), f"got {find!r}", "Choose one of them")
+    surface = checked_number("--surface", surface, 0.0, 0.2, "a reflectance")
+    table = read_spectra(path)
+    complete = np.flatnonzero(np.isfinite(table.reflectance).all(axis=1))
+    if len(complete) < len(table.labels):
+        incomplete = len(table.labels) - len(complete)
+        notify(f"{path}: {incomplete} of {len(table.labels)} spectra have missing values and no result")
+    if not len(complete):
+        refuse(path, "a complete spectrum", "all have missing values", "Fill the missing cells")
+    names: Sequence[str] = SPECTRAL_SETS[find]
+    spectra = table.reflectance[complete] - surface
+    parts = [fit_skin(part, names, "spectrum", skin) for part in _batches(spectra)]
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}
+    fit = SpectralFit(values, spectra, np.concatenate([part.model for part in parts]))
+    return UnmixedSpectra(table.labels, tuple(names), fit, complete.tolist())
+
+
+def _batches(spectra: Floats) -> list[Floats]:
+    """Return spectra in batches whose fits need little memory."""
+    return np.array_split(spectra, -(-len(spectra) // _BATCH))

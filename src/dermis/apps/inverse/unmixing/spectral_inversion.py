@@ -1,0 +1,256 @@
+"""Inversion of spectral models of skin: parameters of measured reflectance spectra or of their colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dermis.images.colour import delta_e_2000, lab
+from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.spectra import rgb_weights
+from dermis.optics.skin_spectra import skin_reflectance
+
+Criterion = Literal["spectrum", "colour"]
+"""What a fit minimises: the RMS difference of the spectra, or the colour difference under D65."""
+Values = Mapping[str, Floats]
+SpectralModel = Callable[[Values], Floats]
+"""Function from the parameters (n,) by name to diffuse reflectances (n, 31) at `WAVELENGTHS_NM`."""
+SPECULAR_INCLUDED = 0.0278
+"""Reflectance of the smooth surface of skin, which spectrophotometers include [-]."""
+_STEP = 1e-4  # of finite differences
+_MAX_STEPS = 30
+_MIN_GAIN, _NEGLIGIBLE = 1e-3, 1e-10  # of the sum of squares, relative and absolute
+_MIN_CURVATURE = 1e-10
+
+
+@dataclass(frozen=True)
+class SpectralUnknown:
+    """Parameter of a spectral model that a fit varies.
+
+    name : name of the parameter
+    low, high, start : smallest and largest value, and the value to start from
+    scale : coordinate in which the parameter is varied: its square root, its logarithm, or itself
+    """
+
+    name: str
+    low: float
+    high: float
+    start: float
+    scale: Literal["root", "log", "linear"] = "linear"
+
+    def coordinates(self, values: Floats | np.float64) -> Floats:
+        """Return the coordinates of values."""
+        if self.scale == "log":
+            return np.asarray(np.log(values))
+        return np.asarray(np.sqrt(values) if self.scale == "root" else values)
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        return float(self.coordinates(np.float64(value)))
+
+    def values(self, coordinate: Floats) -> Floats:
+        """Return the values (n,) of coordinates (n,)."""
+        if self.scale == "log":
+            return np.exp(coordinate)
+        return np.asarray(coordinate**2 if self.scale == "root" else coordinate)
+
+
+UNKNOWNS = {
+    one.name: one
+    for one in (
+        SpectralUnknown("melanin", 0.0, 1.0, 0.05, "root"),
+        SpectralUnknown("blood", 0.0, 0.4, 0.01, "root"),
+        SpectralUnknown("oxygen", 0.0, 1.0, 0.75),
+        SpectralUnknown("scattering", 0.1, 6.0, 1.0, "log"),
+        SpectralUnknown("epidermis_mm", 0.015, 0.5, 0.06, "log"),
+        SpectralUnknown("eumelanin", 0.0, 1.0, 0.7),
+    )
+}
+"""Parameters of the package's skin that a fit may vary; scattering is relative to [DonnerJensen2006]."""
+TWO_UNKNOWNS = ("melanin", "blood")
+THREE_UNKNOWNS = (*TWO_UNKNOWNS, "oxygen")
+FIVE_UNKNOWNS = (*THREE_UNKNOWNS, "scattering", "epidermis_mm")
+
+
+@dataclass(frozen=True, eq=False)
+class SpectralFit:
+    """Parameters of n skins that fit their spectra or colours.
+
+    values : (n,) parameters by name
+    measured, model : (n, 31) diffuse reflectance, without surface reflection [-]
+    """
+
+    values: dict[str, Floats]
+    measured: Floats
+    model: Floats
+
+    @property
+    def residual(self) -> Floats:
+        """Return the measured minus the model's reflectance (n, 31) [-]."""
+        return self.measured - self.model
+
+    @property
+    def rms(self) -> Floats:
+        """Return the root mean square of the residual over wavelengths (n,) [-]."""
+        return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
+
+    def weighted_residual(self, criterion: Criterion) -> Floats:
+        """Return what a fit minimises the sum of squares of, (n, 31) for spectra and (n, 1) for colours."""
+        return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
+
+    def delta_e(self, weights: Floats | None = None) -> Floats:
+        """Return the CIEDE2000 difference (n,) of the model's colour from the measured one.
+
+        weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
+        """
+        w = rgb_weights() if weights is None else weights
+        return delta_e_2000(self.model @ w.T, self.measured @ w.T)
+
+
+def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
+    """Return the package's spectral model; parameters that are not given are those of a skin."""
+
+    def reflectance(values: Values) -> Floats:
+        def parameter(name: str) -> Floats:
+            return np.asarray(values.get(name, getattr(skin, name)))
+
+        return skin_reflectance(
+            parameter("melanin"),
+            parameter("blood"),
+            oxygen=parameter("oxygen"),
+            eumelanin_fraction=parameter("eumelanin"),
+            epidermis_mm=parameter("epidermis_mm"),
+            baseline=parameter("baseline"),
+            scattering=values.get("scattering", np.float64(1.0)),
+        )
+
+    return reflectance
+
+
+def invert_spectra(
+    spectra: Floats,
+    model: SpectralModel,
+    unknowns: Sequence[SpectralUnknown],
+    criterion: Criterion = "spectrum",
+    start: Values | None = None,
+    steps: int = _MAX_STEPS,
+) -> SpectralFit:
+    """Fit the unknowns of a model to each of n spectra by damped least squares.
+
+    spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without surface reflection [-]
+    model : function from parameters to spectra
+    unknowns : parameters that vary; the others are the model's own
+    criterion : "spectrum" minimises the RMS difference, "colour" the difference of colours under D65 in a
+        space whose small distances are those of CIEDE2000
+    start : (n,) values to start from, by name
+    steps : largest number of steps
+    """
+    first = {} if start is None else start
+    columns = (one.coordinates(first.get(one.name, np.array(one.start))) for one in unknowns)
+    x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
+    low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
+
+    def values(point: Floats) -> dict[str, Floats]:
+        return {one.name: one.values(point[:, i]) for i, one in enumerate(unknowns)}
+
+    weights = rgb_weights()
+    target = lab(spectra @ weights.T)
+    metric = colour_metric(target)
+
+    def residual(point: Floats) -> Floats:
+        reflectance = model(values(point))
+        if criterion == "spectrum":
+            return np.asarray(reflectance - spectra)
+        return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
+
+    found = values(least_squares(residual, x, low, high, steps))
+    return SpectralFit(found, spectra, model(found))
+
+
+def fit_skin(
+    spectra: Floats,
+    names: Sequence[str] = TWO_UNKNOWNS,
+    criterion: Criterion = "spectrum",
+    skin: SkinParameters = DEFAULT_SKIN,
+) -> SpectralFit:
+    """Fit parameters of the package's skin to each of n spectra, see `invert_spectra`.
+
+    names : parameters that vary, of `UNKNOWNS`
+    skin : parameters that do not vary
+    """
+    return invert_spectra(spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in names], criterion)
+
+
+def least_squares(
+    residual: Callable[[Floats], Floats], x: Floats, low: Floats, high: Floats, steps: int = _MAX_STEPS
+) -> Floats:
+    """Minimise n sums of squares at once by Gauss-Newton steps with Levenberg's damping.
+
+    residual : function from points (n, u) to residuals (n, r)
+    x : (n, u) points to start from
+    low, high : (u,) limits; coordinates at a limit are fixed while the step points outwards
+
+    Returns the points (n, u).
+    """
+    count = x.shape[1]
+    damping = np.full(len(x), 1e-2)
+    r = residual(x)
+    cost = (r**2).sum(axis=1)
+    for step_number in range(steps):
+        J = _derivatives(residual, x, r, high)
+        H = np.einsum("nri,nrj->nij", J, J)
+        g = -np.einsum("nri,nr->ni", J, r)
+        H += (damping[:, None] * np.einsum("nii->ni", H) + _MIN_CURVATURE)[:, :, None] * np.eye(count)
+        step = np.linalg.solve(H, g[..., None])[..., 0]
+        fixed = ((x <= low) & (step < 0.0)) | ((x >= high) & (step > 0.0))
+        H = np.where(fixed[:, :, None] | fixed[:, None, :], np.eye(count), H)
+        step = np.linalg.solve(H, np.where(fixed, 0.0, g)[..., None])[..., 0]
+        trial = np.clip(x + step, low, high)
+        trial_r = residual(trial)
+        trial_cost = (trial_r**2).sum(axis=1)
+        better = trial_cost <= cost
+        gain = np.where(better, cost - trial_cost, 0.0)
+        x, r = np.where(better[:, None], trial, x), np.where(better[:, None], trial_r, r)
+        cost = np.where(better, trial_cost, cost)
+        damping = np.clip(np.where(better, 0.2 * damping, 6.0 * damping), 1e-7, 1e6)
+        if step_number > 4 and (gain <= _MIN_GAIN * cost + _NEGLIGIBLE).all():
+            break
+    return x
+
+
+def _derivatives(residual: Callable[[Floats], Floats], x: Floats, r: Floats, high: Floats) -> Floats:
+    """Return the derivatives (n, r, u) of residuals by finite differences that stay within the limits."""
+    columns = []
+    for i in range(x.shape[1]):
+        step = np.where(x[:, i] + _STEP > high[i], -_STEP, _STEP)
+        moved = x.copy()
+        moved[:, i] += step
+        columns.append((residual(moved) - r) / step[:, None])
+    return np.stack(columns, axis=-1)
+
+
+def colour_metric(colours: Floats) -> Floats:
+    """Return matrices (n, 3, 3) from small differences in L*a*b* to ones whose length is CIEDE2000.
+
+    The rotation term, which only blue colours have, is left out.
+
+    colours : (n, 3) L*a*b* of the colours
+
+    Source: [Sharma2005].
+    """
+    L, a, b = colours.T
+    chroma = np.hypot(a, b) ** 7
+    stretch = 1.5 - 0.5 * np.sqrt(chroma / (chroma + 25.0**7))
+    C, hue = np.hypot(stretch * a, b), np.arctan2(b, stretch * a)
+    terms = ((-0.17, 1.0, -30.0), (0.24, 2.0, 0.0), (0.32, 3.0, 6.0), (-0.20, 4.0, -63.0))
+    weight = 1.0 + sum(k * np.cos(n * hue + np.radians(shift)) for k, n, shift in terms)
+    metric = np.zeros((len(colours), 3, 3))
+    metric[:, 0, 0] = 1.0 / (1.0 + 0.015 * (L - 50.0) ** 2 / np.sqrt(20.0 + (L - 50.0) ** 2))
+    radial, across = 1.0 / (1.0 + 0.045 * C), 1.0 / (1.0 + 0.015 * C * weight)
+    metric[:, 1, 1], metric[:, 1, 2] = radial * np.cos(hue) * stretch, radial * np.sin(hue)
+    metric[:, 2, 1], metric[:, 2, 2] = -across * np.sin(hue) * stretch, across * np.cos(hue)
+    return metric

@@ -1,0 +1,71 @@
+"""Uncertainty of pigments because oxygen and epidermal thickness of a person are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import lru_cache
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.skin_model import SkinModel, skin_model, solve_pigments
+from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.priors import skin_prior
+from dermis.optics.pigments.spectra import rgb_weights
+from dermis.optics.skin_spectra import skin_reflectance
+
+FIXED_PARAMETERS = ("oxygen", "epidermis_mm")
+"""Parameters that an inversion of colours assumes, and that differ between people."""
+_SAMPLES = 2000
+_KERNEL = 0.35  # standard deviation of weights over the logarithms of melanin and blood
+_MAX_LOG_ERROR = 2.5  # of blood that melanin hides
+
+
+def unknown_skin_sd(
+    melanin: float,
+    blood: float,
+    skin: SkinParameters = DEFAULT_SKIN,
+    known: Collection[str] = (),
+    oxygen_found: bool = False,
+) -> dict[str, float]:
+    """Return relative standard deviations of melanin and blood that are found with the oxygen of `skin`.
+
+    Skins of the prior are unmixed with the parameters of `skin`. The result is the root mean square of the
+    logarithms of found over true pigments of those whose result is near the given one.
+
+    melanin, blood : pigments that were found
+    skin : parameters that the inversion assumes
+    known : names of `FIXED_PARAMETERS` that are known of the person
+    oxygen_found : whether the inversion also estimates oxygen
+    """
+    if set(FIXED_PARAMETERS) <= set(known):
+        return {"melanin": 0.0, "blood": 0.0}
+    found, error = _unmixed_sample(skin, tuple(sorted(known)), oxygen_found)
+    target = np.log(np.maximum([melanin, blood], 1e-4))
+    distance = ((found - target) ** 2).sum(axis=1)
+    # Relative to the nearest sample, so that results outside the prior have weights too.
+    weight = np.exp(-0.5 * (distance - distance.min()) / _KERNEL**2)
+    square = weight @ error**2 / weight.sum()
+    return dict(zip(("melanin", "blood"), map(float, np.sqrt(square)), strict=True))
+
+
+@lru_cache(maxsize=8)
+def _unmixed_sample(
+    skin: SkinParameters, known: tuple[str, ...], oxygen_found: bool
+) -> tuple[Floats, Floats]:
+    """Return logarithms (n, 2) of found melanin and blood of skins of the prior, and their errors (n, 2)."""
+    true = skin_prior().sample(_SAMPLES)
+    values = true | {name: np.full(_SAMPLES, getattr(skin, name)) for name in known}
+    spectra = skin_reflectance(
+        np.minimum(values["melanin"], 1.0),
+        np.minimum(values["blood"], 1.0),
+        oxygen=values["oxygen"],
+        eumelanin_fraction=skin.eumelanin,
+        epidermis_mm=values["epidermis_mm"],
+        baseline=skin.baseline,
+    )
+    model: SkinModel = skin_model(skin, "oxygen" if oxygen_found else "none")
+    estimate = solve_pigments(model, np.maximum(spectra @ rgb_weights().T, 0.0))
+    found = np.log(np.maximum(np.stack([estimate.melanin, estimate.blood], axis=-1), 1e-4))
+    error = found - np.log(np.maximum(np.stack([values["melanin"], values["blood"]], axis=-1), 1e-4))
+    return found, np.clip(error, -_MAX_LOG_ERROR, _MAX_LOG_ERROR)

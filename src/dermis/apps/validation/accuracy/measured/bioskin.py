@@ -1,0 +1,80 @@
+"""Decoder of BioSkin, a published network from pigments to reflectance, evaluated without its framework."""
+
+from __future__ import annotations
+
+import pickle
+import zipfile
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.spectral_inversion import SpectralModel, SpectralUnknown, Values
+from dermis.base.errors import refuse
+from dermis.optics.media import Floats
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+
+_FIRST_NM, _STEP_NM = 380.0, 2.0  # wavelengths of the decoder
+_INPUTS = ("melanin", "blood", "epidermis_mm", "oxygen", "eumelanin")
+_MIDDLE = {"melanin": 0.3, "blood": 0.3, "epidermis_mm": 0.4, "oxygen": 0.7, "eumelanin": 0.74}
+BIOSKIN_UNKNOWNS = {name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE[name]) for name in _INPUTS}
+"""Inputs of the decoder, each warped to 0 to 1 by its authors; starts are within their plausible ranges."""
+BIOSKIN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _INPUTS)
+
+
+def bioskin_model(weights: Path) -> SpectralModel:
+    """Return the decoder as a spectral model.
+
+    weights : the published file pretrained_models/BioSkin.pt
+
+    Raises DermisError for files of other contents.
+
+    Source: [Aliaga2023].
+    """
+    layers = _read_layers(weights)
+    positions = (WAVELENGTHS_NM - _FIRST_NM) / _STEP_NM
+
+    def reflectance(values: Values) -> Floats:
+        count = len(next(iter(values.values())))
+        columns = (np.broadcast_to(values.get(name, np.float64(_MIDDLE[name])), count) for name in _INPUTS)
+        x = np.stack(list(columns), axis=-1)
+        for name in ("fc_dec_in", "fc_dec"):
+            x = np.tanh(x @ layers[f"{name}.weight"].T + layers[f"{name}.bias"])
+        spectrum = 1.0 / (1.0 + np.exp(-(x @ layers["fc_dec_out.weight"].T + layers["fc_dec_out.bias"])))
+        return np.asarray(spectrum[:, positions.astype(int)], np.float64)
+
+    return reflectance
+
+
+class _TensorReader(pickle.Unpickler):
+    """Reader of a dictionary of tensors that constructs nothing else."""
+
+    def find_class(self, module: str, name: str) -> object:
+        """Return the few names that such files contain; refuse all others."""
+        if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
+            return lambda storage, offset, size, *rest: (storage, offset, size)
+        if (module, name) == ("collections", "OrderedDict"):
+            return OrderedDict
+        if module == "torch" and name.endswith("Storage"):
+            return name
+        raise pickle.UnpicklingError(f"{module}.{name}")
+
+    def persistent_load(self, pid: object) -> object:
+        """Return the description of a tensor's storage."""
+        return pid
+
+
+def _read_layers(path: Path) -> dict[str, Floats]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            root = archive.namelist()[0].split("/")[0]
+            with archive.open(f"{root}/data.pkl") as file:
+                tensors = _TensorReader(file).load()
+            layers = {}
+            for name, (storage, offset, size) in tensors.items():
+                raw = np.frombuffer(archive.read(f"{root}/data/{storage[2]}"), "<f4")
+                values = raw[offset : offset + int(np.prod(size))].reshape(size)
+                layers[name.removeprefix("module.")] = values.astype(np.float64)
+            return layers
+    except (OSError, zipfile.BadZipFile, pickle.UnpicklingError, KeyError, ValueError) as fault:
+        refuse(str(path), "BioSkin.pt of facebookresearch/BioSkin", str(fault), "Give its path")

@@ -1,0 +1,200 @@
+"""Constants that all people share, fitted to measured spectra, and what residual spectra ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.spectral_inversion import (
+    UNKNOWNS,
+    Criterion,
+    SpectralFit,
+    SpectralUnknown,
+    Values,
+    invert_spectra,
+)
+from dermis.optics.media import Floats
+from dermis.optics.pigments.spectra import (
+    WAVELENGTHS_NM,
+    baseline_absorption,
+    blood,
+    melanosome,
+)
+from dermis.optics.skin_spectra import two_layer_reflectance
+
+CONSTANTS = UNKNOWNS | {
+    one.name: one
+    for one in (
+        SpectralUnknown("oxygen", -1.0, 2.0, 0.8),
+        SpectralUnknown("baseline", 0.02, 4.0, 0.5, "log"),
+        SpectralUnknown("dermis", 0.1, 2.0, 0.5, "log"),
+        SpectralUnknown("small_fibres", 0.05, 4.0, 1.0, "log"),
+        SpectralUnknown("vessel_mm", 1e-4, 0.2, 0.005, "log"),
+        SpectralUnknown("bandwidth_nm", 0.0, 20.0, 5.0),
+        SpectralUnknown("bilirubin", -0.2, 1.0, 0.0),
+        SpectralUnknown("carotene", -0.2, 1.0, 0.0),
+        SpectralUnknown("methaemoglobin", -0.2, 1.0, 0.0),
+        SpectralUnknown("eumelanin", -0.5, 3.0, 0.7),
+    )
+}
+"""Constants that may be fitted, and additions to the package's model.
+
+dermis : scattering of the dermis over that of the epidermis
+small_fibres : Rayleigh scattering over that of [DonnerJensen2006]
+vessel_mm : mean path through a vessel, whose inside the light does not reach where blood absorbs much
+bandwidth_nm : half width of the instrument's triangular band
+bilirubin, carotene, methaemoglobin : absorption of the dermis at the peak of bands at 460, 480 and 630 nm
+    [1/mm]
+"""
+_BANDS = {"bilirubin": (460.0, 28.0), "carotene": (480.0, 20.0), "methaemoglobin": (630.0, 18.0)}
+_OUTER_STEPS = 6
+_INNER_STEPS = 4
+_STEP = 0.02
+_MIN_GAIN = 1e-4
+_NOTABLE_CORRELATION = 0.85
+
+
+def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
+    """Return the model of skin with given constants, and the package's values for the others."""
+    return ExtendedModel(dict(constants))
+
+
+@dataclass(frozen=True)
+class ExtendedModel:
+    """Spectral model of skin with additions that the package's model does not have.
+
+    constants : values of some of `CONSTANTS`, which the parameters of a fit override
+    """
+
+    constants: dict[str, float]
+
+    def __call__(self, values: Values) -> Floats:
+        """Return the diffuse reflectances (n, 31) of skins."""
+        defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
+
+        def parameter(name: str) -> Floats:
+            fallback = self.constants.get(name, defaults.get(name, CONSTANTS[name].start))
+            return np.asarray(values.get(name, np.float64(fallback)))[..., None]
+
+        wavelength = WAVELENGTHS_NM
+        bloodless = parameter("baseline") * baseline_absorption(wavelength)
+        eu, oxygen = parameter("eumelanin"), parameter("oxygen")
+        pigment = eu * melanosome(wavelength, 1.0) + (1.0 - eu) * melanosome(wavelength, 0.0)
+        half_width = float(self.constants.get("bandwidth_nm", 0.0))
+        vessels = oxygen * _blood_in_bands(1.0, half_width) + (1.0 - oxygen) * _blood_in_bands(
+            0.0, half_width
+        )
+        depth = np.maximum(vessels * parameter("vessel_mm"), 1e-9)
+        vessels = vessels * -np.expm1(-depth) / depth
+        m, b = parameter("melanin"), parameter("blood")
+        dermis = b * vessels + (1.0 - b) * bloodless
+        for name, (centre, width) in _BANDS.items():
+            dermis = dermis + self.constants.get(name, 0.0) * np.exp(
+                -0.5 * ((wavelength - centre) / width) ** 2
+            )
+        fibres = self.constants.get("small_fibres", 1.0)
+        scattering = parameter("scattering") * (
+            14.74 * wavelength**-0.22 + fibres * 2.2e11 * wavelength**-4.0
+        )
+        return two_layer_reflectance(
+            m * pigment + (1.0 - m) * bloodless,
+            np.maximum(dermis, 1e-6),
+            scattering,
+            parameter("epidermis_mm"),
+            self.constants.get("dermis", 0.5),
+        )
+
+
+def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
+    """Return the absorption of blood averaged over triangular bands (31,) [1/mm]."""
+    if half_width_nm < 0.5:
+        return blood(WAVELENGTHS_NM, oxygen)
+    offsets = np.linspace(-half_width_nm, half_width_nm, 21)
+    weights = 1.0 - np.abs(offsets) / half_width_nm
+    bands = blood(np.clip(WAVELENGTHS_NM[:, None] + offsets, 380.0, 780.0), oxygen)
+    return np.asarray(bands @ (weights / weights.sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class SharedFit:
+    """Constants that fit all spectra best, with unknowns of their own for each spectrum.
+
+    constants : values by name
+    fit : unknowns of each spectrum
+    confounded : pairs of constants that the spectra hardly tell apart, with the correlation of their errors
+    """
+
+    constants: dict[str, float]
+    fit: SpectralFit
+    confounded: tuple[tuple[str, str, float], ...]
+
+
+def fit_constants(
+    spectra: Floats,
+    unknowns: Sequence[str],
+    free: Sequence[str],
+    criterion: Criterion = "spectrum",
+    fixed: Mapping[str, float] | None = None,
+) -> SharedFit:
+    """Fit shared constants and each spectrum's unknowns by least squares, in alternation.
+
+    unknowns : parameters of each spectrum
+    free : names of `CONSTANTS` that are fitted
+    fixed : values of other constants
+    """
+    own = [UNKNOWNS[name] for name in unknowns]
+    shared = [CONSTANTS[name] for name in free]
+    z = np.array([one.coordinate(dict(fixed or {}).get(one.name, one.start)) for one in shared])
+
+    def constants(point: Floats) -> dict[str, float]:
+        values = {one.name: float(one.values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
+        return dict(fixed or {}) | values
+
+    def solve(point: Floats, start: SpectralFit | None, steps: int) -> tuple[SpectralFit, Floats]:
+        model = extended_model(constants(point))
+        first = None if start is None else start.values
+        found = invert_spectra(spectra, model, own, criterion, first, steps)
+        return found, found.weighted_residual(criterion).ravel()
+
+    fit, r = solve(z, None, 25)
+    damping = 1e-2
+    for _ in range(_OUTER_STEPS):
+        columns = []
+        for i in range(len(z)):
+            moved = z.copy()
+            moved[i] += _STEP
+            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _STEP)
+        J = np.stack(columns, axis=-1)
+        H, g = J.T @ J, -J.T @ r
+        for _ in range(5):
+            step = np.clip(np.linalg.solve(H + damping * np.diag(np.diag(H) + 1e-12), g), -0.7, 0.7)
+            trial = np.clip(
+                z + step,
+                [one.coordinate(one.low) for one in shared],
+                [one.coordinate(one.high) for one in shared],
+            )
+            trial_fit, trial_r = solve(trial, fit, 2 * _INNER_STEPS)
+            if trial_r @ trial_r < r @ r:
+                break
+            damping *= 8.0
+        else:
+            break
+        gain = 1.0 - float(trial_r @ trial_r) / float(r @ r)
+        z, fit, r, damping = trial, trial_fit, trial_r, 0.3 * damping
+        if gain < _MIN_GAIN:
+            break
+    return SharedFit(constants(z), fit, _confounded(free, H))
+
+
+def _confounded(names: Sequence[str], H: Floats) -> tuple[tuple[str, str, float], ...]:
+    covariance = np.linalg.inv(H + 1e-12 * np.eye(len(H)))
+    sd = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(sd, sd)
+    return tuple(
+        (names[a], names[b], float(correlation[a, b]))
+        for a in range(len(names))
+        for b in range(a)
+        if abs(correlation[a, b]) > _NOTABLE_CORRELATION
+    )

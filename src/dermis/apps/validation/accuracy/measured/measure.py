@@ -1,0 +1,376 @@
+"""Command that measures the spectral model of skin on the archive, and writes docs/measured.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.spectral_inversion import (
+    FIVE_UNKNOWNS,
+    THREE_UNKNOWNS,
+    TWO_UNKNOWNS,
+    UNKNOWNS,
+    SpectralFit,
+    SpectralModel,
+    Values,
+    colour_metric,
+    fit_skin,
+    invert_spectra,
+)
+from dermis.apps.validation.accuracy.measured.archive import (
+    CHEEK_AND_FOREHEAD,
+    FOLDS,
+    GROUPS,
+    ILLUMINANTS,
+    SITES,
+    Archive,
+    colour_weights,
+    read_archive,
+)
+from dermis.apps.validation.accuracy.measured.bioskin import BIOSKIN_SETS, BIOSKIN_UNKNOWNS, bioskin_model
+from dermis.apps.validation.accuracy.measured.constants import ExtendedModel, fit_constants
+from dermis.apps.validation.accuracy.measured.page import write_measured_page
+from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM, edge_loss
+from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, write_results
+from dermis.base.console import print_lines
+from dermis.images.colour import delta_e_2000, lab, linear_of_lab
+from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
+from dermis.optics.pigments.spectra import (
+    WAVELENGTHS_NM,
+    baseline_absorption,
+    blood,
+    jacques_1998,
+    melanosome,
+    rgb_weights,
+)
+from dermis.optics.skin_spectra import two_layer_reflectance
+
+RESULT_FILE = RESULTS / "measured.json"
+FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
+"""Default skin before it was compared with the archive."""
+_SAMPLE, _CONSTANTS_SAMPLE = 1500, 600
+_AT_LIMIT, _MATCHED = 1e-6, 0.25
+_NEIGHBOURS = 80  # of other people, for the local regression of colours
+_PERCENTILES = 50.0, 95.0
+_DONNER_JENSEN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
+_EDGE_MELANIN = 0.01, 0.03, 0.1, 0.3
+_EDGE_NM = np.arange(400.0, 701.0, 50.0)
+_ADDITIONS: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "scattering, both layers": ("scattering",),
+    "scattering of the dermis": ("dermis",),
+    "Rayleigh scattering": ("small_fibres",),
+    "kind of melanin": ("eumelanin",),
+    "blood in vessels": ("vessel_mm",),
+    "band of the instrument": ("bandwidth_nm",),
+    "bilirubin": ("bilirubin",),
+    "carotene": ("carotene",),
+    "methaemoglobin": ("methaemoglobin",),
+}
+
+
+def measured(bioskin: Path | None = None, only: str | None = None) -> None:
+    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md; takes ten minutes.
+
+    Parameters
+    ----------
+    only:
+        Part to measure again (models, surface, limits, folds, alternatives, additions, sites or edge); the
+        other parts keep their last results.
+    bioskin:
+        File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
+    """
+    archive = read_archive()
+    parts: dict[str, Callable[[], object]] = {
+        "counts": lambda: {"spectra": len(archive), "folds": FOLDS},
+        "models": lambda: _models(archive),
+        "surface": lambda: _surface(archive),
+        "limits": lambda: _limits(archive),
+        "folds": lambda: _folds(archive),
+        "alternatives": lambda: _alternatives(archive.sample(_SAMPLE, 2), bioskin),
+        "additions": lambda: _additions(archive.sample(_CONSTANTS_SAMPLE, 3)),
+        "sites": lambda: _sites(archive),
+        "edge": lambda: _edge(archive.sample(_CONSTANTS_SAMPLE, 3)),
+    }
+    results: JsonObject = {} if only is None else read_results(RESULT_FILE)
+    for name in parts if only is None else [only]:
+        results[name] = parts[name]()
+        print_lines(f"{name} measured")
+    write_results(RESULT_FILE, results, digits=4)
+    write_measured_page()
+
+
+def measured_page() -> None:
+    """Write docs/measured.md from the last measurement."""
+    write_measured_page()
+
+
+def _models(archive: Archive) -> JsonObject:
+    """Return errors of the former and of the present default skin, in total and by group and site."""
+    skins = {
+        "former": FORMER_SKIN,
+        "half": replace(FORMER_SKIN, baseline=0.5),
+        "quarter": replace(FORMER_SKIN, baseline=0.25),
+        "present": DEFAULT_SKIN,
+    }
+    face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
+    subsets = {"all": np.ones(len(archive), bool), "cheek and forehead": face}
+    results: JsonObject = {}
+    for name, skin in skins.items():
+        two, three = (fit_skin(archive.spectra, n, "colour", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
+        five = fit_skin(archive.spectra, FIVE_UNKNOWNS, "spectrum", skin)
+        two_spectra, three_spectra = (
+            fit_skin(archive.spectra, n, "spectrum", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS)
+        )
+        results[name] = {
+            label: {
+                "two": _percentiles(two.delta_e()[chosen]),
+                "above_2": float((two.delta_e()[chosen] > 2.0).mean()),
+                "three": _percentiles(three.delta_e()[chosen]),
+                "rms_two": _percentiles(two_spectra.rms[chosen]),
+                "rms_three": _percentiles(three_spectra.rms[chosen]),
+                "rms_five": _percentiles(five.rms[chosen]),
+            }
+            for label, chosen in subsets.items()
+        }
+        if name in ("former", "present"):
+            results[name]["residual"] = {
+                "two": two_spectra.residual.mean(axis=0),
+                "three": three_spectra.residual.mean(axis=0),
+                "five": five.residual.mean(axis=0),
+            }
+            results[name]["lights"] = _lights({"two": two, "three": three, "five": five})
+            results[name]["groups"] = _by_cell(archive, list(GROUPS), archive.group, two, three, five)
+            results[name]["by_site"] = _by_cell(archive, range(len(SITES)), archive.site, two, three, five)
+        if name == "present":
+            results["medians"] = {
+                one: _percentiles(values, (5.0, 50.0, 95.0)) for one, values in five.values.items()
+            }
+    return _lists(results)
+
+
+def _surface(archive: Archive) -> JsonObject:
+    """Return differences of colours from a smooth surface through those of other people.
+
+    It is the limit of models with two unknowns that are the same for all: the third coordinate of the colours
+    is predicted from the first two by local linear regression.
+    """
+    from scipy.spatial import cKDTree
+
+    face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
+    results: JsonObject = {}
+    for label, chosen in (("all", np.ones(len(archive), bool)), ("cheek and forehead", face)):
+        part = archive.where(chosen)
+        colours = lab(part.spectra @ rgb_weights().T)
+        mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
+        axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
+        point = (colours - mean) @ scale.T @ axes.T
+        nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1])
+        on_surface = point.copy()
+        for k, neighbours in enumerate(nearest):
+            others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
+            A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
+            on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
+        nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
+        results[label] = _percentiles(delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours)))
+    return results
+
+
+def _limits(archive: Archive) -> JsonObject:
+    """Return how many fits by colour with three unknowns end at the limits of oxygen, and do not match."""
+    fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
+    oxygen = fit.values["oxygen"]
+    return {
+        "none": float((oxygen <= _AT_LIMIT).mean()),
+        "all": float((oxygen >= 1.0 - _AT_LIMIT).mean()),
+        "unmatched": float((fit.delta_e() > _MATCHED).mean()),
+    }
+
+
+def _by_cell(
+    archive: Archive,
+    cells: Sequence[object],
+    labels: np.ndarray,
+    two: SpectralFit,
+    three: SpectralFit,
+    five: SpectralFit,
+) -> list[list[float]]:
+    """Return number, colour errors and RMS for each group or site."""
+    rows = []
+    for cell in cells:
+        chosen = labels == cell
+        medians = [float(np.median(one.delta_e()[chosen])) for one in (two, three)]
+        rows.append([int(chosen.sum()), *medians, float(np.median(five.rms[chosen]))])
+    return rows
+
+
+def _lights(fits: dict[str, SpectralFit]) -> JsonObject:
+    """Return the colour differences of fits under each illuminant."""
+    return {
+        name: {light: _percentiles(fit.delta_e(colour_weights(light))) for light in ILLUMINANTS}
+        for name, fit in fits.items()
+    }
+
+
+def _folds(archive: Archive) -> list[JsonObject]:
+    """Return constants that four folds of people ask for, and errors of the fifth with them."""
+    rows = []
+    for fold in range(FOLDS):
+        known = archive.where(archive.fold != fold).sample(_CONSTANTS_SAMPLE, fold)
+        held = archive.where(archive.fold == fold)
+        spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
+        skin = replace(DEFAULT_SKIN, **colour.constants | {"oxygen": min(1.0, colour.constants["oxygen"])})
+        row: JsonObject = {"constants": colour.constants, "people": len(held)}
+        for label, one in (("fitted", skin), ("default", DEFAULT_SKIN)):
+            two, three = (fit_skin(held.spectra, n, "colour", one) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
+            five = fit_skin(held.spectra, FIVE_UNKNOWNS, "spectrum", one)
+            face = np.isin(held.site, CHEEK_AND_FOREHEAD)
+            row[label] = {
+                "two": float(np.median(two.delta_e())),
+                "two_face": float(np.median(two.delta_e()[face])),
+                "three": float(np.median(three.delta_e())),
+                "five": float(np.median(five.rms)),
+            }
+        rows.append(row)
+    return rows
+
+
+def _alternatives(archive: Archive, bioskin: Path | None) -> JsonObject:
+    """Return errors of published models of skin on a sample, with two, three and five unknowns."""
+    sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
+
+    def errors(
+        model: SpectralModel | None, skin: SkinParameters, names: Sequence[Sequence[str]]
+    ) -> JsonObject:
+        known = BIOSKIN_UNKNOWNS if names is BIOSKIN_SETS else UNKNOWNS
+        result: JsonObject = {}
+        for one in names:
+            for criterion in ("spectrum", "colour"):
+                if criterion == "colour" and len(one) > 3:
+                    continue
+                fit = (
+                    fit_skin(archive.spectra, one, criterion, skin)
+                    if model is None
+                    else invert_spectra(archive.spectra, model, [known[n] for n in one], criterion)
+                )
+                error = fit.rms if criterion == "spectrum" else fit.delta_e()
+                result[f"{criterion}_{len(one)}"] = _percentiles(error)
+        return result
+
+    results = {
+        "present": errors(None, DEFAULT_SKIN, sets),
+        "former": errors(None, FORMER_SKIN, sets),
+        "donner": errors(None, _DONNER_JENSEN, sets),
+        "jacques": errors(_jacques_model, FORMER_SKIN, sets),
+    }
+    if bioskin is not None:
+        results["bioskin"] = errors(bioskin_model(bioskin), DEFAULT_SKIN, BIOSKIN_SETS)
+    return results
+
+
+def _jacques_model(values: Values) -> Floats:
+    """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
+    bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
+
+    def parameter(name: str, default: float) -> Floats:
+        return np.asarray(values.get(name, np.float64(default)))[..., None]
+
+    m, b, oxygen = parameter("melanin", 0.0), parameter("blood", 0.0), parameter("oxygen", 0.75)
+    vessels = oxygen * blood(WAVELENGTHS_NM, 1.0) + (1.0 - oxygen) * blood(WAVELENGTHS_NM, 0.0)
+    return two_layer_reflectance(
+        m * melanosome(WAVELENGTHS_NM, 1.0) + (1.0 - m) * bloodless,
+        b * vessels + (1.0 - b) * bloodless,
+        parameter("scattering", 1.0) * sigma_s_prime,
+        parameter("epidermis_mm", 0.06),
+        1.0,
+    )
+
+
+def _additions(sample: Archive) -> list[JsonObject]:
+    """Return what each addition to the model improves, with three and with five unknowns by spectrum."""
+    rows = []
+    for name, free in _ADDITIONS.items():
+        row: JsonObject = {"name": name}
+        for label, unknowns in (("three", THREE_UNKNOWNS), ("five", FIVE_UNKNOWNS)):
+            shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
+            if label == "five" and free == ("scattering",):
+                continue
+            found = fit_constants(sample.spectra, unknowns, (*shared, *free))
+            row[label] = {
+                "rms": float(np.sqrt((found.fit.residual**2).mean())),
+                "constants": found.constants,
+                "confounded": [[a, b, c] for a, b, c in found.confounded],
+            }
+        rows.append(row)
+    return rows
+
+
+def _sites(archive: Archive) -> list[JsonObject]:
+    """Return thickness and oxygen that each site asks for, by colour with two unknowns and by spectrum."""
+    rows = []
+    for site in range(len(SITES)):
+        sample = archive.where(archive.site == site).sample(300, site)
+        fixed = {"baseline": DEFAULT_SKIN.baseline}
+        spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed=fixed)
+        colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
+        oxygen = spectral.fit.values["oxygen"]
+        rows.append(
+            {
+                "spectra": int((archive.site == site).sum()),
+                "epidermis_mm": spectral.constants["epidermis_mm"],
+                "oxygen": _percentiles(oxygen, (25.0, 50.0, 75.0)),
+                "colour": colour.constants,
+                "two": float(np.median(colour.fit.delta_e())),
+            }
+        )
+    return rows
+
+
+def _edge(sample: Archive) -> JsonObject:
+    """Return the light that apertures miss, and the constants of spectra that are corrected for it."""
+    skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_MELANIN]
+    losses = [edge_loss(one, _EDGE_NM) for one in skins]
+    model = ExtendedModel({"baseline": DEFAULT_SKIN.baseline, "oxygen": DEFAULT_SKIN.oxygen})
+    true = model(
+        {"melanin": np.array(_EDGE_MELANIN), "blood": np.full(len(skins), 0.008)}
+        | {"epidermis_mm": np.full(len(skins), DEFAULT_SKIN.epidermis_mm)}
+    )
+    results: JsonObject = {"wavelength_nm": _EDGE_NM, "melanin": _EDGE_MELANIN}
+    for name in APERTURES_MM:
+        loss = np.array([np.interp(WAVELENGTHS_NM, _EDGE_NM, one[name]) for one in losses])
+        seen = true * (1.0 - loss)
+        factor = np.stack(
+            [1.0 - np.interp(sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)], axis=-1
+        )
+        found = fit_constants(sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        results[name] = {
+            "loss": [one[name] for one in losses],
+            "constants": found.constants,
+            "rms": float(np.sqrt((found.fit.residual**2).mean())),
+        }
+    uncorrected = fit_constants(sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+    results["uncorrected"] = {
+        "constants": uncorrected.constants,
+        "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),
+    }
+    return _lists(results)
+
+
+def _percentiles(values: Floats, at: Sequence[float] = _PERCENTILES) -> list[float]:
+    return [float(one) for one in np.percentile(values, at)]
+
+
+def _lists(value: object) -> JsonObject:
+    """Return nested dictionaries with arrays as lists."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()  # type: ignore[no-any-return]
+    if isinstance(value, dict):
+        return {str(key): _lists(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_lists(one) for one in value]  # type: ignore[return-value]
+    return value  # type: ignore[return-value]

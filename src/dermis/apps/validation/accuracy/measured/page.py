@@ -1,0 +1,242 @@
+"""Text of docs/measured.md from the results of the last measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from dermis.apps.validation.accuracy.measured.archive import GROUPS, ILLUMINANTS, SITES
+from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM
+from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, read_results
+from dermis.optics.pigments.parameters import DEFAULT_SKIN
+
+PAGE = DOCS / "measured.md"
+RESULT_FILE = RESULTS / "measured.json"
+_SKIN_NAMES = {
+    "former": "absorption of [Jacques1998]",
+    "half": "half of it",
+    "quarter": "a quarter of it",
+    "present": "default skin",
+}
+_MODEL_NAMES = {
+    "present": "default skin",
+    "former": "absorption of [Jacques1998], 0.05 mm",
+    "donner": "Donner and Jensen 2006",
+    "jacques": "Jacques 1998",
+    "bioskin": "BioSkin 2023",
+}
+_CONSTANT_NAMES = {
+    "baseline": "bloodless tissue",
+    "epidermis_mm": "epidermis",
+    "oxygen": "oxygen",
+    "scattering": "scattering",
+    "dermis": "dermis over epidermis",
+    "small_fibres": "Rayleigh scattering",
+    "eumelanin": "eumelanin",
+    "vessel_mm": "vessel [mm]",
+    "bandwidth_nm": "half width [nm]",
+    "bilirubin": "bilirubin [1/mm]",
+    "carotene": "carotene [1/mm]",
+    "methaemoglobin": "methaemoglobin [1/mm]",
+}
+
+
+def write_measured_page() -> None:
+    """Write docs/measured.md from docs/templates/measured.md and the results of the last measurement."""
+    fill_page(PAGE, **measured_parts(read_results(RESULT_FILE)))
+
+
+def measured_parts(results: JsonObject) -> dict[str, str]:
+    """Return the tables and sentences of the page by placeholder."""
+    present = results["models"]["present"]
+    return {
+        "spectra": f"{results['counts']['spectra']:,}",
+        "now": (
+            f"{DEFAULT_SKIN.epidermis_mm:g} mm, {100 * DEFAULT_SKIN.oxygen:g} % oxygen, and "
+            f"{DEFAULT_SKIN.baseline:g} of that absorption"
+        ),
+        "models": _models(results["models"]),
+        **{f"oxygen_{name}": f"{100 * one:.0f} %" for name, one in results["limits"].items()},
+        "surface_all": f"{results['surface']['all'][0]:.2f}",
+        "surface_face": f"{results['surface']['cheek and forehead'][0]:.2f}",
+        "folds": _folds(results["folds"]),
+        **_confounded(results),
+        "additions": _additions(results["additions"]),
+        "residual": _residual(results["models"]),
+        "groups": "\n\n".join(
+            [
+                _cells("group", list(GROUPS.values()), present["groups"]),
+                _cells("site", SITES, present["by_site"]),
+            ]
+        ),
+        "sites": _sites(results["sites"]),
+        "lights": _lights(present["lights"]),
+        "alternatives": _alternatives(results["alternatives"]),
+        "edge": _edge(results["edge"]),
+        "corrected": _corrected(results["edge"]),
+        "red_loss": f"{100 * results['edge']['8 mm of 11 mm']['loss'][1][5]:.0f} %",
+    }
+
+
+def _models(models: JsonObject) -> str:
+    heads = ["skin", "spectra", "two, by colour", "above 2", "three, by colour"]
+    heads += ["two, RMS", "three, RMS", "five, RMS"]
+    rows = []
+    for name, label in _SKIN_NAMES.items():
+        for subset in ("all", "cheek and forehead"):
+            one = models[name][subset]
+            rows.append(
+                [
+                    f"**{label}**" if name == "present" else label,
+                    subset,
+                    _pair(one["two"]),
+                    f"{100 * one['above_2']:.0f} %",
+                    _pair(one["three"]),
+                    *(_pair(one[f"rms_{n}"], 4) for n in ("two", "three", "five")),
+                ]
+            )
+    return _table(heads, rows)
+
+
+def _folds(folds: Sequence[JsonObject]) -> str:
+    heads = ["part", "spectra", "bloodless tissue", "epidermis [mm]", "oxygen", "constants"]
+    heads += ["two", "two, cheek and forehead", "three", "five, RMS"]
+    rows = []
+    for number, fold in enumerate(folds, 1):
+        constants = fold["constants"]
+        for label in ("fitted", "default"):
+            errors = fold[label]
+            own = [f"{constants[name]:.3g}" for name in ("baseline", "epidermis_mm", "oxygen")]
+            rows.append(
+                [
+                    str(number) if label == "fitted" else "",
+                    str(fold["people"]) if label == "fitted" else "",
+                    *(own if label == "fitted" else [""] * 3),
+                    "of the other parts" if label == "fitted" else "the package's",
+                    f"{errors['two']:.2f}",
+                    f"{errors['two_face']:.2f}",
+                    f"{errors['three']:.2f}",
+                    f"{errors['five']:.4f}",
+                ]
+            )
+    return _table(heads, rows)
+
+
+def _confounded(results: JsonObject) -> dict[str, str]:
+    """Return constants that the spectra hardly separate, and the factors of spectra without lost light."""
+    pairs = {}
+    for row in results["additions"]:
+        for label in ("three", "five"):
+            for a, b, correlation in row.get(label, {}).get("confounded", []):
+                pairs[frozenset((a, b))] = correlation
+    found = [
+        f"{' and '.join(sorted(_CONSTANT_NAMES[one] for one in pair))} ({correlation:+.2f})"
+        for pair, correlation in pairs.items()
+    ]
+    edge = results["edge"]
+    small, wide = (f"{edge[name]['constants']['baseline']:.2f}" for name in reversed(APERTURES_MM))
+    return {
+        "confounded": "; ".join(found) if found else "none above 0.85",
+        "wide_factor": wide,
+        "small_factor": small,
+    }
+
+
+def _additions(additions: Sequence[JsonObject]) -> str:
+    heads = ("addition", "three unknowns, RMS", "constants", "five unknowns, RMS", "constants")
+    rows = []
+    for row in additions:
+        cells = [row["name"]]
+        for label in ("three", "five"):
+            one = row.get(label)
+            cells += ["", ""] if one is None else [f"{one['rms']:.4f}", _constants(one["constants"])]
+        rows.append(cells)
+    return _table(heads, rows)
+
+
+def _constants(constants: dict[str, float]) -> str:
+    return ", ".join(f"{_CONSTANT_NAMES[name]} {value:.3g}" for name, value in constants.items())
+
+
+def _residual(models: JsonObject) -> str:
+    """Return the table of mean residuals, measured minus model, by wavelength."""
+    shown = range(0, 31, 2)
+    heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
+    rows = [
+        [f"{_SKIN_NAMES[name]}, {count}", *(f"{1e4 * models[name]['residual'][count][k]:.0f}" for k in shown)]
+        for name in ("former", "present")
+        for count in ("two", "three", "five")
+    ]
+    return _table(heads, rows)
+
+
+def _cells(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+    cells = [
+        [name, f"{count:.0f}", f"{two:.2f}", f"{three:.2f}", f"{five:.4f}"]
+        for name, (count, two, three, five) in zip(names, rows, strict=True)
+    ]
+    return _table((kind, "spectra", "two", "three", "five, RMS"), cells)
+
+
+def _sites(sites: Sequence[JsonObject]) -> str:
+    heads = ("site", "epidermis, by spectrum [mm]", "oxygen", "epidermis, by colour [mm]", "oxygen", "two")
+    rows = []
+    for name, site in zip(SITES, sites, strict=True):
+        low, middle, high = site["oxygen"]
+        rows.append(
+            [
+                name,
+                f"{site['epidermis_mm']:.3f}",
+                f"{middle:.2f} ({low:.2f} to {high:.2f})",
+                f"{site['colour']['epidermis_mm']:.3f}",
+                f"{site['colour']['oxygen']:.2f}",
+                f"{site['two']:.2f}",
+            ]
+        )
+    return _table(heads, rows)
+
+
+def _lights(lights: JsonObject) -> str:
+    labels = {"two": "two, by colour", "three": "three, by colour", "five": "five, by spectrum"}
+    rows = [[label, *(_pair(lights[name][one]) for one in ILLUMINANTS)] for name, label in labels.items()]
+    return _table(("unknowns", *ILLUMINANTS), rows)
+
+
+def _alternatives(models: JsonObject) -> str:
+    heads = ("model", "two, by colour", "three, by colour", "two, RMS", "three, RMS", "five, RMS")
+    rows = []
+    for name, errors in models.items():
+        cells = [_pair(errors[f"colour_{n}"]) for n in (2, 3)]
+        rows.append([_MODEL_NAMES[name], *cells, *(_pair(errors[f"spectrum_{n}"], 4) for n in (2, 3, 5))])
+    return _table(heads, rows)
+
+
+def _edge(edge: JsonObject) -> str:
+    heads = ("aperture, lit disc", "melanin", *(f"{nm:.0f} nm" for nm in edge["wavelength_nm"]))
+    rows = [
+        [name, f"{100 * melanin:g} %", *(f"{100 * one:.1f} %" for one in loss)]
+        for name in APERTURES_MM
+        for melanin, loss in zip(edge["melanin"], edge[name]["loss"], strict=True)
+    ]
+    return _table(heads, rows)
+
+
+def _corrected(edge: JsonObject) -> str:
+    """Return a sentence about the constants of spectra that are corrected for the lost light."""
+    parts = [
+        f"{_constants(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
+        for name, label in (
+            ("uncorrected", "as measured"),
+            ("8 mm of 11 mm", "corrected for 8 mm"),
+            ("3 mm of 6 mm", "corrected for 3 mm"),
+        )
+    ]
+    return "; ".join(parts)
+
+
+def _pair(values: Sequence[float], digits: int = 2) -> str:
+    return " / ".join(f"{one:.{digits}f}" for one in values)
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,71 @@
+"""Command that fits the distribution of people's pigments and writes the package's table of it."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from dermis.apps.inverse.unmixing.spectral_inversion import fit_skin
+from dermis.apps.validation.accuracy.measured.archive import SITES, read_archive
+from dermis.base.atomic_write import atomic_file
+from dermis.base.console import print_lines
+from dermis.optics.media import Floats
+from dermis.optics.pigments.priors import PRIOR_COLUMNS, PRIOR_NAMES, SkinPrior, prior_points
+
+_COMPONENTS = 3
+_ITERATIONS = 300
+_CALLOUS = ("palm", "ring finger")
+"""Sites with a thick stratum corneum, which is not part of the model."""
+_HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and
+#   log epidermis_mm
+# unit: fractions [-], mm; weight, mean and lower triangle of the covariance
+# source: [Lu2025], all sites but palm and fingers, inverted by spectrum with the package's model
+# licence: CC BY 4.0
+"""
+
+
+def priors() -> None:
+    """Fit the distribution of people's pigments to the archive, and write the package's table of it."""
+    archive = read_archive()
+    living = archive.where(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS]))
+    fit = fit_skin(living.spectra, PRIOR_NAMES)
+    prior = fit_mixture(prior_points(fit.values), _COMPONENTS)
+    path = Path(str(files("dermis.optics"))) / "data" / "skin_priors.csv"
+    with atomic_file(path) as file:
+        file.write_text(_HEADER + table(prior), encoding="utf-8")
+    print_lines(*(f"{name}: {prior.moments(name)}" for name in PRIOR_NAMES))
+
+
+def table(prior: SkinPrior) -> str:
+    """Return the rows of the table, with its headings."""
+    lower = np.tril_indices(len(PRIOR_NAMES))
+    lines = [",".join(PRIOR_COLUMNS)]
+    for weight, mean, covariance in zip(prior.weight, prior.mean, prior.covariance, strict=True):
+        lines.append(",".join(f"{one:.5g}" for one in (weight, *mean, *covariance[lower])))
+    return "\n".join(lines) + "\n"
+
+
+def fit_mixture(points: Floats, components: int) -> SkinPrior:
+    """Fit a mixture of normal distributions by expectation maximisation.
+
+    points : (n, d) points
+    components : number of distributions, which start from parts of equal size along the first axis
+    """
+    count, dimensions = points.shape
+    parts = np.argsort(np.argsort(points[:, 0])) * components // count
+    share = np.eye(components)[parts]
+    for _ in range(_ITERATIONS):
+        total = share.sum(axis=0)
+        mean = share.T @ points / total[:, None]
+        offset = points[:, None] - mean
+        covariance = np.einsum("nk,nki,nkj->kij", share, offset, offset) / total[:, None, None]
+        covariance += 1e-4 * np.eye(dimensions)
+        weight = total / count
+        scaled = np.einsum("nki,kij,nkj->nk", offset, np.linalg.inv(covariance), offset)
+        log_density = np.log(weight) - 0.5 * (scaled + np.linalg.slogdet(covariance)[1])
+        share = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+        share /= share.sum(axis=1, keepdims=True)
+    order = np.argsort(mean[:, 0])
+    return SkinPrior(weight[order], mean[order], covariance[order])

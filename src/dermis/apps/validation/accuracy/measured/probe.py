@@ -1,0 +1,50 @@
+"""Light that a spectrophotometer's aperture misses, from photon counts of the package's skin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.apps.truths.slab_mc import SlabResult, trace_medium
+from dermis.optics.media import Floats
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.pigments.skin import spectral_medium
+
+APERTURES_MM = {"8 mm of 11 mm": (4.0, 5.5), "3 mm of 6 mm": (1.5, 3.0)}
+"""Radii of the measured and of the lit disc of common apertures [mm]."""
+_RADII = 400  # of points of the measured disc
+
+
+def edge_loss(
+    skin: SkinParameters, wavelength_nm: Floats, photons: int = 60_000, seed: int = 1
+) -> dict[str, Floats]:
+    """Return the fraction of the reflected light that each aperture misses, by wavelength [-].
+
+    A spectrophotometer compares skin with an opaque white tile. Light that enters the skin near the edge of
+    the lit disc leaves outside it, and the light of the dark surroundings that would replace it is missing.
+
+    photons : number of photons per wavelength
+
+    Source: [Wang1995].
+    """
+    runs = trace_medium(spectral_medium("dj2006", skin, wavelength_nm), photons, seed)
+    return {name: np.array([_missing(run, *radii) for run in runs]) for name, radii in APERTURES_MM.items()}
+
+
+def _missing(run: SlabResult, measured_mm: float, lit_mm: float) -> float:
+    """Return the fraction of the reflected light that an aperture misses [-]."""
+    inner, outer = run.edges_mm[:-1], run.edges_mm[1:]
+    energy = run.reflectance * np.pi * (outer**2 - inner**2)
+    middle = np.sqrt(0.5 * (outer**2 + inner**2))
+    return 1.0 - float(energy @ lit_fraction(middle, measured_mm, lit_mm)) / run.total_reflectance
+
+
+def lit_fraction(distance_mm: Floats, measured_mm: float, lit_mm: float) -> Floats:
+    """Return the part of circles around points of the measured disc that lies in the lit disc, mean (n,) [-].
+
+    distance_mm : (n,) radii of the circles
+    measured_mm, lit_mm : radii of the two concentric discs
+    """
+    r = np.maximum(distance_mm, 1e-12)
+    point = np.sqrt((np.arange(_RADII) + 0.5) / _RADII)[:, None] * measured_mm
+    cosine = (lit_mm**2 - point**2 - r**2) / (2.0 * point * r)
+    return np.asarray((1.0 - np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi).mean(axis=0))

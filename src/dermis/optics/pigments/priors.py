@@ -1,0 +1,89 @@
+"""Distribution of the pigments of people's skins, as a mixture of normal distributions without groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from dermis.base.tables import float_columns, read_rows
+from dermis.optics.media import Floats
+
+PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
+"""Parameters of the prior; all but oxygen are distributed by their logarithms."""
+_LINEAR = PRIOR_NAMES.index("oxygen")
+_SMALLEST_FRACTION = 1e-4
+_COVARIANCE = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
+PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
+"""Columns of the table: weight, mean and lower triangle of the covariance of each component."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinPrior:
+    """Mixture of k normal distributions of `PRIOR_NAMES`, which are logarithms except for oxygen.
+
+    weight : (k,) weights, with a sum of 1
+    mean : (k, 4) means
+    covariance : (k, 4, 4) covariances
+    """
+
+    weight: Floats
+    mean: Floats
+    covariance: Floats
+
+    def moments(self, name: str) -> tuple[float, float]:
+        """Return mean and standard deviation of one parameter; of its logarithm, except for oxygen."""
+        i = PRIOR_NAMES.index(name)
+        mean = float(self.weight @ self.mean[:, i])
+        second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
+        return mean, float(np.sqrt(second - mean**2))
+
+    def given(self, melanin: float, blood: float) -> SkinPrior:
+        """Return the prior of skins with given melanin and blood fractions."""
+        known = np.log(np.maximum([melanin, blood], _SMALLEST_FRACTION))
+        weight, mean, covariance = [], [], []
+        for w, m, C in zip(self.weight, self.mean, self.covariance, strict=True):
+            gain = C[:, :2] @ np.linalg.inv(C[:2, :2])
+            offset = known - m[:2]
+            density = np.exp(-0.5 * offset @ np.linalg.solve(C[:2, :2], offset))
+            weight.append(w * density / np.sqrt(np.linalg.det(C[:2, :2])))
+            mean.append(m + gain @ offset)
+            covariance.append(C - gain @ C[:2, :])
+        weights = np.array(weight) + 1e-300
+        return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
+
+    def sample(self, count: int, seed: int = 0) -> dict[str, Floats]:
+        """Return `count` skins as values (count,) by name; oxygen is clipped to 0 to 1."""
+        rng = np.random.default_rng(seed)
+        component = rng.choice(len(self.weight), size=count, p=self.weight)
+        values, vectors = np.linalg.eigh(self.covariance)
+        roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+        points = self.mean[component] + np.einsum(
+            "nij,nj->ni", roots[component], rng.standard_normal((count, len(PRIOR_NAMES)))
+        )
+        columns = {name: np.exp(points[:, i]) for i, name in enumerate(PRIOR_NAMES) if i != _LINEAR}
+        return columns | {"oxygen": np.clip(points[:, _LINEAR], 0.0, 1.0)}
+
+
+@cache
+def skin_prior() -> SkinPrior:
+    """Return the distribution of the archive's people over all groups and sites of living skin.
+
+    Source: [Lu2025], inverted by the package's model.
+    """
+    rows = read_rows("dermis.optics", "data/skin_priors")
+    count = len(PRIOR_NAMES)
+    lower = float_columns(rows, " ".join(_COVARIANCE))
+    covariance = np.zeros((len(rows), count, count))
+    i, j = np.tril_indices(count)
+    covariance[:, i, j] = covariance[:, j, i] = lower
+    mean = float_columns(rows, " ".join(PRIOR_NAMES))
+    return SkinPrior(float_columns(rows, "weight")[:, 0], mean, covariance)
+
+
+def prior_points(values: dict[str, Floats]) -> Floats:
+    """Return parameters (n,) by name as points (n, 4) of the space of the prior."""
+    columns = [np.log(np.maximum(values[name], _SMALLEST_FRACTION)) for name in PRIOR_NAMES]
+    columns[_LINEAR] = values["oxygen"]
+    return np.stack(columns, axis=-1)

@@ -1,0 +1,76 @@
+"""Diffuse reflectance spectra of many skins at once, with pigments of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
+from dermis.optics.diffusion.layered_diffusion import solve_two_layers
+from dermis.optics.media import SKIN_ETA, Floats, Layer
+from dermis.optics.pigments.spectra import (
+    DERMIS_SCATTERING_RATIO,
+    WAVELENGTHS_NM,
+    baseline_absorption,
+    blood,
+    donner_jensen_2006,
+    eumelanin,
+    pheomelanin,
+)
+
+
+def skin_reflectance(
+    melanin: ArrayLike,
+    blood_fraction: ArrayLike,
+    *,
+    oxygen: ArrayLike,
+    eumelanin_fraction: ArrayLike,
+    epidermis_mm: ArrayLike,
+    baseline: ArrayLike,
+    scattering: ArrayLike = 1.0,
+) -> Floats:
+    """Return the diffuse reflectance of n skins of "dj2006" by layered diffusion, (n, 31) per incident light.
+
+    All arguments are (n,) arrays or numbers. Surface reflection is not included.
+
+    melanin : fraction of the epidermal volume that is melanosomes [-]
+    blood_fraction : fraction of the dermal volume that is blood [-]
+    oxygen : fraction of oxygenated haemoglobin [-]
+    eumelanin_fraction : fraction of melanosomes with eumelanin [-]
+    epidermis_mm : thickness of the epidermis [mm]
+    baseline : absorption of bloodless tissue over that of [Jacques1998] [-]
+    scattering : scattering of both layers over that of [DonnerJensen2006] [-]
+    """
+    m, b, ox, eu = map(_column, (melanin, blood_fraction, oxygen, eumelanin_fraction))
+    bloodless = _column(baseline) * baseline_absorption(WAVELENGTHS_NM)
+    pigment = eu * eumelanin(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin(WAVELENGTHS_NM)
+    vessels = ox * blood(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood(WAVELENGTHS_NM, 0.0)
+    sigma_s_prime = _column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
+    epidermis = m * pigment + (1.0 - m) * bloodless
+    return two_layer_reflectance(
+        epidermis, b * vessels + (1.0 - b) * bloodless, sigma_s_prime, _column(epidermis_mm)
+    )
+
+
+def two_layer_reflectance(
+    epidermis: Floats,
+    dermis: Floats,
+    sigma_s_prime: Floats,
+    epidermis_mm: ArrayLike,
+    scattering_ratio: float = DERMIS_SCATTERING_RATIO,
+) -> Floats:
+    """Return the diffuse reflectance of an epidermis on a semi-infinite dermis, (n, c) per incident light.
+
+    epidermis, dermis : (n, c) absorption coefficients [1/mm]
+    sigma_s_prime : (n, c) or (c,) reduced scattering coefficient of the epidermis [1/mm]
+    epidermis_mm : (n, 1) thicknesses, or one number [mm]
+    scattering_ratio : scattering coefficient of the dermis relative to the epidermis [-]
+    """
+    upper, lower = Layer(epidermis, sigma_s_prime), Layer(dermis, scattering_ratio * sigma_s_prime)
+    A = boundary_mismatch(SKIN_ETA, "exact")
+    return (1.0 - normal_reflectance(SKIN_ETA)) * solve_two_layers(upper, epidermis_mm, lower, A)
+
+
+def _column(value: ArrayLike) -> Floats:
+    """Return an (n,) array as (n, 1), and a number as it is."""
+    return np.asarray(value, np.float64)[..., None]
