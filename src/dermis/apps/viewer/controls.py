@@ -13,10 +13,10 @@ from dermis.scene.camera import CAMERA_PRESETS, camera_preset
 Event = Mapping[str, Any]
 Point = tuple[float, float]
 PRESET_NAMES = tuple(CAMERA_PRESETS)
-"""Names of the camera presets that the keys from 1 on select."""
+"""Names of the camera presets, in the order of the digit keys that select them, from 1."""
 LIGHT_DRAG_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
-_MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event, which sums all rotations of a frame
+_MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event; an event sums all rotations in a frame
 _LEFT_BUTTON = 1
 _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs it [logical pixel]
 

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _MAX_ELEVATION = math.radians(85.0)
 _MIN_DISTANCE_MM = 90.0  # distance from the target; nearer cameras would enter the head
 _FRAME_RANGE_MM = (4.0, 3000.0)  # height of the visible frame at the target
-_EASING_TIME_S = 0.05  # time constant of the exponential decay
+_EASING_TIME_S = 0.05  # time constant with which the displayed camera approaches its target
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
@@ -128,7 +128,7 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     scene : scene with the posed head
     camera : camera to use instead of that of the scene
     x, y : position in the image, from -1 (left, bottom) to 1
-    aspect : image width over height
+    aspect : ratio of image width to height [-]
 
     Source: [MollerTrumbore1997].
     """

@@ -80,7 +80,7 @@ class HeadLoader:
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with the head that has been loaded, once; None if no load has ended.
+        """Return the state with the loaded head, once after each load; None if no load has ended since.
 
         state : current state, in which the head is replaced
 
@@ -275,7 +275,7 @@ def _shorten(text: str) -> str:
 
 
 def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerState] = ()) -> ViewerState:
-    """Return the state with roughness and specular maps from a table of face regions, or without these.
+    """Return the state with roughness and specular maps from a table of face regions, or without such maps.
 
     name : name of the table, "auto" or "none"
     known_states : states whose heads are reused if they already have these maps

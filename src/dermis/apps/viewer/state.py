@@ -38,7 +38,7 @@ class AtlasView:
 
     layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
-    span : extent of the picture's shorter side, in sides of the atlas [-]
+    span : part of the atlas along the picture's shorter side, 1 for the whole side of the atlas [-]
     """
 
     layer: str = "irradiance"

@@ -224,7 +224,7 @@ class Blender(Target):
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
     def _valid_versions(self, version: str) -> VersionRange:
-        """Return the first version with valid parameters, and the first later one without, or None."""
+        """Return the range of versions for which the parameters are valid, see `VersionRange`."""
         if self.variant != "random-walk":
             return list(_FIRST_VERSION), None
         return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
@@ -269,7 +269,7 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of r/d, or of r over the mean free path."""
+        """Return each channel's cumulative profile as a function of r/d or r/(mean free path)."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 _ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
 _FIRST_RADIUS, _RADIUS_RATIO = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
-_ALBEDO_DENSITY = 8.0
+_ALBEDO_DENSITY = 8.0  # larger values place more of the albedos near 1
 _TEXTURES_BY_ROLE = {
     "colour": ("spectrum", "sRGB", "reflectance"),
     "roughness": ("float", "linear", "roughness"),
@@ -48,7 +48,7 @@ _PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
     "opacity": ("float", "linear"),
 }
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
-_OPAQUE_ROUGHNESS = 0.3  # materials other than skin
+_OPAQUE_ROUGHNESS = 0.3  # of materials other than skin
 _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
     10.0,
     1.4,
@@ -125,7 +125,7 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
-    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
+    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # light scattered at a smaller depth is totally reflected
     depth = critical_depth + _sample_depths()[:, None]
     path = np.hypot(radius, depth)
     cosine = depth / path

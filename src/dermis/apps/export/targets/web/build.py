@@ -1,4 +1,4 @@
-"""Frames of a scene captured for the web page, for GPUs and software adapters and several picture sizes."""
+"""Capture of the frames of the web page, for GPUs and software adapters and in several picture sizes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PAGE_TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
 INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
-"""Side [pixel], samples per pixel and merged hairs during interaction, by kind of adapter."""
+"""Side [pixel], samples per pixel and number of hairs drawn as one during interaction, by kind of adapter."""
 
 
 @dataclass
@@ -41,7 +41,7 @@ class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
     frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
-    packer : compressed buffers and textures
+    packer : collector of the buffers and textures, which compresses them
     maps : maps encoded as pictures
     pictures : WebP files of the maps, in the order in which entries refer to them
     picture_entries : index in `pictures`, byte run of the value curves, and number of colour channels, by

@@ -91,7 +91,7 @@ def frames_json(
 
 
 def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
-    """Return a function that packs each third of a buffer separately and returns the byte run of all.
+    """Return a function that packs each third of a buffer separately and returns the index of the joined run.
 
     The buffers are triangle tables: three columns of equal length, one after the other.
     """
@@ -99,7 +99,7 @@ def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
 
 
 def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
-    """Return the bytes of a texture by mip level, with all layers of a level joined, or of a buffer.
+    """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
     number : resource index
     """
@@ -207,7 +207,7 @@ def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Ite
 
     captured_pass : pass that reads
     """
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _reads(entry))
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
         yield int(captured_pass.raster["indices"])
 
@@ -219,7 +219,7 @@ def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> 
     """
     if captured_pass.written:
         yield captured_pass.written[0]
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _writes(entry))
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_writing(entry))
     if captured_pass.raster:
         yield from (
             int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
@@ -234,9 +234,9 @@ def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterat
         )
 
 
-def _reads(entry: Json) -> bool:
+def _allows_reading(entry: Json) -> bool:
     return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
 
 
-def _writes(entry: Json) -> bool:
+def _allows_writing(entry: Json) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
