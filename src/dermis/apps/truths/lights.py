@@ -37,7 +37,7 @@ _FAR_MM = 2e5
 positioned within 0.02 mm in single precision."""
 _SPOT_TEXELS = 1024
 _STRIPE_HALF_EXTENT = 1.25  # in widths; the Gaussian is 4e-6 there
-_STRIPE_TEXELS = 40, 64  # least number across a width and along the length
+_STRIPE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
 _MAX_STRIPE_TEXELS = 2**23
 
 
@@ -186,11 +186,13 @@ def cycles_stripe(light: StripeLight) -> SceneDict:
     return distant | {"stripe": {**axes, "distance": _FAR_MM}}
 
 
-def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **unit: float) -> SceneDict:
+def _cycles_point_light(
+    kind: str, light: PointLight, *, radius_mm: float = 0.0, **fields: float
+) -> SceneDict:
     power = 4.0 * np.pi * (_target_distance_mm(light) / UNIT_MM) ** 2
     to_target = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
-    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **unit)
+    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **fields)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
@@ -227,8 +229,8 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.MITSUBA its replacement",
 )
-"""Functions that describe a kind of light for Mitsuba, from its module with a variant set, the light and its
-name for messages."""
+"""Functions that describe a light for Mitsuba, by kind of light. Their arguments are the module `mitsuba`
+with a variant set, the light, and its name for messages."""
 
 CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     "light of Cycles",
@@ -242,4 +244,4 @@ CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.CYCLES its replacement",
 )
-"""Functions that describe a kind of light for Cycles: its type, fields and transform."""
+"""Functions that describe a light for Cycles (type, fields and transform), by kind of light."""

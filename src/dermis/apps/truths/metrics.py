@@ -18,7 +18,7 @@ Mask = NDArray[np.bool_]
 PIXELS_PER_DEGREE = 67.0
 """FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
 MID_GREY = 0.5
-"""sRGB value of no difference, near the middle of lightness (L* 53)."""
+"""sRGB value that shows equality in `signed_difference`, near the middle of lightness (L* 53)."""
 
 
 class Estimate(NamedTuple):
@@ -51,12 +51,12 @@ def relative_rmse(
 ) -> Estimate:
     """Return the relative root mean square error, corrected for the noise of the reference [-].
 
-    It is the root of the sum of squared differences over the sum of the reference's squares.
+    It is the root of the sum of squared differences divided by the sum of the reference's squares.
 
     image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
     variance : unbiased estimate of the variance of each value of `reference`: the variance of its samples
-        over their number
+        divided by their number
     image_variance : variance of each value of `image`, whose noise is then removed too
 
     With reference T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is
@@ -88,7 +88,7 @@ def relative_rmse(
 def energy_ratio(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Return the sum of the image over the sum of the reference [-].
+    """Return the ratio of the sum of the image to the sum of the reference [-].
 
     The parameters are those of `relative_rmse`. The ratio's relative error is that of the reference's sum,
     whose variance is the sum of the pixels' variances; channels may share paths, so their standard deviations

@@ -17,7 +17,7 @@ _SPLIT_PATTERNS = (
     [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
     [[3, 1, 4], [0, 3, 2], [3, 4, 2]],
 )
-"""Triangles that replace one with 0, 1, 2 or 3 halved sides, from side 0 on; vertex 3 + k halves side k.
+"""Triangles that replace a triangle whose first 0, 1, 2 or 3 sides are halved; vertex 3 + k halves side k.
 
 Two halved sides leave a quadrilateral; the last entry splits it along the other diagonal.
 """

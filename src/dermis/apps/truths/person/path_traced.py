@@ -132,7 +132,7 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return shapes of the head without hair whose skin emits radiance 1, for the image of the coverage."""
+    """Return the shape of the head without hair, which emits radiance 1, for the image of the coverage."""
     emitter, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 

@@ -25,8 +25,7 @@ class SkinTextures:
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
     reach_mm : half the side of the iris texture [mm]
     white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: the distance from the
-        middle
-        is proportional to the angle from the axis, and 180 degrees are 0.49 of the side
+        middle is proportional to the angle from the axis, and 180 degrees are 0.49 of the side
     teeth : (k, k, 3) textures of the upper and of the lower teeth by their uv
     """
 
