@@ -186,6 +186,6 @@ def write_panels(folder: Path, picture: GalleryPicture) -> None:
 
     Raises DermisError when a file cannot be written.
     """
-    for number, data in enumerate(picture.panels.values(), 1):
-        with atomic_file(folder / f"{picture.script.name}-{number}.webp") as file:
+    for panel_number, data in enumerate(picture.panels.values(), 1):
+        with atomic_file(folder / f"{picture.script.name}-{panel_number}.webp") as file:
             file.write_bytes(data)

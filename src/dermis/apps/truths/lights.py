@@ -45,7 +45,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : module `mitsuba` with a variant set
-    number : index of the light in the scene, for messages
+    number : position of the light in the scene, from 1, for messages
 
     Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
     kind of light: references use no approximations.
@@ -57,7 +57,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
 def cycles_lamp(light: Light, number: int) -> SceneDict:
     """Return Cycles' description of a light, in Cycles' units.
 
-    number : index of the light in the scene, for messages
+    number : position of the light in the scene, from 1, for messages
     """
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)

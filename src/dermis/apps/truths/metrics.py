@@ -32,7 +32,7 @@ class Estimate(NamedTuple):
 class FlipDifference:
     """Perceived difference of two pictures by FLIP, from 0 to 1.
 
-    mean : mean over the mask
+    mean : mean of the pixels in the mask
     error : (h, w) difference of each pixel; 0 outside the mask
     pixels_per_degree : assumed resolution at the viewer's eye
     """

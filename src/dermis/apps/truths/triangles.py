@@ -62,8 +62,8 @@ def split_triangles(
         first_longer = np.subtract(*np.square(diagonals).sum(axis=2).T) > 0
         pattern_index = np.where((count == 2) & first_longer, len(_SPLIT_PATTERNS) - 1, count)
     parts = []
-    for number, pattern in enumerate(_SPLIT_PATTERNS):
-        parent = np.flatnonzero(pattern_index == number)
+    for index, pattern in enumerate(_SPLIT_PATTERNS):
+        parent = np.flatnonzero(pattern_index == index)
         new_triangles = vertices[parent][:, pattern].reshape(-1, 3)
         new_weights = vertex_weights[parent][:, pattern].reshape(-1, 3, 3)
         parts.append((new_triangles, np.repeat(parent, len(pattern)), new_weights))

@@ -126,7 +126,7 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     The point is relative to the centre of the head.
 
     scene : scene with the posed head
-    camera : camera to use instead of that of the scene
+    camera : camera, which replaces the scene's camera
     x, y : position in the image, from -1 (left, bottom) to 1
     aspect : ratio of image width to height [-]
 

@@ -37,7 +37,7 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, with its current time and the displayed state.
 
-    While the motion plays, its current pose replaces that of the state, which other controls can still
+    While the motion plays, its current pose replaces the state's pose, which other controls can still
     change. When it pauses or ends, that pose becomes a step of the undo history.
 
     motion : motion to play, None for none

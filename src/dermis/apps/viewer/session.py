@@ -211,7 +211,7 @@ class Session:
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
-        """Replace the state by that of a scene file.
+        """Replace the state by the state in a scene file.
 
         Raises DermisError if the file is not a scene.
         """

@@ -134,7 +134,7 @@ def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
 
     The fraction is relative to the light that leaves on both faces.
 
-    Source: [ChristensenBurley2015], integrated over a plane at a depth.
+    Source: [ChristensenBurley2015], integrated over a plane at the depth of the far face.
     """
     d = fit_burley_width(subject.curve)
     transmitted = (

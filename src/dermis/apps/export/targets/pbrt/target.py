@@ -249,14 +249,14 @@ def _scene_lines(
     part_lines, part_files = _part_textures(subject, prefix)
     lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
     files = textures.files | part_files
-    for number in np.unique(head.mesh.material).tolist():
-        material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm, v_up=True)
+    for index in np.unique(head.mesh.material).tolist():
+        material, name = head.mesh.materials[index], f"{prefix}part_{index}.ply"
+        files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, v_up=True)
         roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]
         else:
-            texts = _opaque_materials(material, roles, f"part_{number}", prefix)
+            texts = _opaque_materials(material, roles, f"part_{index}", prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]

@@ -151,7 +151,7 @@ def _capture_frames(
     kind_json = frames_json(capture, frames, picture_maps, steps, content.packer)
     for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
-    kind_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
+    kind_json["maps"] = {str(index): _mip_entries(content, one) for index, one in picture_maps.items()}
     assert base is not None
     kind_json["hands"] = _interaction_json(request.scene, base)
     kind_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
@@ -192,8 +192,8 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
     """Return the index of the colour map and, by slider, the pictures that replace it at the nodes."""
-    number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
-    if number is None:
+    map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
+    if map_index is None:
         return {}
     settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
     for slider in (one for one in request.sliders if not one.changes_pose_only):
@@ -201,7 +201,7 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
         nodes = [_colour_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes]
         if any(nodes):
             entries[slider.name] = nodes
-    return {"map": number, "dials": entries} if entries else {}
+    return {"map": map_index, "dials": entries} if entries else {}
 
 
 def _colour_entry(

@@ -69,16 +69,16 @@ def frames_json(
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
-    for number in resources_read_first(capture, captured_frames):
-        if number in steps:
-            floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
-            contents[number] = [packer.add_floats(floats, steps[number])]
+    for index in resources_read_first(capture, captured_frames):
+        if index in steps:
+            floats = capture.read_content(index)[0].view(np.float32).reshape(-1, len(steps[index]))
+            contents[index] = [packer.add_floats(floats, steps[index])]
             continue
-        _, picture_count, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mip_bytes(capture, number)[picture_count:]
+        _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
+        mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
         if any(one.any() for one in mips):
-            add = packer.add if number not in tables else _column_packer(packer)
-            contents[number] = [-1] * picture_count + [add(one) for one in mips]
+            add = packer.add if index not in tables else _column_packer(packer)
+            contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
         "programs": [_program_json(one) for one in capture.programs],
@@ -98,12 +98,12 @@ def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
+def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
-    number : resource index
+    index : resource index
     """
-    parts, layers = capture.read_content(number), capture.resources[number].get("size")
+    parts, layers = capture.read_content(index), capture.resources[index].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -194,12 +194,12 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
     return found
 
 
-def base_resource(capture: FrameCapture, number: int) -> int:
+def base_resource(capture: FrameCapture, index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
-    number : resource index
+    index : resource index
     """
-    return int(capture.resources[number].get("of", number))
+    return int(capture.resources[index].get("of", index))
 
 
 def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
