@@ -90,16 +90,16 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
     """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
-    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light))
-    return mitsuba_shape("rectangle", np.divide(light.irradiance, unit), to_world=to_world)
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light))
+    return mitsuba_shape("rectangle", np.divide(light.irradiance, unit_irradiance), to_world=to_world)
 
 
 def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
     """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
-    unit = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
+    unit_irradiance = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
     return mitsuba_shape(
         "sphere",
-        np.divide(light.irradiance, unit),
+        np.divide(light.irradiance, unit_irradiance),
         center=[float(c) for c in light.position],
         radius=float(light.radius_mm),
     )
@@ -158,12 +158,12 @@ def cycles_sphere(light: SphereLight) -> SceneDict:
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return Cycles' area light; its power P gives the radiance P / (pi A) on its area A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
-    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
         np.pi * width * height
     )
     to_target = np.subtract(light.target, light.position)
     shape: dict[str, float | str] = {"shape": "RECTANGLE", "size": width, "size_y": height}
-    return cycles_light("AREA", light.irradiance, 1.0 / unit, light.position, to_target, **shape)
+    return cycles_light("AREA", light.irradiance, 1.0 / unit_irradiance, light.position, to_target, **shape)
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:

@@ -47,8 +47,8 @@ class HeadLoader:
     def __init__(self) -> None:
         self.recent: list[str] = []
         self.request_frame: Callable[[], None] = lambda: None
-        self._names: dict[str, str] = {}  # original names of uploaded files, by path
-        self._thread = ThreadPoolExecutor(1, "head")
+        self._original_names: dict[str, str] = {}  # original names of uploaded files, by path
+        self._executor = ThreadPoolExecutor(1, "head")
         self._future: Future[LoadedHead] | None = None
         self._name = ""
 
@@ -63,7 +63,7 @@ class HeadLoader:
 
     def uploaded_name(self, name: str) -> str:
         """Return the original name of an uploaded file from its path; other names are returned unchanged."""
-        return self._names.get(name, name)
+        return self._original_names.get(name, name)
 
     def open(self, name: str, uploaded_as: str = "") -> None:
         """Start to load a head or a scene; a load that has not started yet is cancelled.
@@ -75,8 +75,8 @@ class HeadLoader:
             self._future.cancel()
         self._name = str(Path(name).resolve()) if Path(name).is_file() else name
         if uploaded_as:
-            self._names[self._name] = uploaded_as
-        self._future = self._thread.submit(_load_head_or_scene, self._name)
+            self._original_names[self._name] = uploaded_as
+        self._future = self._executor.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:

@@ -115,7 +115,7 @@ Images = tuple[Texture, Texture | None]
 _CACHED_RESOURCES = 2  # resources for frames in motion and for still frames
 _PREPARATION_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
 _TIMED_FRAMES = 120
-_FROZEN_SIDE = "before"  # view with its own light, so that a moving camera relights neither side
+_FROZEN_SIDE = "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
 
 
 @dataclass(frozen=True)

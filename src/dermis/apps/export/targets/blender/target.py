@@ -140,7 +140,7 @@ def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Fl
 
 @cache
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return the tabulated random walks of Cycles by entry: sqrt(1 - albedo), radii, and fractions of light.
+    """Return Cycles' random walks by direction of entry: sqrt(1 - albedo), radii, and light fractions.
 
     Their shapes are (n,), (m,) [mean free paths] and (n, m) [-].
     """

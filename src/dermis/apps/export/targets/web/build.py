@@ -44,8 +44,8 @@ class PageContent:
     packer : collector of the buffers and textures, which compresses them
     maps : maps encoded as pictures
     pictures : WebP files of the maps, in the order in which entries refer to them
-    picture_entries : index in `pictures`, byte run of the value curves, and number of colour channels, by
-        role, mip level and layer of a map
+    picture_entries : for each role, mip level and layer of a map: index in `pictures`, index of the value
+        curves in `Packer.runs`, and number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -166,7 +166,7 @@ def _frame_changes(
     base: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
-    """Return, by slider, the changes of a frame's records and buffers at each node of the slider.
+    """Return, by slider name, how a frame's records and buffers change at each node of the slider.
 
     base : inputs of the frame with all sliders at their defaults
     """

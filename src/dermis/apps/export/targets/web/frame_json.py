@@ -60,7 +60,7 @@ def frames_json(
 ) -> Json:
     """Return the JSON of frames with their shaders, resources and passes, and add their data to the packer.
 
-    Resources are created with zeros, so that data which is all zero is not stored.
+    Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
     steps : quantisation step of each column of quantised float buffers, by resource index
