@@ -209,7 +209,7 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
-    """Return the JSON description of a scene for Cycles without its passes, and its arrays by name.
+    """Return the JSON description of a scene for Cycles, except its passes, and the scene's arrays by name.
 
     They are stored in scene.json and arrays.npz.
 

@@ -196,7 +196,7 @@ def _cycles_point_light(
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance of a rectangle of radiance 1 on a parallel surface in front of its centre.
+    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface before its centre.
 
     width, height, distance : size of the rectangle, and its distance from the surface, all in the same unit
 

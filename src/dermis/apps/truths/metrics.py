@@ -59,8 +59,8 @@ def relative_rmse(
         divided by their number
     image_variance : variance of each value of `image`, whose noise is then removed too
 
-    With reference T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is
-    that of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of
+    Let T = t + n be the reference, with noise n of mean 0 and variance s², and D = I - T the difference. Then
+    mean(D²) = mean((I - t)²) + s² and mean(T²) = mean(t²) + s², so E = sum(D² - s²) / sum(T² - s²) is free of
     noise. A pixel contributes U = D² - s² - E (T² - s²) to the error of E; its random part is -2 n (I - t + E
     t) + (1 - E)(n² - s²). For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased
     estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
@@ -90,9 +90,9 @@ def energy_ratio(
 ) -> Estimate:
     """Return the ratio of the sum of the image to the sum of the reference [-].
 
-    The parameters are those of `relative_rmse`. The ratio's relative error is that of the reference's sum,
-    whose variance is the sum of the pixels' variances; channels may share paths, so their standard deviations
-    are added.
+    The parameters are those of `relative_rmse`. The ratio and the reference's sum have the same relative
+    error. The variance of that sum is the sum of the pixels' variances; channels may share paths, so their
+    standard deviations are added.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())

@@ -120,7 +120,7 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
 def _add_midpoints(
     point: Floats, i: int, stack: TriangleStack, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add the light of sub-triangle i of the stack by the midpoints of its sides.
+    """Add the light of sub-triangle i of the stack, evaluated at the midpoints of its sides.
 
     This quadrature is exact to second order in the product of irradiance and profile.
     """

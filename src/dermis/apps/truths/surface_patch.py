@@ -1,4 +1,4 @@
-"""Patch of a surface, subdivided until its edges are short enough for diffusion, with its shape kept."""
+"""Patch of a surface with unchanged shape, subdivided until its edges are short enough for diffusion."""
 
 from __future__ import annotations
 

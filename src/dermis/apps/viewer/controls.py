@@ -195,7 +195,7 @@ def picture_event(event: Event, left: float) -> Event:
 
 
 def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
-    """Return the state with its camera, or its part of the atlas, moved along with the pointer.
+    """Return the state with the camera, or the displayed part of the atlas, moved along with the pointer.
 
     right, down : motion of the pointer, divided by `Controls._drag_unit`
     """

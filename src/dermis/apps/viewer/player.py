@@ -37,8 +37,8 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, with its current time and the displayed state.
 
-    While the motion plays, its current pose replaces the state's pose, which other controls can still
-    change. When it pauses or ends, that pose becomes a step of the undo history.
+    While the motion plays, its current pose is displayed instead of the state's pose; other controls can
+    still change the state. When it pauses or ends, that pose becomes a step of the undo history.
 
     motion : motion to play, None for none
     clock : function that returns the time [s]

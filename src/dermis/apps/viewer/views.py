@@ -157,7 +157,7 @@ class IntermediateViews:
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
     """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
 
-    The thickness is the least depth of a cell below the tangent planes of its source cells, and at most the
+    The thickness is the least depth of a cell below the tangent planes of its source cells. It is at most the
     radius within which source cells are searched.
 
     target : texture to fill, with one texel per cell; cells without pairs are unchanged

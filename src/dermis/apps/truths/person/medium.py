@@ -34,7 +34,7 @@ _PHOTONS = 40_000
 
 @cache
 def _albedo_table() -> tuple[Doubles, Doubles]:
-    """Return diffuse albedos of half-spaces, and the square root of 1 minus their scattering albedo."""
+    """Return tabulated diffuse albedos of half-spaces, and sqrt(1 - single-scattering albedo) of each."""
     absorption_root = np.linspace(1.0, _MIN_ROOT, 32)
     return np.array([diffuse_albedo(float(1.0 - one**2)) for one in absorption_root]), absorption_root
 
@@ -96,9 +96,9 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
 
 
 def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Return the low and high corner (3,) of the visible part of the head, in which albedos vary [mm].
+    """Return the low and high corner (3,) of a box around the visible part of the head [mm].
 
-    Outside this box the albedo is constant.
+    Albedos vary inside this box, and are constant outside.
     """
     half_side = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
@@ -116,7 +116,7 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
-    """Return the colour (z, y, x, 3) of each cell of a box, which is that of the nearest skin.
+    """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
 
     Cells farther from the skin than the colour reaches have the mean colour.
 

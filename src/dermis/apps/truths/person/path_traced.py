@@ -138,7 +138,7 @@ def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
 
 
 def person_key(scene: Scene, person: Person, mean_free_path_mm: Doubles, trace_settings: str) -> str:
-    """Return a hash of all inputs of a path-traced person, which names the cached passes.
+    """Return a hash of all inputs of a path-traced person, used as the name of the cached passes.
 
     trace_settings : versions and settings of the path tracer
     """

@@ -60,8 +60,8 @@ class HairFibres:
 class Person:
     """Posed head with its textures; positions are relative to the head's centre [mm].
 
-    eyes : (m, 4, 4) transforms from head space to the space of each eye, in mm of an average eye, with z
-        along its axis
+    eyes : (m, 4, 4) transforms from head space to the space of each eye, in which every eye has
+        the size of an average eye [mm] and z is along its axis
     eye_materials : (m,) material indices of the eyes, whose triangles are replaced by refracting eyeballs
     """
 

@@ -63,8 +63,7 @@ def write_scene(
     """Write a subject as a script or .blend, as `Target.write` does, and return the paths of all files.
 
     method : subsurface method of the Principled BSDF, or "EEVEE"
-    versions : first version of Blender in which the parameters are valid, and the first later version in
-        which they are not, or None
+    versions : versions of Blender for which the parameters are valid, see `VersionRange`
     """
     skin = _describe_skin(subject, parameters, method, versions)
     if output.suffix == ".blend":

@@ -208,7 +208,7 @@ class SkinColours:
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours of the subject's colour map, or the colour of its profile."""
+    """Return the colours in the subject's colour map or, without such a map, the colour of the profile."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)

@@ -279,7 +279,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 
 
 def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
-    """Return the directives of the material of a part that is not skin, with the pictures that it needs.
+    """Return the material directives for a part that is not skin, with references to the part's pictures.
 
     name : prefix of the names of the two materials that are mixed for a metal part
     prefix : prefix of the names of the image files
@@ -304,7 +304,7 @@ def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefi
 
 
 def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the textures of parts that are not skin, and their image files by name.
+    """Return the texture directives for parts that are not skin, and the image files by name.
 
     prefix : prefix of the names of the image files
     """
@@ -328,8 +328,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : contents of the image files by file name
-    material_textures : pbrt type, and name of the texture or image file, by the parameter of the skin's
-        material that uses it
+    material_textures : for each parameter of the skin's material with a map: pbrt type, and name of the
+        texture or image file
     """
 
     lines: Lines

@@ -43,7 +43,7 @@ class PageContent:
     frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
     packer : collector of the buffers and textures, which compresses them
     maps : maps encoded as pictures
-    pictures : WebP files of the maps, in the order in which entries refer to them
+    pictures : WebP files of the maps; `picture_entries` has indices in this list
     picture_entries : for each role, mip level and layer of a map: index in `pictures`, index of the value
         curves in `Packer.runs`, and number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders

@@ -111,7 +111,7 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the stored picture of a role was encoded."""
+        """Return whether texels equal the texels from which the stored picture of a role was encoded."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:

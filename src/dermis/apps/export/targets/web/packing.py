@@ -98,7 +98,7 @@ def encode_seven_bits(data: bytes) -> str:
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
-    """Return the bytes of a table of words by byte column, which compresses better than row by row.
+    """Return the bytes of a table of words, one byte column after another, which improves compression.
 
     raw : the table, row by row
     word, row : bytes per word and words per row
