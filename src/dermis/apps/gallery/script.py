@@ -133,7 +133,7 @@ _WEBP_QUALITY, _FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """Picture that a gallery script has drawn, as WebP files, or the reason why it could not.
+    """Picture that a gallery script has drawn, as WebP files, or the reason why there is none.
 
     script : gallery script
     panels : WebP file of each panel, by caption

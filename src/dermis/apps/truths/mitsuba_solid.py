@@ -109,7 +109,7 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return directed edges (n, 2) that lack an opposite edge, repeated as often as opposites are missing.
+    """Return directed edges (n, 2) that lack an opposite edge, each repeated for every missing opposite edge.
 
     count : number of points
     """

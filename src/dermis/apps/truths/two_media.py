@@ -62,7 +62,7 @@ def tally_exits(
     rng: RandomState,
     tally: Counts,
 ) -> None:
-    """Trace photons and count them by the strips where they enter and leave, in `tally` (n, n).
+    """Trace photons, and add to `tally` (n, n) how many of those entering each strip leave from each strip.
 
     photons : number of photons that enter each strip
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media

@@ -14,7 +14,7 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file, and the clip that was loaded from it for the last head.
+    """Motion file, with a cache of the clip that was last loaded from it for a head.
 
     path : file that `load_motion` accepts
     fps : frame rate of files without times [1/s]

@@ -298,7 +298,7 @@ class UndoHistory:
     def change(self, state: ViewerState, gesture: str = "") -> None:
         """Add a state; within one gesture it replaces the last state.
 
-        gesture : name of the gesture, empty for a step of its own
+        gesture : name of the gesture, empty for a change that is undone separately
         """
         if states_equal(state, self.state):
             return

@@ -87,7 +87,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     eta : index of refraction of the medium
 
-    Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
+    Source: [Habel2013] in the form of [Pharr2023]; the moments of the Fresnel reflectance are exact here.
     """
     radius = np.concatenate([[0.0], _FIRST_RADIUS * _RADIUS_RATIO ** np.arange(_RADIUS_COUNT - 1)])
     steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)

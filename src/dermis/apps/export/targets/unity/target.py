@@ -95,7 +95,7 @@ class Unity(Target):
 
 
 def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
-    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier since.
+    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier from HDRP 14 on.
 
     d_mm : (3,) widths of the Burley profiles [mm]
     """

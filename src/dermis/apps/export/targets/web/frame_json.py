@@ -133,7 +133,7 @@ def _view_record(captured: CapturedFrame, stage: str) -> int:
 
 
 def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
-    """Return the passes of a frame; bytes that the host writes become a buffer index and a byte run."""
+    """Return the passes of a frame; bytes that the host writes are given as buffer index and byte run."""
     writes = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
 
