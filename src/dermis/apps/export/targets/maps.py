@@ -204,7 +204,7 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -
 
 
 def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes all maps."""
+    """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them."""
     described: dict[str, Ranges] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked.maps:
