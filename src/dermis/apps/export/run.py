@@ -168,12 +168,13 @@ def export_skin(
     version : str, optional
         Version of the program; the newest supported one by default.
     variant : str, optional
-        Variant of the target, such as a scattering method; its first one by default.
+        Variant of the target, such as a scattering method; the target's first variant by default.
     model : {"montecarlo", "layered", "multipole", "dipole", "better-dipole"}, optional
         Model of the diffusion profile. By default tabulated Monte Carlo for homogeneous media of the package,
         layered diffusion for other tissue, and the Gaussians themselves for a table of Gaussians.
     profile : str or Path, optional
-        Skin of a head; by default a person's own pigments, or the default skin.
+        Skin of a head. By default a parametric person has skin with its own pigments, and other heads have
+        the default skin.
     library : str or Path, optional
         Folder node_modules of npm with the JavaScript library of a page; the page then embeds the library.
     side : int, default 2048
@@ -225,7 +226,7 @@ def export_skin(
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
     """Return the report of an export without writing any file: parameters and predicted errors."""
-    own_limitations = () if subject.part_pictures is None else (target.part_limitations,)
+    part_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
         curve_error(subject.curve, target.predicted_curve(one, subject, version))
@@ -243,7 +244,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
         d_mm=fit_burley_width(subject.curve),
         error=errors[0],
         naive_error=errors[1],
-        limitations=" ".join([target.limitations, *own_limitations]).rstrip(),
+        limitations=" ".join([target.limitations, *part_limitations]).rstrip(),
         untested=target.untested,
     )
 
@@ -285,7 +286,7 @@ def _write_report(report: ExportReport, output: Path) -> list[Path]:
     """Write the report as Markdown and JSON beside the output file or into the folder; return both paths."""
     single = bool(output.suffix)
     page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
-    numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
+    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
     page.write_text(report.markdown(), encoding="utf-8")
-    numbers.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
-    return [page, numbers]
+    data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+    return [page, data_file]

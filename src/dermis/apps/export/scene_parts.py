@@ -13,7 +13,7 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights, with unsupported ones replaced by point or directional lights; warn of each.
+    """Return the lights, with unsupported ones replaced by point or directional lights, and warn of these.
 
     supported : kinds of light that the program supports, including point and directional
     program : name of the program for the warnings
@@ -21,13 +21,13 @@ def supported_lights(lights: Iterable[Light], supported: Container[str], program
     return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
 
 
-def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Light:
+def _nearest_kind(light: Light, supported: Container[str], message_start: str) -> Light:
     if light.kind in supported:
         return light
     bases = (one for one in type(light).__mro__ if issubclass(one, Light))
     base = next(one for one in bases if one.model_fields["kind"].default in supported)
     replacement = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
-    notify(f"{culprit} has no {light.kind} light, so it becomes a {replacement.kind} light")
+    notify(f"{message_start} has no {light.kind} light, so it becomes a {replacement.kind} light")
     return replacement
 
 

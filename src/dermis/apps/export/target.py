@@ -118,7 +118,7 @@ class Target(ABC):
     part_limitations: ClassVar[str] = (
         "Only skin is exported; an export to gltf contains the other parts with their pictures."
     )
-    """Limitations of parts that are not skin, in sentences, for heads with pictures of such parts."""
+    """Limitations of eyes and other parts that are not skin, for the report on heads with their pictures."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 

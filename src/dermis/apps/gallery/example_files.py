@@ -1,4 +1,4 @@
-"""Files of the forms that other programs write: an avatar with cards of hair, and two scans."""
+"""Example files as other programs write them: an avatar with hair cards, and two scans."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from dermis.images.colour import encode_srgb8
 from dermis.mesh.head import Head
 
 _MESHES = Path(__file__).parent / "meshes"
-_STRIPE_MM, _STITCH_MM = 22.0, 2.6  # of the sweater
-_HAIR_CARDS, _HAIR_KNOTS, _HAIR_MM = 2600, 20, 230.0
+_STRIPE_MM, _STITCH_MM = 22.0, 2.6  # period of the sweater's stripes, and size of its stitches
+_HAIR_CARDS, _HAIR_KNOTS, _HAIR_MM = 2600, 20, 230.0  # cards, points along each, and length
 _PARTING_MM, _EAR_MM, _NEIGHBOURS = 15.0, 70.0, 40
-_COLUMNS = 8  # different cards in a picture of cards
+_COLUMNS = 8  # number of cards side by side in a picture of hairs
 
 
 class _Surface(NamedTuple):
@@ -60,7 +60,7 @@ class _Glb:
         self._buffer = BufferBuilder(bytearray(data[28 + length :]), views, accessors)
 
     def add(self, name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
-        """Add a mesh with a picture (h, w, 4), whose alpha cuts it out."""
+        """Add a mesh with a picture (h, w, 4), whose alpha determines which parts of the mesh are visible."""
         add_rows = self._buffer.add_accessor
         attributes = {
             "POSITION": add_rows((surface.points_mm / 1000.0).astype("<f4"), bounded=True),
@@ -93,7 +93,9 @@ class _Glb:
 
 
 def write_avatar(studio: Studio, folder: Path) -> Path:
-    """Write an avatar with a sweater and cards of hair, brows and lashes; return the path."""
+    """Write an avatar with a sweater, and ribbons with pictures of hairs (cards) as hair, brows and lashes.
+
+    Return the path of the file."""
     plain = Human(sex=0.1, age=26).head()
     painted, eyes = paint_head(studio.renderer.device, plain, 1024)
     file = _Glb(encode_head(replace(painted, strands=None, hair=None), roughness=0.3, eyes=eyes))
@@ -106,7 +108,7 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
 
 
 def write_pictures(head: Head, folder: Path) -> Path:
-    """Write the skin of a head as three materials with a part of its colour map each; return the path."""
+    """Write a head's skin as three meshes, each with a picture cut from the colour map; return the path."""
     mesh, colour = head.mesh, _colours(head)
     file = _Glb()
     corner = mesh.triangles[_is_skin(head)]
@@ -152,7 +154,7 @@ def unpack_mesh(name: str, folder: Path) -> Path:
 
 
 def _is_skin(head: Head) -> Mask:
-    """Return which triangles are skin, (f,)."""
+    """Return a mask (f,) of the triangles that are skin."""
     return np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
 
 
@@ -193,10 +195,10 @@ def _strands_picture(
 ) -> Bytes:
     """Return a picture (h, w, 4) of cards side by side, with hairs that end at different lengths.
 
-    colour : linear
-    hairs : number in each card
+    colour : mean colour of the hairs, linear Rec. 709
+    hairs : number of hairs in each card
     size : height and width of the picture [pixel]
-    taper : part of the length in which hairs become thinner [-]
+    taper : part of the picture height over which hairs become thinner towards their tips [-]
     """
     rng, (height, width) = np.random.default_rng(seed), size
     picture = np.zeros((height, width, 4), np.uint8)
@@ -215,7 +217,7 @@ def _strands_picture(
 
 
 def _covers_face(points_mm: Doubles) -> Mask:
-    """Return which points are in front of the face, (n,)."""
+    """Return a mask (n,) of the points that are in front of the face."""
     x, y, z = points_mm.T
     return np.asarray((np.abs(x) < 72.0) & (y < 60.0) & (y > -130.0) & (z > -45.0))
 

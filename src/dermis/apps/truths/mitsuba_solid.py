@@ -78,7 +78,7 @@ def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[
 
 
 def _mitre_vectors(solid: ClosedSurface) -> Doubles:
-    """Return the outward vector (p, 3) of each point that moves all faces around it by a distance of 1.
+    """Return for each point the outward vector (p, 3) that moves all faces around the point by 1.
 
     At sharp edges it is longer than 1, but at most 2.
     """
@@ -109,7 +109,7 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return directed edges (n, 2) that lack an opposite edge, repeated as often as opposites are missing.
+    """Return directed edges (n, 2) that lack an opposite edge, each repeated for every missing opposite edge.
 
     count : number of points
     """

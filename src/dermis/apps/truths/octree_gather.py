@@ -120,7 +120,7 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
 def _add_midpoints(
     point: Floats, i: int, stack: TriangleStack, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add the light of sub-triangle i of the stack by the midpoints of its sides.
+    """Add the light of sub-triangle i of the stack, evaluated at the midpoints of its sides.
 
     This quadrature is exact to second order in the product of irradiance and profile.
     """
@@ -172,7 +172,7 @@ def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[in
 def _add_flux(
     distance: float, red: float, green: float, blue: float, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add flux by channel times the profile at a distance, interpolated in its table, to `exitance`."""
+    """Add each channel's flux times the profile at a distance, interpolated in its table, to `exitance`."""
     row_position = math.sqrt(distance) * table.rows_per_root
     row = int(row_position)
     if row < len(table.R) - 1:

@@ -83,7 +83,7 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CORNEA_INDEX = 1.336
-"""Index of refraction behind the cornea's front surface: that of the aqueous humour [-]."""
+"""Index of refraction of the aqueous humour, used behind the cornea's front surface [-]."""
 TEAR_ROUGHNESS = 0.06
 """Roughness of the tear film over the white of the eye [-]."""
 LIMBUS_BLUR_MM = 0.55

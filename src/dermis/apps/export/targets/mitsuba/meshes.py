@@ -79,7 +79,7 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
-    """Return a PLY file for each of some materials, by material index, relative to the head's centre [mm].
+    """Return a PLY file for each given material by its index, relative to the head's centre [mm].
 
     Triangles are subdivided and have a colour per vertex instead of maps.
 

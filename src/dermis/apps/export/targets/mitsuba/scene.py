@@ -27,7 +27,7 @@ Boundary = Literal["matched", "smooth", "rough"]
 BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
-"""Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
+"""Reflectance of an index-matched surface in all directions: the mean reflectance of rough skin [-]."""
 _OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
 _PART_IOR = 1.5  # of the metallic-roughness model
 _PART_INPUTS: Mapping[PartRole, str] = {
@@ -60,7 +60,7 @@ class SkinAppearance(NamedTuple):
     dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
         skin
     opaque : PLY file of each other material, by material index
-    pictured : roles of the pictures of each material that has some, by material index
+    pictured : roles of the pictures of a material, by material index, for materials with pictures
     pictures : PNG files by role
     """
 
@@ -122,7 +122,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_description(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return Mitsuba's description of the skin's surface; of index-matched skin, only its outer layer.
+    """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
 
     boundary : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for 1

@@ -131,7 +131,7 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium with the profile closest to `curve` under a surface, and the lightest skin's albedo.
+    """Return the medium whose profile under a surface is closest to `curve`, with the lightest skin's colour.
 
     Heads are lit from all directions. Under an index-matched surface, skin returns up to a quarter more of
     oblique light than of light along the normal; under a refracting surface, both are equal.
@@ -156,19 +156,19 @@ def _boundary_factor(boundary: Boundary) -> float:
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the roles of each part's pictures by material index, without eyes that have geometry."""
+    """Return the roles of each part's pictures by material index, except eyes with their own geometry."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
     used = {*np.unique(head.mesh.material).tolist()} - {*(head.eyes.material.tolist() if head.eyes else ())}
     roles = {k: pictures.roles(head.mesh.materials[k]) for k in sorted(used)}
-    return {k: own for k, own in roles.items() if own}
+    return {k: part_roles for k, part_roles in roles.items() if part_roles}
 
 
 def _opaque_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
     """Return a PLY file for each of the head's materials except skin, by material index.
 
-    pictured : materials with pictures
+    pictured : indices of the materials with pictures
     """
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
@@ -208,7 +208,7 @@ class SkinColours:
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours of the subject's colour map, or the colour of its profile."""
+    """Return the colours in the subject's colour map or, without such a map, the colour of the profile."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)

@@ -50,7 +50,7 @@ def _add_material(
     name = MaterialX.createValidName(definition.name) or "material"
     node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
     for key, value in definition.values.items():
-        constant = node.setInputValue(input_name(shader, key), _value(value))
+        constant = node.setInputValue(input_name(shader, key), _materialx_value(value))
         if key in LENGTH_INPUTS:
             constant.setUnitType("distance")
             constant.setUnit("meter")
@@ -92,5 +92,5 @@ def _add_map(graph: MaterialX.NodeGraph, role: str, file: str, shader: str) -> M
     return output
 
 
-def _value(value: InputValue) -> MaterialX.Color3 | float:
+def _materialx_value(value: InputValue) -> MaterialX.Color3 | float:
     return MaterialX.Color3(*value) if isinstance(value, tuple) else float(value)

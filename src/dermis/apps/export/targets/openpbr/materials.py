@@ -1,4 +1,4 @@
-"""OpenPBR materials of a head: input values, and maps of inputs with their files."""
+"""OpenPBR materials of a head: values of their inputs, maps that set inputs, and the files of these maps."""
 
 from __future__ import annotations
 
@@ -250,7 +250,7 @@ def write_part_pictures(
     """Write the pictures of parts that are not skin as PNG files, and return their paths.
 
     prefix : prefix of the file names
-    roles : roles of pictures besides those of OpenPBR
+    roles : further roles of pictures to write, which OpenPBR does not use
     """
     if subject.part_pictures is None:
         return []
@@ -275,4 +275,4 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> d
             return opaque_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
-    return {number: definition(mesh.materials[number]) for number in np.unique(mesh.material).tolist()}
+    return {index: definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

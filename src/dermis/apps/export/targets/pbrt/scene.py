@@ -36,7 +36,7 @@ def directive(word: str, kind: str, parameters: DirectiveParameters | None = Non
 
     word : first word of the directive, such as "Material"
     kind : pbrt's name of the implementation, such as "subsurface"
-    parameters : text, texts, Boolean, number or array of numbers by type and name, such as "float eta"
+    parameters : values by type and name, such as "float eta": text, texts, Boolean, number or numbers
     """
     texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([word, f'"{kind}"', *texts])
@@ -76,7 +76,7 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of lights and environment, omitting with a note those that pbrt lacks."""
+    """Return the directives of lights and environment; those that pbrt lacks are omitted with a warning."""
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT_LIGHTS, "pbrt"), start=1):
         if PBRT_LIGHTS[light.kind] is _unsupported:

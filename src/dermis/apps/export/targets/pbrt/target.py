@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 _ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
 _FIRST_RADIUS, _RADIUS_RATIO = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
-_ALBEDO_DENSITY = 8.0
+_ALBEDO_DENSITY = 8.0  # larger values place more of the albedos near 1
 _TEXTURES_BY_ROLE = {
     "colour": ("spectrum", "sRGB", "reflectance"),
     "roughness": ("float", "linear", "roughness"),
@@ -48,7 +48,7 @@ _PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
     "opacity": ("float", "linear"),
 }
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
-_OPAQUE_ROUGHNESS = 0.3  # materials other than skin
+_OPAQUE_ROUGHNESS = 0.3  # of materials other than skin
 _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
     10.0,
     1.4,
@@ -87,7 +87,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     eta : index of refraction of the medium
 
-    Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
+    Source: [Habel2013] in the form of [Pharr2023]; the moments of the Fresnel reflectance are exact here.
     """
     radius = np.concatenate([[0.0], _FIRST_RADIUS * _RADIUS_RATIO ** np.arange(_RADIUS_COUNT - 1)])
     steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)
@@ -125,7 +125,7 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
-    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
+    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # light scattered at a smaller depth is totally reflected
     depth = critical_depth + _sample_depths()[:, None]
     path = np.hypot(radius, depth)
     cosine = depth / path
@@ -249,14 +249,14 @@ def _scene_lines(
     part_lines, part_files = _part_textures(subject, prefix)
     lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
     files = textures.files | part_files
-    for number in np.unique(head.mesh.material).tolist():
-        material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm, v_up=True)
+    for index in np.unique(head.mesh.material).tolist():
+        material, name = head.mesh.materials[index], f"{prefix}part_{index}.ply"
+        files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, v_up=True)
         roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]
         else:
-            texts = _opaque_materials(material, roles, f"part_{number}", prefix)
+            texts = _opaque_materials(material, roles, f"part_{index}", prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
@@ -279,7 +279,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 
 
 def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
-    """Return the directives of the material of a part that is not skin, with the pictures that it needs.
+    """Return the material directives for a part that is not skin, with references to the part's pictures.
 
     name : prefix of the names of the two materials that are mixed for a metal part
     prefix : prefix of the names of the image files
@@ -304,7 +304,7 @@ def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefi
 
 
 def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the textures of parts that are not skin, and their image files by name.
+    """Return the texture directives for parts that are not skin, and the image files by name.
 
     prefix : prefix of the names of the image files
     """
@@ -328,8 +328,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : contents of the image files by file name
-    material_textures : pbrt type, and name of the texture or image file, by the parameter of the skin's
-        material that uses it
+    material_textures : for each parameter of the skin's material with a map: pbrt type, and name of the
+        texture or image file
     """
 
     lines: Lines

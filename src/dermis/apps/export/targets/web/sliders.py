@@ -110,7 +110,7 @@ def _differences(
     pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer
 ) -> list[tuple[int, int, int]]:
     changes = []
-    for number, (before, after) in pairs:
+    for index, (before, after) in pairs:
         if before.tobytes() == after.tobytes():
             continue
         if len(before) != len(after):
@@ -121,7 +121,7 @@ def _differences(
         changed = np.flatnonzero(difference)
         if len(changed):
             part = difference[changed[0] : changed[-1] + 1]
-            changes.append((number, int(changed[0]), packer.add(part.view(np.uint8))))
+            changes.append((index, int(changed[0]), packer.add(part.view(np.uint8))))
     return changes
 
 

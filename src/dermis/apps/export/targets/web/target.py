@@ -115,7 +115,7 @@ class Web(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the exported parameters, as users of the page cannot choose any."""
+        """Return the exported parameters: the page has no parameters that a user could set."""
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
