@@ -77,7 +77,7 @@ def register_types(ffi: Any) -> int:
     This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
     """
     try:
-        with ffi._lock:  # as its own callers do
+        with ffi._lock:  # cffi's own callers take it too
             declared = ffi._parser._declarations
             types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _named_types(declared)}
             types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callback_types(declared)}

@@ -101,7 +101,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and derived tables this head uses: its template, else `bare`."""
+        """Return the head whose atlas and tables this head uses: its template if it fits, else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare

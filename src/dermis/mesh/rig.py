@@ -33,7 +33,7 @@ _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
-    """State of a rig as arrays, as the device uses it.
+    """State of a rig as arrays, which are uploaded to the device.
 
     weights : (t,) weights of the targets, relative to the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
@@ -199,7 +199,11 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return control points of the lid edges, their weights in edge points, and their outline."""
+        """Return the control points that determine the lid edges, and how they do.
+
+        The second result is the weights (e, n) of the n control points in the points of the edges, the third
+        is an outline that poses the control points.
+        """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))

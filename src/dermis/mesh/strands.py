@@ -134,7 +134,7 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
 
 
 def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubles:
-    """Interpolate c quantities bilinearly in quads, from the corners (c, 4, n) to a position in each, (c, n).
+    """Interpolate c quantities bilinearly from the corners of n quads (c, 4, n) to a point in each, (c, n).
 
     position : (n, 2) bilinear coordinates, see `Roots`
     """

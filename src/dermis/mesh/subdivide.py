@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MAX_LEVELS = 3
 _CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
 _CACHED_TRIANGLES = 500_000
-"""Number of finer triangles from which weights are cached on disk, which saves half a second or more."""
+"""Smallest number of triangles of a finer mesh whose weights are cached on disk, to save half a second."""
 Corners = NDArray[np.integer]
 
 
@@ -186,9 +186,9 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) of a subdivided head that leave out levels of subdivision in flat regions.
+    """Return triangles (t, 3) that cover a subdivided head with fewer levels of subdivision in flat regions.
 
-    The vertices are those of the subdivided mesh. Triangles that are cut out by their opacity are left out.
+    The vertices are those of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : smallest number of faces of the coarsest level
     tolerance_mm : largest distance of a left out vertex from the coarse edge that replaces it

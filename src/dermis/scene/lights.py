@@ -247,7 +247,8 @@ LIGHTS: Registry[type[Light]] = Registry(
 reference; exports write a registered light as the class that it derives from."""
 
 
-_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0  # typical, and largest without scaling
+# Reach of a typical head, and largest reach for which the lights of presets are not moved away.
+_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0
 _NARROW_DEGREES = 10.0
 _SIZES = "width_mm", "height_mm", "radius_mm"
 _VECTORS = "position", "target", "direction", "up"
