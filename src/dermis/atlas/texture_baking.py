@@ -34,7 +34,7 @@ class PackedTextures:
     """Common layout and maps of several materials.
 
     vertices, uv : (n,) vertex indices in the mesh, and (n, 2) their uv in the common maps
-    maps : (side, side, k) map of each role, such as colour or roughness, multiplied by the materials' factors
+    maps : by role, such as colour or roughness, the map (side, side, k), multiplied by the materials' factors
     notes : sentences for users about lost detail
     """
 

@@ -127,7 +127,7 @@ def _move_charts(
 
 
 def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
-    """Set the sizes of tiles without pictures; skin gets the median texel density of tiles with pictures."""
+    """Return the tiles with sizes for those without pictures: skin gets the others' median texel density."""
     areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
     density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
     usual = float(np.median([value for value in density if value > 0] or [0.0]))

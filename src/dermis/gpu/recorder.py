@@ -46,8 +46,8 @@ class Recorder(ABC):
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
         groups : number of workgroups along each axis
-        in_place : name of a resource that the pass only extends from its own content, such as the gutters of
-            a map; the version of that resource does not change
+        in_place : name of a resource that the pass only completes from the resource's own content, such as a
+            map whose gutters it fills; the version of that resource does not change
         """
 
     def compute(

@@ -221,7 +221,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 
 
 def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node of a graph, (n,), numbered by order of appearance.
+    """Return the connected component of each node of a graph, (n,), numbered as they first appear.
 
     count : n, number of nodes
     a, b : (l,) nodes at the two ends of each link

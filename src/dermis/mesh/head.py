@@ -86,7 +86,7 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig; for a head without one, a rig with its points only."""
+        """Return the rig; for a head without one, a rig of its points without targets or bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))

@@ -97,8 +97,8 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None to let them intersect
-    template : rig of the same topology whose outline points are reused, in addition to the corners of the
-        convex hull; None to search outline points
+    template : rig of the same topology whose outline points are used, together with the extreme points of
+        this rig; None to search for outline points
     """
 
     positions_mm: Floats
@@ -146,7 +146,7 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If the rest positions in `motion` differ from those of the rig, their extreme points are added.
+        If `motion` has other rest positions than the rig, the extreme points of these are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)

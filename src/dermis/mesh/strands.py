@@ -127,9 +127,8 @@ def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tu
 def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
     """Return the positions of roots (3, n) and of the corners of their quads (4, 3, n) [mm], as columns."""
     columns = np.ascontiguousarray(points_mm.T, np.float64)
-    corners = columns.take(
-        quad_corners(mesh, roots.quad).T, axis=1
-    )  # `take` is ten times faster than indexing
+    # `take` is ten times faster than indexing
+    corners = columns.take(quad_corners(mesh, roots.quad).T, axis=1)
     return interpolate_quads(roots.position, corners), corners.transpose(1, 0, 2)
 
 

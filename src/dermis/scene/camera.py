@@ -299,9 +299,8 @@ def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
 def _show_all(head: Head, degrees: float) -> Camera:
     """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
     x, _, z = _azimuth_direction(degrees)
-    axes = (
-        np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
-    )  # rows: right, up, to the camera
+    # rows: to the right, up and towards the camera
+    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
     points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))

@@ -36,7 +36,7 @@ Seams = Annotated[
     Field(description=_SEAMS),
 ]
 
-_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance over pi.'
+_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance divided by pi.'
 SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR)]
 
 _GAMMA = (

@@ -22,10 +22,7 @@ from dermis.mesh.mesh import Mesh
 
 _MIN_DENSITY = 0.05  # lowest ratio of a piece's uv density to the mean at which light is blurred in it
 _SPECK_MM2 = 1.0  # parts of a chart with less area are merged into its largest part
-_DENSITY_RANGE = (
-    0.5,
-    1.4,
-)  # ratio of uv density to the mean; pieces outside this range are scaled towards it
+_DENSITY_RANGE = (0.5, 1.4)  # ratio of uv density to the mean; pieces outside are scaled towards this range
 _MAX_GUTTER = 1 / 8  # largest width of gutters as a fraction of the map's side
 
 

@@ -17,9 +17,7 @@ from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_bo
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-_MAX_STRETCH = (
-    2.0  # gutters are as wide as if a border had at most this many times the texels per mm of its piece
-)
+_MAX_STRETCH = 2.0  # largest width of a gutter on the grid, relative to the width at its piece's mean density
 
 
 class Border(NamedTuple):

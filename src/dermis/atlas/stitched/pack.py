@@ -17,10 +17,7 @@ Span = tuple[int, int, int]
 _MAX_CELLS = 512  # largest number of cells along each side of the square
 _COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTIONS = 8  # number of trials in the search for the scale
-_FINE_BISECTIONS, _FINE_GAIN = (
-    4,
-    1.12,
-)  # trials with fine cells, and the largest factor of scale they may gain
+_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
 _ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales

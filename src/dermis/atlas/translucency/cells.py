@@ -18,9 +18,9 @@ TILE_CELLS = 4
 TILE_MARGIN_TEXELS = 0.7
 """Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
 
-# in standard deviations of the widest Gaussian:
-_PAIR_RADIUS_SIGMAS = 3.2  # largest distance between an entry and an exit cell
-_CELL_SIGMAS = 0.36  # side of a cell, so small that light interpolated between cells is smooth
+# In standard deviations of the widest Gaussian: largest distance between an entry and an exit cell; and side
+# of a cell, so small that light interpolated between cells is smooth.
+_PAIR_RADIUS_SIGMAS, _CELL_SIGMAS = 3.2, 0.36
 _MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs of cells
 _MAX_TEXELS = 1024  # texels per side whose light is averaged into cells; more if there are more cells
 _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a surface point count as equal
