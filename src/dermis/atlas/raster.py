@@ -124,7 +124,7 @@ def _row_interval(p: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubl
 
 
 def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
-    """Build the atlas of a mesh's own uv layout, so that its texels are those of the mesh's maps."""
+    """Build the atlas of a mesh in the mesh's own uv layout, in which the mesh's maps are drawn too."""
     chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
     usable = usable_triangles(mesh, size) & skin[mesh.material]

@@ -59,7 +59,7 @@ DEFAULT_LIMITS = {
 _REQUIRED_LIMITS = tuple(
     name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
 )
-"""Limits that programs rely on; those of texture and buffer sizes may be lower."""
+"""Limits that programs rely on; the limits of texture and buffer sizes may be lower."""
 _RANKED_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 

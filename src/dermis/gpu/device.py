@@ -186,7 +186,7 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for later readbacks; a buffer of a new size replaces those of other sizes."""
+        """Keep a staging buffer for later readbacks; if its size is new, drop the buffers of other sizes."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)

@@ -91,7 +91,7 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """Return control points (p, 3) with those of the lids moved out of the eyeballs [mm].
+        """Return control points (p, 3) in which the lids' points are moved out of the eyeballs [mm].
 
         points_mm : (p, 3) control points of a posed head
         """

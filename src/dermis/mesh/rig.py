@@ -122,7 +122,7 @@ class Rig(ShortRepr):
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3), given those of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """

@@ -133,7 +133,7 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
 def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Return the arrays of a subdivision, cached on disk for large meshes.
 
-    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
     if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
         return _compute_refinement(mesh, levels, by_quads)
@@ -148,7 +148,7 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Return the arrays of a subdivision by name: corners of finer faces, and control point weights.
 
-    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
     triangles = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
     faces = polygons(mesh) if by_quads else triangles

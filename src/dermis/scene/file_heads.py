@@ -40,7 +40,7 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, which replace those of the mesh file; None keeps the picture of the mesh
+    files : picture files by role, which replace the mesh file's pictures; None keeps the mesh file's picture
     height_mm, normal_y : see `load_maps`
     """
 

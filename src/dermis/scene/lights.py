@@ -267,8 +267,8 @@ def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
 
     head : subject of the lights; None for a head of ordinary size that faces +Z
 
-    The lights of a body larger than a metre are farther away and larger in proportion; those of a flat piece
-    of skin are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
+    For a body larger than a metre, the lights are farther away and larger in proportion; for a flat piece of
+    skin, they are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
     the head.
     """
     if name == NO_LIGHTS:

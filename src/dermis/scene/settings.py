@@ -118,4 +118,4 @@ class Settings(FrozenModel):
 
 
 PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
-"""Defaults of `dermis render`, `animate` and `view` in place of those of `Settings`."""
+"""Defaults of `dermis render`, `animate` and `view` where they differ from the defaults of `Settings`."""

@@ -117,7 +117,7 @@ def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
 
 
 def _mirrored_triangles(surface: FlatSurface, piece: Index, members: Index) -> Mask:
-    """Return the mask of triangles whose uv orientation is opposite to that of most of their piece.
+    """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
 
     piece, members : (t,) piece and index of each triangle
     """

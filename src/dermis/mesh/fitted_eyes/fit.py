@@ -54,9 +54,9 @@ class _EyeShape(NamedTuple):
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
-    The fitted eyeballs have the radius and position of those of the file, look along the axis of their
-    corneas or straight ahead, and follow their bones and morph targets rigidly. If the file has no two
-    eyeballs, the head is returned unchanged, with the reason in its `note`.
+    The fitted eyeballs have the radius and position of the file's eyeballs, look along the axis of the file's
+    corneas or else straight ahead, and move rigidly by the bones and morph targets of the file's eyeballs. If
+    two eyeballs are not found in the file, the head is returned unchanged, with the reason in its `note`.
 
     coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
     look : appearance of the eyes
