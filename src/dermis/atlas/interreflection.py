@@ -25,7 +25,7 @@ LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
 _TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # for a test whether any skin faces other skin
 _CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
 _MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES are merged
-_MERGED_LINES = 1.5  # distance below which points are merged, in distances between lines
+_MERGED_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
@@ -42,7 +42,8 @@ class FormFactors:
     cell_target, cell_factor : (k,) index of the patch that the cell faces, and (k,) float32 form factor, 0 to
         1 [-]
     nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
-    confidence : (CELLS_PER_SIDE^2,) float32 number of lines leaving each cell, over the median, at most 1 [-]
+    confidence : (CELLS_PER_SIDE^2,) float32 ratio of the number of lines that leave each cell to the median
+        number, at most 1 [-]
     patch_first, patch_target, patch_factor : sparse matrix of the form factors from patches to patches
     sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle index of the sample points
     sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner
@@ -91,8 +92,8 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     another is the fraction of the lines leaving the first patch that meet the second one next.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, except those
-        cut out by their opacity, such as cards of hair, which are left out
+    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, but triangles
+        with an opacity map, such as hair cards, are ignored
     """
     facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
     if len(facing):
@@ -145,8 +146,8 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
     x, y, z = np.ascontiguousarray(points.transpose(2, 1, 0))
     (left, width), (bottom, height) = _integer_range(x), _integer_range(y)
     count = width * height
-    triangle, number = expand_runs(np.zeros_like(count), count)
-    row, column = np.divmod(number, width[triangle])
+    triangle, line_in_box = expand_runs(np.zeros_like(count), count)
+    row, column = np.divmod(line_in_box, width[triangle])
     line_x, line_y = left[triangle] + column, bottom[triangle] + row
     (ax, bx, cx), (ay, by, cy) = x[:, triangle] - line_x, y[:, triangle] - line_y
     a, b, c = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
@@ -161,9 +162,9 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
 
 
 def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
-    """Return the lowest integer between each triangle's three corners (f,), and the number of such integers.
+    """Return the lowest integer within each triangle's extent along one axis (f,), and how many there are.
 
-    corner : (3, f) one coordinate of the corners
+    corner : (3, f) coordinate of the triangles' corners along this axis
     """
     low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
     high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
@@ -178,7 +179,7 @@ def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> In
     """
     order = np.lexsort((depth, line))
     line, outward, cell = line[order], outward[order], cell[order]
-    # Light leaves a body where it faces along the line, and meets one that faces against it.
+    # Light leaves a body where the surface faces along the line, and meets the next one where it faces back.
     through_air = (line[1:] == line[:-1]) & outward[:-1] & ~outward[1:]
     pair = np.stack([cell[:-1][through_air], cell[1:][through_air]], axis=1)
     return np.concatenate([pair, pair[:, ::-1]])
@@ -270,7 +271,7 @@ def _sparse_rows(
 
 
 def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
-    """Return the patch of each cell, and triangles and weights of all patches' sample points.
+    """Return the patch of each cell, and the triangles and weights of the sample points of all patches.
 
     The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels.
     """
@@ -279,12 +280,12 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[I
     patch = (cell // CELLS_PER_SIDE // 2) * half + cell % CELLS_PER_SIDE // 2
     order = np.lexsort((rank, patch))
     occupied, first, size = np.unique(patch[order], return_index=True, return_counts=True)
-    number = np.full(half * half, -1, np.int64)
-    number[occupied] = np.arange(len(occupied))
+    patch_index = np.full(half * half, -1, np.int64)
+    patch_index[occupied] = np.arange(len(occupied))
     chosen = order[(first[:, None] + np.arange(SAMPLES_PER_PATCH) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
-    patch_of = number[(y // 2) * half + x // 2]
+    patch_of = patch_index[(y // 2) * half + x // 2]
     words = packed[:, 1] | (packed[:, 2] << np.uint32(16))
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 

@@ -17,7 +17,7 @@ from dermis.mesh.geometry import components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
-"""Distance by which uv may lie outside [0, 1] in a tile that shows its picture only once [-]."""
+"""Distance by which uv may lie outside [0, 1] without the picture being repeated there [-]."""
 PADDING = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
 _PLAIN_SIDE = 16  # side of a tile without pictures that is not skin [texel]
@@ -32,7 +32,7 @@ class Tile:
     material : index of the file's material, -1 for none
     vertices, triangles : indices of vertices and triangles in the mesh
     uv : (n, 2) positions of the vertices in the material's pictures, v down
-    low, high : (2,) part of the picture that the tile shows
+    low, high : (2,) lowest and highest position in the pictures that the tile shows
     size : width and height [texel]
     corner : left and top texel in the map, without the padding
     """
@@ -53,7 +53,7 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose mapping determines the layout of a material: its colour, else the first."""
+    """Return the texture whose mapping determines a material's layout: its colour, or else its first one."""
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
@@ -66,7 +66,9 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 def lay_out_tiles(
     mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
 ) -> tuple[list[Tile], int, float]:
-    """Return the tiles of selected materials, the side of their common map, and the scale of their pictures.
+    """Return the tiles of selected materials, and the side of their common map.
+
+    The third result is the factor, at most 1, by which their pictures are reduced to fit into the map.
 
     surface : surface data of the file that the mesh comes from
     members : (m,) mask of the mesh's materials that share the map
@@ -81,7 +83,7 @@ def lay_out_tiles(
                 mesh, surface, materials[index] if index >= 0 else FileMaterial(), index, triangles
             )
         )
-    tiles = _with_plain_sizes(mesh, tiles, materials)
+    tiles = _set_plain_sizes(mesh, tiles, materials)
     return _pack(tiles)
 
 
@@ -124,16 +126,16 @@ def _move_charts(
     return np.asarray(uv - period * np.floor(middle / np.where(period > 0, period, 1.0)))
 
 
-def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
-    """Return the tiles with sizes for those without pictures; skin gets the texel density of other tiles."""
-    area = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
-    density = [tile.size[0] * tile.size[1] / max(own, 1e-9) for tile, own in zip(tiles, area, strict=True)]
-    usual = float(np.median([own for own in density if own > 0] or [0.0]))
+def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
+    """Return the tiles with sizes for those without pictures: skin gets the others' median texel density."""
+    areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
+    density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
+    usual = float(np.median([value for value in density if value > 0] or [0.0]))
     sized = []
-    for tile, own in zip(tiles, area, strict=True):
+    for tile, mm2 in zip(tiles, areas, strict=True):
         if tile.size == (0, 0):
             is_skin = mesh.materials[int(mesh.material[tile.triangles[0]])].kind == "skin"
-            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * own)))) if is_skin else _PLAIN_SIDE
+            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * mm2)))) if is_skin else _PLAIN_SIDE
             tile = Tile(
                 tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)
             )
@@ -146,7 +148,7 @@ def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
     scale = 1.0
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
-        side, corners = _shelves(sizes)
+        side, corners = _pack_in_rows(sizes)
         if side <= MAX_SIDE:
             break
         scale *= 0.98 * MAX_SIDE / side
@@ -157,8 +159,8 @@ def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
     return placed, side, scale
 
 
-def _shelves(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
-    """Pack rectangles in rows; return the side of the smallest square that they fit, and their corners."""
+def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
+    """Pack rectangles in rows; return the side of the smallest square that holds them, and their corners."""
     padded = np.array(sizes) + 2 * PADDING
     order = np.argsort(-padded[:, 1], kind="stable")
     side = float(max(padded.max(), np.sqrt(padded.prod(axis=1).sum())))

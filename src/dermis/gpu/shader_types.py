@@ -101,7 +101,7 @@ def uniform_type(text: str, name: str) -> str:
 
 
 def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
-    """Return a function that takes a uniform record as bytes, and selects those that the shader reads.
+    """Return a function that selects, from the bytes of a uniform record, those that the shader reads.
 
     It selects all bytes if the shader passes the record to a function, or if the type of the variable is not
     a struct.

@@ -22,7 +22,7 @@ IRIS_BEHIND_MM = 3.0
 SIDE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
 UV_RIM = 0.49
-"""Distance from the centre of the uv layout at which the back of the eye is."""
+"""Distance of the back of the eye from the centre of the uv layout [-]."""
 UV_DECAY_RADIANS = 0.9
 """Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
 
@@ -91,7 +91,7 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """Return control points (p, 3) with those of the lids moved out of the eyeballs [mm].
+        """Return control points (p, 3) in which the lids' points are moved out of the eyeballs [mm].
 
         points_mm : (p, 3) control points of a posed head
         """

@@ -10,17 +10,19 @@ from dermis.base.arrays import Doubles, Index
 from dermis.mesh.geometry import cross_columns, dot_columns
 
 Direction = Literal["x", "z", "-x", "-z"]
+# Numbers of examined triangles, of points sampled on them, and of points that are mirrored:
 _MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
-# Of the eyes, relative to their width together:
+# Limits for the eyes, relative to the width of both together:
 _MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MIN_GAP, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.1, 0.25, 0.25, 3.0
-# Of the head, relative to its height:
+# Limits for the head, relative to its height:
 _HEAD_WIDTH = 0.68  # largest width of the head without shoulders
 _DEPTHS = 0.5, 1.6  # smallest and largest depth
 _MAX_ASYMMETRY = 0.03  # root mean square distance of mirrored points from the surface
 _MIN_NOSE = 0.04  # protrusion of the middle of the face
 _MIN_RELIEF = 0.03  # see `_relief`
-_CELL, _ROW, _RIDGE, _SIDES = 0.08, 0.05, 0.03, (0.07, 0.12)
-# Ratio of both horizontal axes; ratios of front and back:
+_CELL = 0.08  # side of the cells in `_relief`
+_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)  # in `_ridge`: height of rows, and distances from the middle
+# Smallest ratio of the asymmetries about both horizontal axes, and of relief and nose in front to the back:
 _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 
@@ -37,10 +39,10 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     if not len(triangles):
         return None
     corners = positions[triangles[:: 1 + len(triangles) // _MAX_TRIANGLES]]
-    return _from_eyes(corners[:, 0], eyes) or _from_shape(corners)
+    return _direction_from_eyes(corners[:, 0], eyes) or _direction_from_shape(corners)
 
 
-def _from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
+def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     if len(eyes) < 2:
         return None
     middle, spread = (eyes.min(axis=0) + eyes.max(axis=0)) / 2, np.ptp(eyes, axis=0)
@@ -58,7 +60,7 @@ def _from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     return _direction(front, shift[front])
 
 
-def _from_shape(corners: Doubles) -> Direction | None:
+def _direction_from_shape(corners: Doubles) -> Direction | None:
     """Return the direction of the face of a head or of a standing figure from its triangles (f, 3, 3)."""
     top, height = float(corners[..., 1].max()), _head_height(corners[:, 0])
     head = corners[corners[..., 1].max(axis=1) >= top - height]
@@ -120,7 +122,10 @@ def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _asymmetry(points: Doubles, axis: int) -> float:
-    """Return the root mean square distance of points (n, 3) from their mirror images along an axis."""
+    """Return the root mean square distance of mirrored points (n, 3) from the nearest original points.
+
+    axis : index of the coordinate that is mirrored
+    """
     single = points.astype(np.float32)
     mirrored = single[:: len(points) // _MIRRORED] * np.where(np.arange(3) == axis, -1, 1).astype(np.float32)
     squares = (-2 * mirrored) @ single[::2].T
@@ -138,9 +143,10 @@ def _relief(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge(points: Doubles, front: int) -> float:
-    """Return the largest protrusion of the middle of the front or back of a head beyond its two sides.
+    """Return how far the middle of a face protrudes beyond both sides, at the height where it does most.
 
-    points : (n, 3) points of the front or back
+    points : (n, 3) points of the front or back of a head
+    front : index of the coordinate along which the face may look
     """
     row = (points[:, 1] / -_ROW).astype(int)
     across, depth = points[:, 2 - front], np.abs(points[:, front])

@@ -48,8 +48,8 @@ def merge_near_points(
     cell = np.floor(positions / spacing).astype(np.int64)
     cell -= cell.min(axis=0)
     x, y, _ = cell.max(axis=0) + 1
-    number = cell[:, 0] + x * (cell[:, 1] + y * cell[:, 2])
-    _, merged, count = np.unique(number, return_inverse=True, return_counts=True)
+    cell_key = cell[:, 0] + x * (cell[:, 1] + y * cell[:, 2])
+    _, merged, count = np.unique(cell_key, return_inverse=True, return_counts=True)
     sums = [np.bincount(merged.reshape(-1), column) for column in positions.T]
     return np.stack(sums, axis=1) / count[:, None], merged.reshape(-1)[triangles]
 
@@ -164,8 +164,8 @@ def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     """Return the derivatives of the position by u and by v at each vertex, (v, 3) each [mm per unit of uv].
 
-    They are means over the triangles of a vertex, weighted by area, without triangles that have no uv area. A
-    vertex without other triangles gets two orthogonal unit vectors, to avoid divisions by 0.
+    They are means over the triangles of a vertex, weighted by area; triangles without uv area are ignored. A
+    vertex with no other triangles gets two orthogonal unit vectors, to avoid divisions by 0.
 
     positions, normals : (v, 3) [mm], and unit vectors
     uv : (v, 2)
@@ -221,7 +221,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 
 
 def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node of a graph, (n,), numbered in the order of first nodes.
+    """Return the connected component of each node of a graph, (n,), numbered as they first appear.
 
     count : n, number of nodes
     a, b : (l,) nodes at the two ends of each link

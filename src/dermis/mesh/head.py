@@ -86,7 +86,7 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig; for a head without one, a rig with its points only."""
+        """Return the rig; for a head without one, a rig of its points without targets or bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
@@ -101,7 +101,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and derived tables this head uses: its template, else `bare`."""
+        """Return the head whose atlas and tables this head uses: its template if it fits, else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare

@@ -82,7 +82,7 @@ class Mesh(ShortRepr):
 
     @property
     def cut_out(self) -> Mask:
-        """Return the mask (f,) of triangles that are cut out by the opacity of their part."""
+        """Return the mask (f,) of triangles of which an opacity map cuts out parts, such as hair cards."""
         return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
     @property

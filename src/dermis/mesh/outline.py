@@ -21,7 +21,7 @@ from dermis.mesh.skeleton import Skeleton
 
 _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
 _REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
-_CLOSE_MM = 0.5
+_CLOSE_MM = 0.5  # largest distance of points beyond the bounds of the chosen ones at which they are skipped
 _BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
 _RANDOM_POSES, _SEED = 128, 0
@@ -72,7 +72,7 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """Outline points of a rig, s of them stored as columns, with dense morph targets and skin weights.
+    """The s outline points of a rig, stored as columns, with dense morph targets and skin weights.
 
     rest_mm : (4, s) homogeneous points at rest
     delta_mm : (t, 3 s) displacements by each target at weight 1
@@ -116,9 +116,9 @@ def rig_outline(
     if skeleton is None:
         return RigOutline(rest, delta, None, np.zeros(0, np.intp))
     bone, weight = skeleton.bone[points], skeleton.weight[points]
-    bones, number = np.unique(bone, return_inverse=True)
+    bones, row = np.unique(bone, return_inverse=True)
     weights = np.zeros((len(bones), len(points)), np.float32)
-    np.add.at(weights, (number.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
+    np.add.at(weights, (row.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
     return RigOutline(rest, delta, weights, bones.astype(np.intp))
 
 

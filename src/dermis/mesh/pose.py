@@ -45,7 +45,7 @@ class Pose(ShortRepr):
     Raises
     ------
     DermisError
-        If weights or bones are no mappings.
+        If weights or bones are not mappings.
 
     Examples
     --------
@@ -129,9 +129,9 @@ class Pose(ShortRepr):
         )
 
     def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones of the pose, with the bone rotations of active morph targets added to angles.
+        """Return the bones of the pose, rotated in addition by the active morph targets.
 
-        A bone that is given by a matrix is not changed.
+        Bones that are given by a matrix are not changed.
         """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
@@ -166,7 +166,7 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Return a pose completed from a base: weights, bones and positions that `pose` does not set."""
+    """Return a pose with weights, bones and positions of a base wherever `pose` does not set them."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)

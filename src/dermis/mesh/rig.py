@@ -33,7 +33,7 @@ _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
-    """State of a rig as arrays, as the device uses it.
+    """State of a rig as arrays, which are uploaded to the device.
 
     weights : (t,) weights of the targets, relative to the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
@@ -97,8 +97,8 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None to let them intersect
-    template : rig of the same topology whose outline points are reused, in addition to the corners of the
-        convex hull; None to search outline points
+    template : rig of the same topology whose outline points are used, together with the extreme points of
+        this rig; None to search for outline points
     """
 
     positions_mm: Floats
@@ -122,7 +122,7 @@ class Rig(ShortRepr):
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3), given those of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """
@@ -146,7 +146,7 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If the rest positions in `motion` differ from those of the rig, their extreme points are added.
+        If `motion` has other rest positions than the rig, the extreme points of these are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -199,7 +199,11 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return control points of the lid edges, their weights in edge points, and their outline."""
+        """Return the control points that determine the lid edges, and how they do.
+
+        The second result is the weights (e, n) of the n control points in the points of the edges, the third
+        is an outline that poses the control points.
+        """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))

@@ -13,9 +13,9 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.rotations import angles_matrix
 
 INFLUENCES = 4
-"""Number of bones that move a point; of more, those with the largest weights are kept."""
+"""Largest number of bones that move a point; if a file has more, those with the largest weights are kept."""
 _IDENTITY = np.eye(4)
-_MAX_SEQUENTIAL = 12
+_MAX_SEQUENTIAL = 12  # largest number of moving bones that are handled one after the other
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,7 +74,7 @@ class Skeleton(ShortRepr):
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
     def head_space_transforms(self, bones: Sequence[int], local: Doubles) -> Doubles:
-        """Return head-space transforms (n, 4, 4) that give n bones other transforms than at rest [mm].
+        """Return the head-space transforms (n, 4, 4) by which n bones leave their rest pose [mm].
 
         bones : (n,) indices of the bones
         local : (n, 4, 4) new transforms from the space of each bone to its parent's

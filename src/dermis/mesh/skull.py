@@ -137,9 +137,9 @@ class _Section(NamedTuple):
 
 
 def _section(positions: Doubles, cut: Ints, height: float) -> _Section:
-    """Return the section at a height.
+    """Return the section of a mesh with the horizontal plane at a height.
 
-    cut : (n, 3) vertex indices of the triangles that it cuts
+    cut : (n, 3) vertex indices of the triangles that the plane cuts
     """
     if not len(cut):
         return _Section(0, 0.0, 0.0)

@@ -199,7 +199,7 @@ def _old_point_weights(
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
-    """Return uv and point of the old vertices, followed by those of a vertex in the middle of each edge."""
+    """Return uv and point of the old vertices, followed by a new vertex in the middle of each edge."""
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))

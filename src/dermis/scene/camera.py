@@ -19,7 +19,7 @@ from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsic
 
 _DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
 _RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
-_MARGIN = 1.08
+_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
 _UP = (0.0, 1.0, 0.0)
 
 
@@ -227,7 +227,7 @@ def full_body(head: Head) -> Camera:
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m, or three times the size of what it shows.
+        Camera at a distance of 1.1 m or, if that is more, of three times the size of the mesh.
 
     Examples
     --------
@@ -299,7 +299,8 @@ def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
 def _show_all(head: Head, degrees: float) -> Camera:
     """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
     x, _, z = _azimuth_direction(degrees)
-    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes  # to the right, up and back
+    # rows: to the right, up and towards the camera
+    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
     points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))

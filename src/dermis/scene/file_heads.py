@@ -40,7 +40,7 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, which replace those of the mesh file; None keeps the picture of the mesh
+    files : picture files by role, which replace the mesh file's pictures; None keeps the mesh file's picture
     height_mm, normal_y : see `load_maps`
     """
 
@@ -73,8 +73,8 @@ class MapOptions:
 
     def relief_mm(self, files: Mapping[str, Any]) -> float | None:
         """Return the relief of one grey level of the height map [mm]."""
-        own = files.get("height_mm") if self.files["height"] is None else None
-        return own if self.height_mm is None else self.height_mm
+        mesh_relief_mm = files.get("height_mm") if self.files["height"] is None else None
+        return mesh_relief_mm if self.height_mm is None else self.height_mm
 
 
 def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
@@ -112,12 +112,12 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
-    own = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
-    if own["v_origin"] == "auto":
-        own["v_origin"] = sample.v_origin or "auto"
+    sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
+    if sample_options["v_origin"] == "auto":
+        sample_options["v_origin"] = sample.v_origin or "auto"
     with ThreadPoolExecutor(1) as pool:
         pending_maps = pool.submit(options.load, {**files, "height_mm": sample.height_mm})
-        rigged = _load_mesh(files["mesh"], sample.name, own)
+        rigged = _load_mesh(files["mesh"], sample.name, sample_options)
         maps = pending_maps.result()
     check_relief(options.height_mm, maps.height, f"{sample.name}: height_mm")
     credit = f"{sample.attribution}, {sample.licence}"
@@ -133,7 +133,8 @@ def _with_materials(
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
     loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
     roles = [one.name for one in fields(Maps)]
-    maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
+    loaded_maps = {role: one for role in roles if (one := getattr(loaded, role)) is not None}
+    maps = replace(packed, **loaded_maps)
     unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced_roles, pack_skin)
     return mesh, maps, [*notes, *faults, unused]
 
@@ -142,7 +143,7 @@ def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tup
     """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
     if path.suffix.lower() != ".obj" or not material.name:
         return with_factors(options.load(material.skin_pictures()), material, options.user_files), []
-    own, faults = obj_maps(
+    mtl_maps, faults = obj_maps(
         path,
         material.name,
         overridden=options.user_files,
@@ -152,5 +153,5 @@ def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tup
     loaded = options.load({})
     chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in options.user_files}
     return with_factors(
-        replace(own, **chosen_maps), material, {*options.user_files, "normal", "roughness"}
+        replace(mtl_maps, **chosen_maps), material, {*options.user_files, "normal", "roughness"}
     ), faults

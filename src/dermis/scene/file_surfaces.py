@@ -1,4 +1,4 @@
-"""Maps and materials of heads from mesh files, from the pictures of each material."""
+"""Maps and materials of heads from mesh files, made from the pictures of each material."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh with a new uv layout for skin without uv, and a note."""
+    """Return a mesh with a new uv layout for its skin groups without uv, and with a note on them."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -44,8 +44,8 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
     rigged, materials : mesh and materials of a file
     """
     mesh, surface = rigged.mesh, rigged.surface
-    skin = _members(mesh, "skin")
-    used = {index for index, own in zip(surface.in_file, skin, strict=True) if own}
+    skin = _materials_of_kind(mesh, "skin")
+    used = {index for index, is_skin in zip(surface.in_file, skin, strict=True) if is_skin}
     if len(used) != 1:
         return None
     index = used.pop()
@@ -81,7 +81,7 @@ def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]
     return replace(maps, **changed)
 
 
-def _members(mesh: Mesh, kind: str) -> Mask:
+def _materials_of_kind(mesh: Mesh, kind: str) -> Mask:
     """Return the mask (m,) of the mesh's materials of a kind."""
     return np.array([material.kind == kind for material in mesh.materials])
 
@@ -96,14 +96,16 @@ def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
 def with_file_textures(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
 ) -> tuple[Mesh, Maps, tuple[str, ...]]:
-    """Return the mesh with uv in common maps, the maps, and notes on loss of detail.
+    """Pack the pictures of materials; return the mesh with uv in common maps, the maps, and notes.
+
+    The notes are sentences for users about lost detail.
 
     rigged, materials : mesh and materials of a file
     pack_skin : whether the maps of the skin are packed, see `direct_material`
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()
     if pack_skin:
-        packed = pack_textures(mesh, rigged.surface, materials, _members(mesh, "skin"))
+        packed = pack_textures(mesh, rigged.surface, materials, _materials_of_kind(mesh, "skin"))
         mesh, maps = _with_uv(mesh, packed), _skin_maps(packed)
         notes += [f"skin: {note}" for note in packed.notes]
     pictured = _pictured_parts(mesh, rigged.surface, materials)
@@ -136,14 +138,14 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
 
 def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
-    opaque = _members(mesh, "opaque")
+    opaque = _materials_of_kind(mesh, "opaque")
     if any(one.maps is not None for one in materials):  # this package wrote the file; eyes are fitted again
         opaque &= ~np.array([one.eye for one in mesh.materials])
     pictured = np.zeros_like(opaque)
     for index in np.flatnonzero(opaque):
-        own, in_file = np.arange(len(opaque)) == index, surface.in_file[index]
+        selected, in_file = np.arange(len(opaque)) == index, surface.in_file[index]
         has_pictures = in_file >= 0 and bool(materials[in_file].textures) and surface.has_uv[index]
-        pictured[index] = has_pictures or _has_colours(mesh, surface, own)
+        pictured[index] = has_pictures or _has_colours(mesh, surface, selected)
     return pictured
 
 
@@ -212,15 +214,17 @@ def unused_properties(
         return ""
     lines = dict[str, None]()
     for material, index in zip(mesh.materials, in_file, strict=True):
-        own, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
-        unused = list(own.unused)
-        unused += [text for role, text in own.missing.items() if not (is_skin and role in user_roles)]
-        if is_skin and own.maps is None:
-            unused += _replaced_by_skin(own)
+        file_material, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
+        unused = list(file_material.unused)
+        unused += [
+            text for role, text in file_material.missing.items() if not (is_skin and role in user_roles)
+        ]
+        if is_skin and file_material.maps is None:
+            unused += _replaced_by_skin(file_material)
         if not is_skin or is_packed:
-            unused += own.skin_only
+            unused += file_material.skin_only
         if unused:
-            lines[f"{own.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
+            lines[f"{file_material.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
     return "\n  ".join(["not drawn, or replaced by the properties of skin:", *lines]) if lines else ""
 
 

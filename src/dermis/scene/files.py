@@ -69,7 +69,7 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
 
 
 def load_camera(name: str | Path, head: Head) -> Camera:
-    """Return the camera of a preset, placed for the head, or that of the [camera] table in a TOML file."""
+    """Return the camera of a preset, placed for the head, or of the [camera] table in a TOML file."""
     preset = find_preset(str(name))
     if preset is not None:
         return preset(head)
@@ -90,8 +90,8 @@ def load_scene(
     Tables: [head] (`name` of a file or a sample, options of `load_head`, and `regions`, a table for
     `with_regions`), [pose] (`weights` and `bones` by name), [skin] or skin = "deck-2007", [[lights]] or
     lights = "preset", [environment], [camera] or camera = "preset", [render]. Missing keys have their
-    defaults. File names are relative to the folder of the file. A scene with an environment has other lights
-    only if the file names them.
+    defaults. File names are relative to the folder of the file. A scene with an environment has no other
+    lights unless the file names them.
 
     Parameters
     ----------
@@ -100,9 +100,10 @@ def load_scene(
     head : Head, optional
         Head to use instead of loading the head of the file's [head] table.
     camera : str, optional
-        Name of the camera that determines the subdivision levels of the head, instead of the file's camera.
+        Name of the camera for which the subdivision levels of the head are chosen, instead of the file's
+        camera.
     size : (int, int), optional
-        Picture size that determines these levels, instead of the file's size [pixel].
+        Picture size for which these levels are chosen, instead of the file's size [pixel].
 
     Returns
     -------
@@ -137,7 +138,7 @@ def load_scene(
     skin = _parse_skin(path, table.get("skin", {}))
     settings = _build_settings(Settings, path, "render", table.get("render", {}))
     head_entry = _build_settings(HeadTable, path, "head", table.get("head"))
-    _check_single_strength(path, head_entry, skin)
+    _check_rho_s_given_once(path, head_entry, skin)
     entry = table.get("camera", "portrait")
     resolve_camera = partial(_parse_camera, path, entry) if camera is None else partial(load_camera, camera)
     picture = SmoothIn(resolve_camera, size or settings.size)
@@ -213,7 +214,7 @@ def _parse_skin(path: Path, entry: Any) -> Skin:
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
-    """Return the skin with its profile files as paths in a folder."""
+    """Return the skin with the names of its profile files resolved relative to a folder."""
     others = tuple(_resolve_file(folder, name) for name in skin.other_profiles)
     mixture_map = skin.profile_map and _resolve_file(folder, skin.profile_map)
     names = {
@@ -224,7 +225,7 @@ def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
     return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
-def _check_single_strength(path: Path, table: HeadTable, skin: Skin) -> None:
+def _check_rho_s_given_once(path: Path, table: HeadTable, skin: Skin) -> None:
     if has_region_table(vars(table)) and "rho_s" in skin.model_fields_set:
         actual = "it is given beside the head's regions, which set it for each region"
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")

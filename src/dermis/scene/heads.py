@@ -80,12 +80,13 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the unit of the file [mm]; by default 1000 for glTF, and as stated for USD. OBJ, PLY and STL
-        state no unit: 1 if the mesh is then 100 to 1000 mm large, else guessed from the size, with a note.
+        Length of the unit of the file [mm]; by default 1000 for glTF, and what the file states for USD. OBJ,
+        PLY and STL state no unit: it is 1 if the mesh then measures 100 to 1000 mm, else it is guessed from
+        the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
-        Upward axis of the file; by default that stated by USD, else y.
+        Upward axis of the file; by default the axis that USD states, for other formats y.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
         Axis of the file along which the face looks; "auto" uses, in this order: the axis that VRM states, the
         axis indicated by eyes or by the shape of the head (with a note), -y if z is up, as in Blender, and z.
@@ -96,8 +97,7 @@ def load_head(
         own materials. By default skin is recognised by names, or by the groups that cover the head.
     opaque : str or sequence of str
         Groups of the file that are not skin, to correct the automatic choice. Two balls in groups named as
-        eyes
-        become the package's eyes and need not be listed.
+        eyes become the package's eyes and need not be listed.
     eyes : {"fitted", "plain"}
         "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
     eye_groups : str or sequence of str
@@ -144,7 +144,7 @@ def load_head(
     map_files = {"colour": colour, "normal": normal, "height": height}
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
-    levels, relief = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
+    levels, map_options = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
     mesh_options: dict[str, Any] = {
         "unit_mm": unit_mm,
         "v_origin": v_origin,
@@ -159,7 +159,7 @@ def load_head(
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
-    loaded, look = load_file_head(name, mesh_options, relief)
+    loaded, look = load_file_head(name, mesh_options, map_options)
     coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
@@ -210,7 +210,7 @@ def _load_human(
 
     name : "human", "human:SEED", or a person's .json file
     maps : map files that replace painted maps, by role
-    mesh_options : options that apply only to mesh files; DermisError unless they have their defaults
+    mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     levels : subdivision levels, or a function of the head that returns them
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
@@ -228,7 +228,7 @@ def _load_human(
 
 
 def load_person(name: str) -> Human:
-    """Return the person for a head name: the default person, one sampled by seed, or that of a .json file.
+    """Return the person for a head name: the default person, one drawn by seed, or the one in a .json file.
 
     Raises DermisError for an invalid seed or file.
     """

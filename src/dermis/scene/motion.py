@@ -38,10 +38,9 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file, which is that of the head or has nodes or targets of the same names, with "file.glb#clip"
-        for one of several clips; a CSV file of Live Link Face; results of MediaPipe's face landmarker in
-        JSON; or files
-        of one topology: a folder, "face_%05d.obj" or "face_*.ply".
+        A glTF file: the head's own, or one whose nodes or targets have the same names ("file.glb#clip"
+        selects one of several clips); a CSV file of Live Link Face; results of MediaPipe's face landmarker in
+        JSON; or a sequence of mesh files of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head
         Head that moves.
     clip : str, optional
@@ -50,11 +49,12 @@ def load_motion(
         Frame rate of a sequence (by default 30), of a CSV file whose timecode does not imply it, or of
         results without times.
     unit_mm : float, optional
-        Length of the unit of a sequence's files [mm]; by default one that makes them as large as the head.
+        Length of the unit of a sequence's files [mm]; by default the length that makes the meshes as large as
+        the head.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
         Upward axis of a sequence's files; without `up` and `front`, they have the axes of the head's file.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of a sequence's files along which the face looks; with `up`, "auto" is -y with z up, else z.
+        Axis of a sequence's files along which the face looks; with `up` given, "auto" is -y for z up, else z.
 
     Returns
     -------

@@ -29,7 +29,7 @@ def default_skin_colour() -> Doubles:
 
 
 def with_skin_tone(mesh: Mesh, maps: Maps) -> tuple[Maps, str]:
-    """Return maps with the colour of the skin's materials if they have no colour map, and a note or "".
+    """Return maps with a colour, from the skin's materials if there is no colour map, and a note or "".
 
     White and the default grey of Blender's materials are not skin colours; groups with these colours get the
     colour of the default skin. The colour of several groups is averaged.

@@ -26,8 +26,8 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 class Coverage:
     """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of the piece to which it belongs: for a texel of the piece its
-    own point, for a gutter texel a point on the border.
+    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece it is
+    the point that the texel shows, in the gutter a point on the border.
 
     triangle : (h, w) index of the triangle that the texel shows, -1 for none
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
@@ -107,7 +107,9 @@ def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size:
 
 
 def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
-    """Return triangle indices sorted so that triangles mirrored within their piece are overwritten.
+    """Return triangle indices sorted so that triangles mirrored within their piece come first.
+
+    They are then overwritten by the other triangles.
 
     members : (t,) indices of the triangles
     """
@@ -115,7 +117,7 @@ def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
 
 
 def _mirrored_triangles(surface: FlatSurface, piece: Index, members: Index) -> Mask:
-    """Return the mask of triangles whose uv orientation is opposite to that of most of their piece.
+    """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
 
     piece, members : (t,) piece and index of each triangle
     """

@@ -17,7 +17,7 @@ from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_bo
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-_MAX_STRETCH = 2.0  # largest texels per mm at a border over the mean of its piece, for the width of a gutter
+_MAX_STRETCH = 2.0  # largest width of a gutter on the grid, relative to the width at its piece's mean density
 
 
 class Border(NamedTuple):
@@ -139,9 +139,9 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from nearest border points to texels; return their ends, and the weights of the points.
+    """Trace geodesics from nearest border points to texels; return the ends, and the weights of the starts.
 
-    The weights (n, 2) are those of the second and third corner of the border triangle.
+    The weights (n, 2) of a start are those of the second and third corner of the border triangle.
 
     sides : border sides on the texel grid
     nearest : nearest border point of each texel

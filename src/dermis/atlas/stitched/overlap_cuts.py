@@ -152,9 +152,9 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
 
 
 def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
-    """Return the surface points (n, 3) of the texels in `chosen`; those of other texels are NaN [mm].
+    """Return the surface point of each texel of the grid (n, 3), or NaN where it is not computed [mm].
 
-    Texels beyond the end of the surface are NaN too.
+    It is computed for the texels in `chosen`, except for those beyond the end of the surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -206,7 +206,7 @@ def _cut_length_mm(surface: FlatSurface, members: Index, part: Index) -> float:
 
 
 def _cut_piece(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None without cuts.
 
     members : (t,) indices of the piece's triangles
     """
@@ -259,9 +259,9 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(
     surface: FlatSurface, members: Index, overlap: Conflicts, half: Mask, reach: float
 ) -> Mask:
-    """Return the mask (t,) of triangles near meeting gutters, on the side of a line with less such area.
+    """Return the mask (t,) of the triangles near meeting gutters on one side of a line.
 
-    The area is that of the triangles near meeting gutters on each side.
+    It is the side on which these triangles have the smaller area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
@@ -276,7 +276,7 @@ def _conflict_strip(
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts for its length.
+    """Return the line that separates most conflicts per length.
 
     Returns its normal and offset, and the number of conflicts that it separates.
     """

@@ -17,12 +17,12 @@ Span = tuple[int, int, int]
 _MAX_CELLS = 512  # largest number of cells along each side of the square
 _COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTIONS = 8  # number of trials in the search for the scale
-_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest gain of scale by them
+_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
 _ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
-_MASK_RATIO = 0.65  # found scale over the scale of the masks, below which the masks are computed again
-_MASK_EXCESS = 1.15  # scale of the next masks over the found scale
+_MASK_RATIO = 0.65  # masks are computed again if the ratio of the found scale to their scale is smaller
+_MASK_EXCESS = 1.15  # ratio of the scale of the next masks to the found scale
 
 
 def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
@@ -55,7 +55,7 @@ def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
     width = 1 + max(last for _, _, last in spans)
     if max(height, width) > n:
         return 0
-    blocked, ahead = 0, [occupied]  # cells of which one of the next 1, 2, 4, ... in the row is occupied
+    blocked, ahead = 0, [occupied]  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
     for row, first, last in spans:
         length = last - first + 1
         step = length.bit_length() - 1
@@ -78,7 +78,7 @@ class _Piece(NamedTuple):
     surface : triangles of the piece
     uv : (t, 3, 2) uv of the corners, scaled and moved so that the lowest coordinates are 0
     extent : (2,) largest u and v of the scaled uv
-    scale : factor of the mesh's uv
+    scale : factor by which the mesh's uv is scaled
     uv_per_mm : scaled uv per mm on the surface [1/mm]
     border : border of the piece, with triangle indices within the piece
     """
@@ -146,9 +146,9 @@ def pack_pieces(
 
 def _single_piece(surface: FlatSurface, piece: Index, members: Index, scale: float) -> _Piece:
     border = find_border(surface, piece, members)
-    number = np.empty(len(piece), np.int64)
-    number[members] = np.arange(len(members))
-    border = border._replace(triangle=number[border.triangle])
+    index_in_piece = np.empty(len(piece), np.int64)
+    index_in_piece[members] = np.arange(len(members))
+    border = border._replace(triangle=index_in_piece[border.triangle])
     uv, subset = surface.uv[members] * scale, surface.subset(members)
     uv -= uv.min(axis=(0, 1))
     uv_per_mm = scale * float(np.sqrt(np.abs(subset.area_uv).sum() / subset.area_mm2.sum()))

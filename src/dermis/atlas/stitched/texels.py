@@ -70,7 +70,7 @@ class AnchoredTexels(NamedTuple):
 
 
 def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:
-    """Return flat indices of adjacent texels whose triangles share no side in uv, as pairs, (n,) each.
+    """Return the flat indices (n,) of both texels of each adjacent pair whose triangles share no side in uv.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y

@@ -44,6 +44,8 @@ class DetectedEyeball:
 
 @dataclass(frozen=True, eq=False)
 class _EyePiece:
+    """Connected component of the triangles that a file declares to be eyes, with a fitted sphere."""
+
     points: Index
     area: Doubles  # around each point [mm2]
     sphere: Sphere
@@ -54,7 +56,7 @@ class _EyePiece:
 
     @property
     def fault(self) -> str:
-        """Return the reason why this component is not an eyeball, as a verb phrase; empty if it is one."""
+        """Return why this component is not an eyeball, as a phrase such as "is a ..."; empty if it is one."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
@@ -94,11 +96,11 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
     eye_triangles : (n,) indices of the triangles whose material is declared to be an eye
     """
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
-    points, own = np.unique(corners, return_inverse=True)
-    own = own.reshape(-1, 3)
-    label = components(len(points), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
+    points, triangles = np.unique(corners, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    label = components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
     thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[eye_triangles]]) / 3, 3)
-    area = np.bincount(own.ravel(), thirds, minlength=len(points))
+    area = np.bincount(triangles.ravel(), thirds, minlength=len(points))
     positions = mesh.points_mm[points]
     pieces = []
     for piece in range(int(label.max()) + 1):

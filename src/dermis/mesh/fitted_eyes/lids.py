@@ -49,7 +49,7 @@ class Lids:
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return the distances (n,) before the ball's centre at which rays first meet lid or skin [mm].
+        """Return how far in front of the ball's centre rays first meet lids or other skin (n,) [mm].
 
         The distance is -inf for rays that meet none.
         """
