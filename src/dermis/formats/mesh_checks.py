@@ -19,7 +19,7 @@ UV_TOLERANCE = 1e-4
 MAX_DISTANCE_MM = 1e6
 """Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
 MIN_RELATIVE_AREA = 1e-6
-"""Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
+"""Ratio of a triangle's area to its squared longest side below which single precision is too coarse [-]."""
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
