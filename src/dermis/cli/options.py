@@ -25,7 +25,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 
 
 def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return the choice that was typed; other text is accepted too, as plug-ins may register it later."""
+    """Return the choice that was typed; it is checked only now, as plug-ins may have registered more."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field)):
@@ -82,7 +82,7 @@ def model_options(
 
     only, without : names of the fields to include (all by default) and to exclude
     names : option names by field, where they differ from the name of the field
-    defaults : defaults to show in the help instead of those of the model
+    defaults : defaults by field, which the help shows instead of the model's
     """
     from dermis.scene.frozen_model import field_heading
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of null devices in place of closed standard streams
+_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # for null devices that replace closed standard streams
 
 
 class StandardStreams:
@@ -132,7 +132,7 @@ def _reserve_descriptor(number: int, mode: int) -> None:
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
 _RETRY_S = 0.02
-_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # half-imported modules, and callbacks from Rust
+_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal

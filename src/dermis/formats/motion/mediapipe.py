@@ -64,7 +64,8 @@ class _CapturedFrame(NamedTuple):
 
     culprit : file with line or number of the frame, for errors
     number : number of the frame
-    time : time of the frame in units of `unit` [s], or in an unknown unit if that is None; NaN if it has none
+    time : time of the frame, in the unit `unit`; NaN if the frame has none
+    unit : unit of the time [s]; None if it is not stated
     columns, weights : (n,) indices of the blend shapes of the frame, and their weights; empty without a face
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces
@@ -169,7 +170,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
     if not isinstance(record, dict | None):
         refuse(culprit, "an object in JSON", f"got {format_value(record)}", _LINE_ADVICE)
     fields = _plain_fields(record)
-    for value in tuple(fields.values()):  # a result in the record
+    for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
             fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
     shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
@@ -208,7 +209,7 @@ def _first_face(value: object) -> tuple[object, int]:
 
 
 def _is_list_object(value: object) -> bool:
-    """Return whether a value is an object that holds a list: one of categories, or an Optional of Java."""
+    """Return whether a value is an object around the blend shapes: MediaPipe's lists, or a Java Optional."""
     return isinstance(value, dict) and (bool(value.keys() & _LIST_KEYS) or value.keys() == {"value"})
 
 
@@ -263,7 +264,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
 
 
 def _is_row(value: object) -> bool:
-    """Return whether the first entry of a list belongs to a matrix, and is not a matrix itself."""
+    """Return whether the first entry of a list is a row or a number of a matrix, not a whole matrix."""
     is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
     return not is_nested and not isinstance(value, dict)
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 _MM = 1000.0
 _UV_NAMES = ("st", "UVMap", "map1", "st0", "st_0", "uv")
-_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
-_HIDDEN = ("guide", "proxy")  # purposes
-_OWN_MATERIAL_ONLY = "faces of one mesh read different texture coordinates: those of the first are used"
+_TYPES_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
+_HIDDEN_PURPOSES = ("guide", "proxy")
+_SEVERAL_UV_NOTE = "faces of one mesh read different texture coordinates: those of the first are used"
 
 
 class _Primvar(NamedTuple):
@@ -83,7 +83,7 @@ class _SceneReader:
         self.vertices = self.triangles = 0
 
     def read(self) -> Arrays:
-        """Return the arrays of all meshes, named by their number, and "scene", a JSON text."""
+        """Return the arrays of all meshes, whose names begin with the mesh's number, and the JSON "scene"."""
         meshes, unread = list[Tree](), Counter[str]()
         for count, prim in enumerate(self._prims()):
             limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
@@ -91,7 +91,7 @@ class _SceneReader:
                 if self._is_visible(prim):
                     limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
                     meshes.append(self._mesh(self.geom.Mesh(prim), str(len(meshes))))
-            elif prim.GetTypeName() not in _WITHOUT_NOTE:
+            elif prim.GetTypeName() not in _TYPES_WITHOUT_NOTE:
                 unread[str(prim.GetTypeName())] += 1
         if unread:
             names = ", ".join(f"{name} ({count})" for name, count in unread.most_common(8))
@@ -119,8 +119,9 @@ class _SceneReader:
         return unit_mm
 
     def _is_visible(self, prim: Usd.Prim) -> bool:
-        own = self.geom.Imageable(prim)
-        return own.ComputePurpose() not in _HIDDEN and own.ComputeVisibility(self.time) != "invisible"
+        shown = self.geom.Imageable(prim)
+        is_hidden = shown.ComputePurpose() in _HIDDEN_PURPOSES
+        return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
     def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
         """Add the arrays of a mesh to the answer, and return its names and materials."""
@@ -138,7 +139,7 @@ class _SceneReader:
             if primvar is not None:
                 arrays |= {name: primvar.values, f"{name} index": primvar.corner_index[order]}
         if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
-            arrays["normals"] = _unit(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
+            arrays["normals"] = _normalised(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
             arrays["colours"] = colours
         self.arrays |= {f"{number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -162,14 +163,14 @@ class _SceneReader:
         return points, _Faces(counts, np.cumsum(counts) - counts, vertex)
 
     def _corner_order(self, mesh: UsdGeom.Mesh, faces: _Faces, matrix: Doubles) -> Index:
-        """Return the order of corners (c,) in which polygons are anticlockwise from outside."""
+        """Return the order of corners (c,) in which polygons are anticlockwise when seen from outside."""
         is_left = mesh.GetOrientationAttr().Get(self.time) == "leftHanded"
         if is_left != bool(np.linalg.det(matrix[:3, :3]) < 0):
             return faces.reversed_corners()
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
-        """Return the materials of a mesh, -1 for none, and the index of each of `count` faces in this list.
+        """Return the list of a mesh's materials, -1 for none, and each face's index in this list (count,).
 
         Faces that are holes have the index -1.
         """
@@ -201,10 +202,10 @@ class _SceneReader:
         return self.material_index[key]
 
     def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv coordinates that the mesh's materials use, or by default those with a common name."""
+        """Return the uv that the mesh's materials name, else uv with a usual name; None without any."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
-            self.notes[_OWN_MATERIAL_ONLY] = None
+            self.notes[_SEVERAL_UV_NOTE] = None
         primvars = self.geom.PrimvarsAPI(prim)
         typed = [one for one in primvars.GetPrimvars() if "texCoord2" in str(one.GetTypeName())]
         names = (*named, *_UV_NAMES, *(str(one.GetPrimvarName()) for one in typed))
@@ -244,7 +245,7 @@ class _SceneReader:
     def _colours(
         self, prim: Usd.Prim, faces: _Faces, materials: list[int], count: int
     ) -> tuple[list[float] | None, Doubles | None]:
-        """Return the colour of a whole mesh, or the linear colours (count, 3) of its vertices."""
+        """Return one colour for a whole mesh, or linear colours (count, 3) of its vertices, or neither."""
         named = [one for k in materials if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
         if not named and any(k >= 0 for k in materials):
             return None, None
@@ -260,7 +261,7 @@ class _SceneReader:
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 
-def _unit(vectors: Doubles) -> Doubles:
+def _normalised(vectors: Doubles) -> Doubles:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 

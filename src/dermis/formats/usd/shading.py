@@ -60,7 +60,7 @@ _BLACK = (0.0, 0.0, 0.0)
 
 
 class _Source(NamedTuple):
-    """Output of a shader that an input is connected to."""
+    """Output of a shader to which an input is connected."""
 
     shader: UsdShade.Shader
     output: str
@@ -95,7 +95,7 @@ class MaterialReader:
                 self._add_source(tree, name, role, source)
         self._add_opacity(tree, surface, values)
         self._list_unused_inputs(tree, surface)
-        return _as_unlit(tree)
+        return _emission_to_colour(tree)
 
     def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
         """Add the texture or the vertex colours to which an input is connected."""
@@ -181,13 +181,13 @@ class MaterialReader:
         return ""
 
     def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
-        """Return the attributes that provide an input's value, resolved through material interfaces."""
+        """Return the attributes from which an input gets its value, found through its connections."""
         entry = shader.GetInput(name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
     def _source(self, shader: UsdShade.Shader, name: str) -> _Source | None:
-        """Return the output of a shader that an input is connected to, or None."""
+        """Return the output to which an input of a shader is connected, or None."""
         for attribute in self._attributes(shader, name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
@@ -210,8 +210,8 @@ class MaterialReader:
         return str(next((value for value in values if value is not None), ""))
 
 
-def _as_unlit(tree: Tree) -> Tree:
-    """Return a material in which the emission of an unlit scan becomes the surface colour."""
+def _emission_to_colour(tree: Tree) -> Tree:
+    """Return a material; a picture of emission over a black colour, as in unlit scans, becomes the colour."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]
