@@ -118,7 +118,7 @@ def animate(
         Print one JSON object with the number of frames and the timings.
     """
     if names:
-        return _list_names(head, scene, as_json)
+        return _print_names(head, scene, as_json)
     started = time.perf_counter()
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check(scene.settings.get("size", (2, 2)))
@@ -215,7 +215,7 @@ def _summary_line(report: Options) -> str:
     return f"{report['file']}  {frames}{reused} at {report['fps']:g}/s  {report['seconds']:.1f} s{device}"
 
 
-def _list_names(name: str, options: SceneOptions, as_json: bool) -> int:
+def _print_names(name: str, options: SceneOptions, as_json: bool) -> int:
     with spinner("loading"):
         names = animatable_names(name, assemble_scene(name, options)[0].head)
     lines = (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())

@@ -248,7 +248,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     try:
         values = parse_numbers(rows.text, len(words), np.float64)
     except ValueError:
-        _refuse_line(path, rows, _first_fault(rows, np.float64), expected)
+        _refuse_line(path, rows, _first_non_numeric(rows, np.float64), expected)
     column = np.arange(_USED_NUMBERS)
     table = np.full((len(counts), _USED_NUMBERS), np.nan)
     given = column < counts[:, None]
@@ -256,7 +256,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     return table, counts
 
 
-def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
+def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
@@ -283,7 +283,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
     try:
         values = parse_numbers(spaced.text, len(index_start), np.int64)
     except ValueError:
-        _refuse_line(path, faces, _first_fault(spaced, np.int64), "faces by whole numbers")
+        _refuse_line(path, faces, _first_non_numeric(spaced, np.int64), "faces by whole numbers")
     refuse_at(values == 0, index_start, "faces by indices from 1", "there is a 0")
     corner = np.searchsorted(corner_start, index_start, side="right") - 1
     slashes = np.cumsum(slash, dtype=np.int32)

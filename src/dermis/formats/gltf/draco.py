@@ -66,12 +66,12 @@ def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _ADVICE)
 
 
-def _store(document: Document, primitive: _Primitive, answer: Arrays, name: str) -> None:
+def _store(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
     tree, compressed = primitive
     for attribute, identifier in compressed["attributes"].items():
-        _replace(document, tree["attributes"][attribute], answer[f"{name}/{identifier}"], attribute)
+        _replace(document, tree["attributes"][attribute], answer[f"{mesh_name}/{identifier}"], attribute)
     if "indices" in tree:
-        triangles = answer[f"{name}/triangles"]
+        triangles = answer[f"{mesh_name}/triangles"]
         _replace(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
         tree["mode"] = _TRIANGLES
 

@@ -136,17 +136,19 @@ def read_influences(
     return SkinInfluences(bone[joint], weight), np.asarray(matrices)
 
 
-def _check_weights(document: Document, name: str, joint: Index, weight: Doubles, count: int) -> None:
+def _check_weights(
+    document: Document, node_name: str, joint: Index, weight: Doubles, joint_count: int
+) -> None:
     if joint.shape != weight.shape:
-        actual = f"{name!r} has {joint.shape} of joints and {weight.shape} of weights"
+        actual = f"{node_name!r} has {joint.shape} of joints and {weight.shape} of weights"
         refuse(document.path, "as many joints as weights", actual, DAMAGED_ADVICE)
     invalid = np.flatnonzero(~(np.isfinite(weight) & (weight >= 0)).all(axis=1))
     if len(invalid):
-        actual = f"those of {name!r} are invalid at {len(invalid)} vertices, first {invalid[0]}"
+        actual = f"those of {node_name!r} are invalid at {len(invalid)} vertices, first {invalid[0]}"
         refuse(document.path, "skin weights of 0 and more", actual, DAMAGED_ADVICE)
-    if joint[weight > 0].max(initial=0) >= count:
-        actual = f"{name!r} names joint {joint[weight > 0].max()}"
-        refuse(document.path, f"joints of a skin from 0 to {count - 1}", actual, DAMAGED_ADVICE)
+    if joint[weight > 0].max(initial=0) >= joint_count:
+        actual = f"{node_name!r} names joint {joint[weight > 0].max()}"
+        refuse(document.path, f"joints of a skin from 0 to {joint_count - 1}", actual, DAMAGED_ADVICE)
 
 
 def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:

@@ -125,7 +125,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None to assume the largest in which frames are at most 2 s apart, and note it
+    unit : unit of the times [s]; None to assume, with a note, the largest in which frames are at most 2 s
+        apart
     """
     if unit is None:
         steps = np.diff(times)

@@ -123,7 +123,7 @@ class _SceneReader:
         is_hidden = shown.ComputePurpose() in _HIDDEN_PURPOSES
         return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
-    def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
+    def _mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
         """Add the arrays of a mesh to the answer, and return its names and materials."""
         prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._geometry(mesh)
@@ -142,7 +142,9 @@ class _SceneReader:
             arrays["normals"] = _normalised(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
             arrays["colours"] = colours
-        self.arrays |= {f"{number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()}
+        self.arrays |= {
+            f"{mesh_number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()
+        }
         return {"name": prim.GetName(), "materials": materials, "colour": colour}
 
     def _geometry(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
@@ -186,10 +188,10 @@ class _SceneReader:
         group[holes] = -1
         return materials, group
 
-    def _check_face_indices(self, faces: Index, count: int, name: object) -> None:
-        if len(faces) and (faces.min() < 0 or faces.max() >= count):
-            actual = f"{name} has some from {faces.min()} to {faces.max()}"
-            refuse(self.path, f"indices of faces from 0 to {count - 1}", actual, limits.DAMAGED_ADVICE)
+    def _check_face_indices(self, faces: Index, face_count: int, prim_path: object) -> None:
+        if len(faces) and (faces.min() < 0 or faces.max() >= face_count):
+            actual = f"{prim_path} has some from {faces.min()} to {faces.max()}"
+            refuse(self.path, f"indices of faces from 0 to {face_count - 1}", actual, limits.DAMAGED_ADVICE)
 
     def _material(self, binding: UsdShade.MaterialBindingAPI) -> int:
         material = binding.ComputeBoundMaterial()[0]
@@ -224,9 +226,9 @@ class _SceneReader:
             element = np.array(primvar.GetIndices(self.time), np.int64)[element]
         return self._checked_primvar(values.reshape(-1, width), element, primvar.GetAttr().GetPath())
 
-    def _checked_primvar(self, values: Doubles, element: Index | None, name: object) -> _Primvar:
+    def _checked_primvar(self, values: Doubles, element: Index | None, attribute_path: object) -> _Primvar:
         if element is None or (len(element) and (element.min() < 0 or element.max() >= len(values))):
-            actual = f"{name} has other numbers of values"
+            actual = f"{attribute_path} has other numbers of values"
             refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
         return _Primvar(values, element)
 

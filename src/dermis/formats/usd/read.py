@@ -62,7 +62,8 @@ USD_PROPERTIES = (
 def read_usd(path: Path) -> MeshFile:
     """Read the meshes of a USD file at its first time, with their materials.
 
-    Raises DermisError if the package usd-core is missing, for damaged files and for layers outside the folder.
+    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder of
+    the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
@@ -144,7 +145,7 @@ class _Pictures:
         """
         textures, missing = dict[Role, Texture](), dict[str, str]()
         for role, one in tree["textures"].items():
-            picture = self._find(one["file"])
+            picture = self._find_picture(one["file"])
             if picture is None:
                 missing[role] = f"its picture {one['file']!r} is not in the {self._picture_location()}"
             else:
@@ -160,7 +161,7 @@ class _Pictures:
     def _picture_location(self) -> str:
         return "folder of the file" if self.package is None else "package"
 
-    def _find(self, name: str) -> PathLike | None:
+    def _find_picture(self, name: str) -> PathLike | None:
         """Return the picture with a name relative to the layers, or None."""
         if self.package is None:
             return find_referenced_file(self.path, name) if name else None
