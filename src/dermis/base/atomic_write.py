@@ -84,7 +84,7 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(target: Path) -> Iterator[Path]:
-    """Yield a new empty folder next to `target`, which is deleted with its files at the end of the block.
+    """Yield a new empty folder next to `target`; it is deleted with its content at the end of the block.
 
     Raises DermisError when the folder cannot be created, or when writing into it fails.
     """

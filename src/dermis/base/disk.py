@@ -41,7 +41,7 @@ _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
-    """Return the array that `make` computes from `sources`, from the disk cache if it is there.
+    """Return the array that `make` computes from `sources`; if the disk cache has it, it is read from there.
 
     parameters : text with everything else that the result depends on, part of the key
     """
@@ -51,7 +51,7 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callab
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `make` computes from `sources`, from the disk cache if they are there.
+    """Return the arrays that `make` computes from `sources`; if the disk cache has them, they are read there.
 
     parameters : text with everything else that the result depends on, part of the key
     names : names of the arrays in the result

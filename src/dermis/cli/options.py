@@ -77,8 +77,8 @@ def model_options(
 ) -> Any:
     """Return a parameter type for cyclopts that has one option per field of a settings model.
 
-    Type, choices, bounds and help of each option are those of the field; fields that hold other models have
-    no option. The parameter's value is a dictionary of the given options by field name.
+    Each option has the type, choices, bounds and help of its field; fields that hold other models have no
+    option. The parameter's value is a dictionary of the given options by field name.
 
     only, without : names of the fields to include (all by default) and to exclude
     names : option names by field, where they differ from the name of the field

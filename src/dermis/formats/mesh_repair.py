@@ -178,7 +178,7 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
 
 
 def _duplicate_materials(key: Index, material: Ints, is_skin: Mask) -> Mask:
-    """Return the mask (m,) of materials with exactly the same triangles as another one, which is kept.
+    """Return the mask (m,) of materials that have exactly the triangles of another material, which is kept.
 
     key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
     """

@@ -199,7 +199,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
 
 
 def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
-    """Return the file name of a texture's picture; for a sequence of UDIM tiles, that of the given tile."""
+    """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
     return _UDIM.sub(str(udim), texture.name)
 
 
@@ -248,7 +248,7 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts, whose first name is that of the material if it has one
+    parts : mesh parts; the first name of a part's group is the name of its material, if that has one
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]

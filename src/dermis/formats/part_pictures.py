@@ -56,7 +56,7 @@ class PartPictures:
         return {role for role, used in needed.items() if used} if material.has_maps else set()
 
     def encode(self, roles: Iterable[PartRole]) -> dict[PartRole, bytes]:
-        """Return 8-bit PNG files by role, for those of the given roles that any part needs."""
+        """Return 8-bit PNG files by role; roles that no part needs are left out."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
         used = set[PartRole]().union(*map(self.roles, parts))
         levels = {role: _LEVELS[role](self.maps) for role in roles if role in used}

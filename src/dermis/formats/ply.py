@@ -424,7 +424,7 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
 
 
 def _strip_triangles(strips: _List) -> Index:
-    """Return the triangles (t, 3) of strips, which -1 separates; every second triangle is reversed."""
+    """Return the triangles (t, 3) of strips that are separated by -1; every second triangle is reversed."""
     index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1

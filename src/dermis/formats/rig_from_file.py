@@ -17,7 +17,7 @@ SPLIT_TOLERANCE_MM = 0.01
 points."""
 _MAX_COINCIDENT = 64  # vertices at one position that move differently
 _WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
-_MIN_DISPLACEMENT_MM = 1e-4  # rounding errors of vertices that do not move
+_MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
 def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:

@@ -57,7 +57,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely unit of a mesh whose file states none [mm].
 
-    It is the millimetre if the mesh is then 100 to 1000 mm large and no standing figure. Otherwise it is the
+    It is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Else it is the
     unit of `UNITS_MM` for which the size is closest to that of an adult or a head, or of a hand if the mesh
     is flat or slender.
 

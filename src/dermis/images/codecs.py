@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
 _PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
-_UP_FILTER = 2  # number of PNG's filter that stores differences from the row above
+_UP_FILTER = 2  # PNG's code of the filter that stores differences from the row above
 
 _STRIP_PIXELS = 1 << 20  # pixels converted at a time
 _CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}  # by FFmpeg's pixel format

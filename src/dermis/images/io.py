@@ -74,7 +74,7 @@ class EmbeddedPicture:
     data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name, which replaces a path in error messages."""
+        """Return the name, which error messages show where they show the path of other pictures."""
         return self.name
 
 

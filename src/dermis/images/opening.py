@@ -86,7 +86,7 @@ _GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
 _EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
 _ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
 _TIFF_SUBFILE, _TIFF_DNG_VERSION, _CANON_RAW = 254, 50706, b"CR"
-_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # as PNG files state it
+_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state sRGB
 
 
 def picture_format(data: bytes) -> str | None:
@@ -263,7 +263,7 @@ def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
 
 
 def _is_adobe_rgb(exif: Exif) -> bool:
-    """Return whether a camera states Adobe RGB in EXIF, which most cameras do without a profile."""
+    """Return whether EXIF states Adobe RGB; most cameras state it there without embedding a profile."""
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (

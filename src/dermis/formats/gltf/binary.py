@@ -19,12 +19,12 @@ CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT"
 """Sampler with mip levels and without repetition."""
 _COMPONENT_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_MAX_SHORT_COUNT = 65535  # the value 65535 itself means primitive restart
+_MAX_SHORT_COUNT = 65535  # most vertices with 16-bit indices, of which 65535 means primitive restart
 
 
 @dataclass
 class BufferBuilder:
-    """Binary buffer of an exported glTF file, which grows, with its buffer views and accessors."""
+    """Binary buffer of a glTF file to export, with its buffer views and accessors; data are appended to it."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)

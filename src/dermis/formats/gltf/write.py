@@ -99,7 +99,7 @@ def _primitive_sources(
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
     """Return the geometry of each glTF primitive and the material of each, in the same order.
 
-    pictures : PNG files by name; those of eyes, hairs and parts that are not skin are added
+    pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     roles : entries of the extras of skin, see `skin_pictures`
     """
     head = points.head

@@ -243,7 +243,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
     Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
     ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    necks the other half; a skeleton with only one of them applies all of it there.
+    necks the other half; without neck bones or without a head bone, the other gets all of it.
     """
     if skeleton is None:
         return RotationBones({}, {})

@@ -81,7 +81,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
 
-    Raises DermisError for a file with other columns or invalid lines, which it names.
+    Raises DermisError for a file with other columns and for invalid lines; the message names the line.
     """
     table = _read_table(path, fps)
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in table.names])

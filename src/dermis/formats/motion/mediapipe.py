@@ -90,9 +90,9 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
     first face is used. Frames without a face are interpolated. Assumptions are noted.
 
-    fps : frame rate if the frames have no time; by default that of the file, or 30
+    fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
-    Raises DermisError for a file without a face, and for invalid frames, which it names.
+    Raises DermisError for a file without a face, and for invalid frames; the message names the frame.
     """
     rate, records = _read_records(path)
     columns: dict[str, int] = {}
@@ -196,7 +196,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
 def _first_face(value: object) -> tuple[object, int]:
     """Return the blend shapes of the first face, None for no face, and the number of faces.
 
-    value : blend shapes of a face, an object with a list of them, or a list of either
+    value : blend shapes of one face, an object around their list, or a list of such values, one for each face
     """
     faces = 1
     while True:

@@ -209,7 +209,7 @@ def _frame_sort_key(file: Path) -> tuple[int, str]:
 
 
 class FrameVertices(NamedTuple):
-    """Vertices of one mesh file, without those that no triangle uses.
+    """Vertices of one mesh file that its triangles use.
 
     positions_mm : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
@@ -238,8 +238,8 @@ class _ObjPattern(NamedTuple):
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    If an OBJ file differs from the first one only in positions, only these are parsed, which is 20 times as
-    fast.
+    If an OBJ file differs from the first one only in positions, only its positions are parsed, which is 20
+    times as fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
     to_head : (3, 3) rotation from the axes of the files to those of the head
