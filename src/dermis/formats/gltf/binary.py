@@ -24,7 +24,7 @@ _MAX_SHORT_COUNT = 65535  # most vertices with 16-bit indices, of which 65535 me
 
 @dataclass
 class BufferBuilder:
-    """Binary buffer of a glTF file to export, with its buffer views and accessors; data are appended to it."""
+    """Binary buffer of an exported glTF file that grows, with its buffer views and accessors."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
