@@ -11,7 +11,7 @@ from egg import BUMPY, CLOTH, SKIN
 from property_rows import load_quietly, loaded, names_of, row_named, treatment
 
 from dermis.base.file_properties import keys_of
-from dermis.formats.obj_materials import MTL_PROPERTIES, NUMBERS, TEXTURE_ROLES
+from dermis.formats.obj_materials import MTL_PROPERTIES, NUMERIC_STATEMENTS, TEXTURE_ROLES
 from dermis.images.io import write_png
 from dermis.mesh.primitives import uv_sphere
 
@@ -104,7 +104,7 @@ def test_each_statement_is_treated_as_declared(which: str, change: Change, tmp_p
 
 def test_all_table_rows_are_exercised_and_all_read_statements_have_a_row() -> None:
     assert {row_named(MTL_PROPERTIES, one.row).name for one in CHANGES} == names_of(MTL_PROPERTIES)
-    assert {key.lower() for key in keys_of(MTL_PROPERTIES)} >= {*NUMBERS, *TEXTURE_ROLES}
+    assert {key.lower() for key in keys_of(MTL_PROPERTIES)} >= {*NUMERIC_STATEMENTS, *TEXTURE_ROLES}
 
 
 def test_face_and_shirt_have_separate_pictures(tmp_path: Path) -> None:

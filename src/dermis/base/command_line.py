@@ -1,4 +1,4 @@
-"""Framework of the command-line programs: a function per command, one-line errors with exit status 2."""
+"""Framework of command-line programs: a command is a function; an error is one line, with exit status 2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Declarations of file properties and their treatment by the readers, from which docs/formats.md is built."""
+"""Declarations of file properties and what the readers do with them; docs/formats.md is built from these."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 
 @dataclass(frozen=True)
 class FileProperty:
-    """Property of a file and its treatment.
+    """Property of a file, and what the reader does with it.
 
-    treatment : "drawn" if it changes the scene as the file states; "noted" if it does not and a note names
-        it; "no effect" if it does not and there is no note
+    treatment : "drawn" if the scene follows the property; "noted" if the property is ignored and a note says
+        so; "no effect" if it is ignored without a note; "refused" if it raises an error
     name : property as the documentation shows it, in Markdown
     detail : how it is drawn, or why it is not, in Markdown
-    keys : words by which the reader recognises it, such as statements or extensions
-    other_parts : treatment in materials of parts that are not skin, if it differs from that of skin
+    keys : words by which the reader recognises the property, such as statements or extensions
+    other_parts : treatment in materials of parts that are not skin; None if it is the same as for skin
     """
 
     treatment: Treatment
@@ -29,9 +29,9 @@ class FileProperty:
     other_parts: Treatment | None = None
 
     def cells(self, is_material: bool) -> list[str]:
-        """Return the cells of its row in the documentation.
+        """Return the cells of this property's row in the documentation.
 
-        is_material : whether there are two columns of treatments, that of skin and that of other parts
+        is_material : whether the table has separate columns for the treatment in skin and in other parts
         """
         others = [self.other_parts or self.treatment] if is_material else []
         return [self.name, self.treatment, *others, self.detail]
@@ -40,7 +40,7 @@ class FileProperty:
 def _property(
     treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
 ) -> FileProperty:
-    """Return a property; `drawn`, `noted` and so on call this function with their treatment."""
+    """Return a property; `drawn`, `noted` and so on are this function with a fixed treatment."""
     return FileProperty(treatment, name, detail, keys, other_parts)
 
 
@@ -53,8 +53,8 @@ no_effect = partial(_property, "no effect")
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
     """Return the keys of the properties with one of the given treatments; by default of all properties."""
-    chosen = (one for one in properties if not treatments or one.treatment in treatments)
-    return tuple(dict.fromkeys(key for one in chosen for key in one.keys))
+    chosen = (item for item in properties if not treatments or item.treatment in treatments)
+    return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 
 
 def in_code(keys: Iterable[str]) -> str:

@@ -22,8 +22,8 @@ from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
 _CPU_S, _SMALL_BYTES = 8.0, 64 << 20
-"""CPU time limit of files up to this size, above which it is proportional to the size [s, bytes]."""
-_MAX_WAIT = 3.0  # elapsed time relative to the CPU time, on a busy machine
+"""Limit of CPU time [s] for files of up to `_SMALL_BYTES`; for larger files it grows with their size."""
+_MAX_WAIT = 3.0  # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
 _MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
 _ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
 _REFUSED, _FAILED = "refused", "failed"
@@ -37,7 +37,7 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
     """Run a decoder in a separate process and return its answer.
 
     module : module of the decoder, which runs in an empty temporary folder
-    request : arrays by name, of numbers
+    request : numeric arrays by name
     size : size of the data to decode, which determines the time limit [bytes]
     culprit, expected : the file, and what it should be, for errors
 
@@ -73,9 +73,10 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
 
 
 def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
-    """Answer the request on standard input on standard output; the main function of a decoder.
+    """Read a request from standard input, and write its answer to standard output; main function of decoders.
 
-    decode : raises DermisError to refuse the data; other exceptions mean that the data are damaged
+    decode : function that returns the answer; it raises DermisError to refuse the data, and any other
+        exception if the data are damaged
     """
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries print messages

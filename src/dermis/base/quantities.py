@@ -1,4 +1,4 @@
-"""Checks that numbers of callers and files are finite and in a range; conversion to Python types."""
+"""Checks that numbers from callers or files are finite and in a range, and conversion to Python types."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Safe reading of files that users name, and of files that those refer to.
+"""Safe reading of files that users name, and of files to which these refer.
 
 Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
 the file.
@@ -51,7 +51,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
                 max_bytes, max(size, _MIN_READ_BYTES)
             )  # system files such as /proc report a size of 0
             data = file.read(limit + 1) if size <= max_bytes else b""
-    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; not a name
+    except (OSError, ValueError, TypeError) as fault:  # ValueError: a NUL in the name; TypeError: no name
         refuse(culprit, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")

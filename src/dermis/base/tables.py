@@ -41,7 +41,7 @@ def column_separator(line: str) -> str:
 
 @lru_cache(4096)
 def plain_key(key: str) -> str:
-    """Return a key or column name without case and punctuation: timestamp_ms and timestampMs are one."""
+    """Return a key or column name in lower case without punctuation: timestampms for timestamp_ms."""
     return re.sub(r"[\W_]", "", key).casefold()
 
 

@@ -56,7 +56,7 @@ if not TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """Scene options from the command line; field values of settings models are dictionaries by field name."""
+    """Options of a scene on the command line; the options of a model are a dictionary by field name."""
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Axes of files: which of them points up, and along which the face looks.
+"""Coordinate axes of files: the axis that points up, and the axis along which the face looks.
 
 NumPy is imported on first use, so that help texts appear quickly.
 """
@@ -38,9 +38,11 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, chosen by a user, completed by the axes that a file states.
+        """Return these axes, chosen by the user, with those that are not set taken from the file.
 
-        The front that the file states is used only if the up axis is that of the file.
+        stated : axes that the file states
+
+        The file's front is used only if the resulting up axis is the file's as well.
         """
         chosen = self._replace(up=self.up or stated.up)
         same = chosen.front == "auto" and chosen.top == stated.top
@@ -51,7 +53,7 @@ DEFAULT_AXES = Axes()
 
 
 def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
-    """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""
+    """Rotate vectors (v, 3) of a file so that the file's up axis becomes +Y and its front becomes +Z."""
     import numpy as np
 
     if (axes.top, axes.face) == ("y", "z"):
@@ -64,7 +66,11 @@ def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
 
 
 def file_axis(direction: Axis, axes: Axes) -> Axis:
-    """Return the axis of a file that points along an axis of the head, after `to_y_up`."""
+    """Return the axis of a file that `to_y_up` rotates to an axis of the head.
+
+    direction : axis of the head
+    axes : axes of the file
+    """
     import numpy as np
 
     index, sign = _split(direction)

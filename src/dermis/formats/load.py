@@ -74,7 +74,7 @@ def load_rigged(
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
-    """Load mesh and rig of a file of one of `MESH_FORMATS`, in millimetres, with Y up and v down.
+    """Load the mesh and the rig of a file in one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
     `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; others are opaque.
     The mesh is checked by `check_mesh`; its size is not checked.
@@ -155,9 +155,9 @@ def _load_uncached(
 
 
 def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
-    """Return the axes that a user chooses, or those that the file states.
+    """Return the axes that the user chose, with those that are not set taken from the file.
 
-    Raises DermisError for a chosen front along the up axis of the file.
+    Raises DermisError if the front is parallel to the up axis.
     """
     axes = chosen.or_stated(stated)
     if axes.face[-1] == axes.top[-1]:
@@ -167,9 +167,9 @@ def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
 
 
 def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
-    """Return axes with the front detected from the shape, and a note if it is not the default one.
+    """Detect the front from the shape; return the axes with it, and a note if it is not the default front.
 
-    A front that the file states is not changed, nor that of files that this package wrote.
+    A front that is already set is kept, and so is the default front of files that this package wrote.
 
     part : mesh part with all vertices of the file
     skin : (f,) mask of triangles that are skin
@@ -263,7 +263,7 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
 def _without_empty(
     mesh: RawMesh, assigned: _AssignedMaterials
 ) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
-    """Return the mesh and its materials without materials that have no triangles left, and a note."""
+    """Remove the materials that have no triangles left; return mesh, materials and a note if any were."""
     kept = np.bincount(mesh.material, minlength=len(assigned.materials)) > 0
     if kept.all() or not kept[assigned.skin].any():
         return mesh, assigned, ()
@@ -280,7 +280,7 @@ def _without_empty(
 def _match_groups(
     groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
 ) -> list[bool]:
-    """Return whether each group's name is in `names`; refuse names that no group has.
+    """Return for each group whether one of its names is in `names`; refuse names that no group has.
 
     option : argument of `load_rigged` with these names, for the error
     """
@@ -302,12 +302,12 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """Surface data of a mesh file that its pictures need in addition to the mesh.
+    """Data of a mesh file that are needed, besides the mesh, to apply the file's materials and pictures.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
     has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : (v, 2) further uv coordinates by their index in the file
+    other_uv : additional uv sets (v, 2), by their index in the file
     """
 
     in_file: tuple[int, ...] = ()
@@ -322,7 +322,7 @@ class RiggedMesh(NamedTuple):
     notes : sentences for users on content that was repaired, replaced or left out
     materials : materials of the file, which `surface` indexes; empty if the mesh is from the disk cache
     unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
-    file_vertices : index of the file's vertex at each point of the mesh
+    file_vertices : relation between the points of the mesh and the vertices of the file
     """
 
     mesh: Mesh

@@ -30,7 +30,7 @@ PathLike = str | Path | EmbeddedPicture
 A = TypeVar("A", bound=Numbers)
 
 MAX_SIDE = 8192
-"""Largest number of texels along a side, which every device supports."""
+"""Largest number of texels along a side of a map; every device supports textures of this size."""
 _GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 MapLoader = Callable[[PathLike], Numbers]
@@ -218,7 +218,7 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any bit depth [mm]
+    height_mm : height difference of 1/255 of the full scale, one grey level of an 8-bit map [mm]
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels
     normal_y : "up" if green points to row 0 (OpenGL, Blender), "down" if away from it (DirectX)

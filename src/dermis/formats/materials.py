@@ -32,7 +32,7 @@ class Texture:
     uv_set : index of the uv coordinates of the vertices
     transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
     wrap : continuation beyond the picture along u and v
-    channel : channel of a scalar in a colour picture; None for the first channel of a grey picture
+    channel : index of the picture's channel that is used; None for colours, normals and grey pictures
     """
 
     picture: PathLike
@@ -54,7 +54,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class FileMaterial:
-    """Material of a mesh file, as glTF's metallic-roughness model states it.
+    """Material of a mesh file, described by the parameters of glTF's metallic-roughness model.
 
     name : name of the material, empty for none
     textures : pictures by role; factors multiply them
@@ -64,7 +64,7 @@ class FileMaterial:
     emission, normal_scale : emissiveFactor and normalTexture.scale of glTF
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
-    skin_only : properties that only the maps of skin have
+    skin_only : properties that are drawn on skin only; for other parts, a note lists them
     missing : sentences on missing pictures, by role
     unused : properties that have no effect here, for the note
     """
@@ -96,14 +96,14 @@ class FileMaterial:
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` for skin that has the uv of its pictures."""
+        """Return keyword arguments of `load_maps` for skin whose uv are those of its pictures."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}
 
 
 def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
-    """Refuse materials whose pictures have too many texels together.
+    """Refuse materials whose pictures have too many texels in total.
 
     path : path of the file, for error messages
     """

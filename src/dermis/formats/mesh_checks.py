@@ -19,7 +19,7 @@ UV_TOLERANCE = 1e-4
 MAX_DISTANCE_MM = 1e6
 """Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
 MIN_RELATIVE_AREA = 1e-6
-"""Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
+"""Ratio of a triangle's area to its squared longest side below which single precision is too coarse [-]."""
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
@@ -66,11 +66,13 @@ def check_arrays(
         refuse(culprit, expected, f"one is {farthest:.3g} mm away", advice)
 
 
-def _check_finite(name: str, values: NDArray[np.floating], culprit: object, items: str = "vertices") -> None:
+def _check_finite(
+    quantity: str, values: NDArray[np.floating], culprit: object, items: str = "vertices"
+) -> None:
     lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if len(lost):
         actual = f"{len(lost)} {items} are NaN or infinite, first {lost[0]}"
-        refuse(culprit, f"finite {name}", actual, limits.DAMAGED_ADVICE)
+        refuse(culprit, f"finite {quantity}", actual, limits.DAMAGED_ADVICE)
 
 
 def check_rig(rig: Rig, culprit: object) -> None:

@@ -28,24 +28,26 @@ from dermis.mesh.geometry import (
 )
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 
-_MAX_FLAT = 0.5
+_MAX_FLAT_FRACTION = 0.5
 """Fraction of triangles without area above which a mesh is refused instead of repaired [-]."""
 _MAX_NON_MANIFOLD_EDGES = 100_000
 """Number of non-manifold edges above which a mesh is refused instead of repaired."""
 _MAX_PAIRED_SIDES = 8
-"""Triangles at an edge above which the edge is cut open, instead of a search for sheets across it."""
+"""Number of triangles at an edge above which it is cut open without a search for sheets that cross it."""
 _MIN_CONVEXITY = -0.05
-"""Mean cosine of normals and directions from the centroid below which a component may be inverted [-]."""
+"""Mean cosine of normals and directions from the centroid: below it, a component may be inside out [-]."""
 _MAX_OPPOSITE_COSINE = -0.5
-"""Mean cosine of the file's normals and the triangles' normals below which these are opposite [-]."""
+"""Mean cosine of the file's normals and the triangles' normals: below it, they count as opposite [-]."""
 _MIN_BALANCE = 0.25
-"""Excess of one side among the visible samples above which a component shows that side outwards [-]."""
-_MIN_VISIBLE_SAMPLES, _MIN_SLOPE = 8, 0.05  # slope as a cosine
-_MIN_VISIBLE_FRACTION = 0.02  # of the samples that an isolated component would have
-_VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 20, 64, 120_000
-_DOUBTFUL_SAMPLES = 0.25  # fraction of the samples for components that may be inverted
+"""Absolute visible balance above which the more visible side of a component is its outer side [-]."""
+_MIN_VISIBLE_SAMPLES = 8
+_MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
+_MIN_VISIBLE_FRACTION = 0.02  # relative to the visible samples of the same component without the others
+_VIEWS, _VIEW_CELLS = 20, 64  # number of views from outside, and of cells along a side of each view
+_SURFACE_SAMPLES = 120_000  # points on the mesh whose visibility is tested
+_DOUBTFUL_FRACTION = 0.25  # fraction of the samples that is reserved for components that may be inside out
 _MAX_UV_EXCESS = 0.02
-"""Distance from [0, 1] up to which uv are clamped [-]."""
+"""Largest distance of uv from [0, 1] at which they are clamped [-]."""
 _NO_PERIOD = 1e9
 _PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD}
 
@@ -108,7 +110,7 @@ class RawMesh:
         return replace(self._select(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
-        """Return the mesh without vertices and points that no triangle uses, and without broken quads."""
+        """Return the mesh without unused vertices and points, and without quads whose halves were parted."""
         used, triangles = compact_vertices(self.triangles)
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
@@ -116,7 +118,7 @@ class RawMesh:
         return replace(self._select(used), point=point, triangles=triangles, quads=self.quads[whole])
 
     def _select(self, source: Index) -> RawMesh:
-        """Return the mesh with the vertices of the given indices (n,); points and triangles are unchanged."""
+        """Return the mesh with the vertices at the given indices (n,); points and triangles are unchanged."""
         return replace(
             self,
             positions=self.positions[source],
@@ -142,7 +144,7 @@ def repair_mesh(
     """
     notes: list[str] = []
     flat = flat_triangles(mesh.positions, mesh.triangles)
-    if flat.mean() > _MAX_FLAT:
+    if flat.mean() > _MAX_FLAT_FRACTION:
         return mesh, ()
     repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
     return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
@@ -168,26 +170,26 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
         again = (key[order][1:] == key[order][:-1]) & (np.diff(mesh.material[order]) == 0)
         kept = np.ones(len(key), bool)
         kept[order[1:][again]] = False
-        kept &= ~_copies(key[kept], mesh.material[kept], is_skin)[mesh.material]
+        kept &= ~_duplicate_materials(key[kept], mesh.material[kept], is_skin)[mesh.material]
         if not kept.all():
             notes.append(f"left out {_counted(int((~kept).sum()), 'triangle')} that repeat others")
             mesh = mesh.with_triangles(kept)
     return mesh
 
 
-def _copies(key: Index, material: Ints, is_skin: Mask) -> Mask:
-    """Return the mask (m,) of materials with exactly the same triangles as another one, which is kept.
+def _duplicate_materials(key: Index, material: Ints, is_skin: Mask) -> Mask:
+    """Return the mask (m,) of materials that have exactly the triangles of another material, which is kept.
 
     key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
     """
     ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
     triangles = np.split(key[np.lexsort((key, material))], ends[:-1])
-    copies, seen = np.zeros(len(is_skin), bool), {b""}
+    is_duplicate, seen = np.zeros(len(is_skin), bool), {b""}
     for index in np.argsort(~is_skin, kind="stable"):
-        own = triangles[index].tobytes()
-        copies[index] = own in seen
-        seen.add(own)
-    return copies
+        content = triangles[index].tobytes()
+        is_duplicate[index] = content in seen
+        seen.add(content)
+    return is_duplicate
 
 
 class _Sides(NamedTuple):
@@ -196,7 +198,7 @@ class _Sides(NamedTuple):
     Side 3 t + k runs from corner k of triangle t to its next corner.
 
     side : (3f,) sides, ordered by edge
-    first, counts : (e,) index in `side` of the first side of each edge, and number of its sides
+    first, counts : (e,) for each of e edges, the index in `side` of its first side, and its number of sides
     start, end : (3f,) points at the ends of each side
     """
 
@@ -222,7 +224,7 @@ def _group_sides(corners: Index) -> _Sides:
     return _Sides(side, first, np.diff(first, append=len(key)), start, end)
 
 
-def _label(count: int, links: NDArray[np.integer]) -> Index:
+def _label_components(count: int, links: NDArray[np.integer]) -> Index:
     """Return the connected component of each node of a graph, (count,).
 
     links : (n, 2) nodes at the ends of each link
@@ -256,8 +258,8 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
 def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Index:
     """Return pairs of triangle sides (n, 2) across which sheets continue at non-manifold edges.
 
-    At each edge, the first pair prefers equal materials, opposite directions and a small angle; further pairs
-    must have opposite directions.
+    At each edge, the first pair preferably has the same material, opposite directions and the flattest
+    continuation; further pairs must have opposite directions.
 
     rounds : largest number of pairs at an edge
     """
@@ -270,7 +272,7 @@ def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Ind
     )
     table = -np.sort(-table, axis=1)
     inwards = _directions_from_sides(mesh, table)
-    forward, piece = sides.start < sides.end, _label(len(mesh.triangles), sides.pairs // 3)
+    forward, piece = sides.start < sides.end, _label_components(len(mesh.triangles), sides.pairs // 3)
     found = [np.empty((0, 2), np.int64)]
     for turn in range(rounds):
         best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
@@ -321,7 +323,7 @@ def _split_points(mesh: RawMesh, links: Index) -> Index:
     affected = np.flatnonzero(busy[flat])
     number = np.cumsum(busy[flat]) - 1
     used = busy[flat[ends]]
-    fan = _label(len(affected), number[np.column_stack((ends[used], others[used]))])
+    fan = _label_components(len(affected), number[np.column_stack((ends[used], others[used]))])
     point = np.zeros(int(fan.max()) + 1, np.int64)
     point[fan] = flat[affected]
     order = np.lexsort((-np.bincount(fan), point))
@@ -362,22 +364,22 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
 
 
 def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
-    """Return each triangle's connected component (f,), and the mask (f,) of those to reverse.
+    """Return each triangle's connected component (f,), and the mask (f,) of triangles to reverse.
 
-    Reversing them makes the winding consistent. Of the two windings of a component, that of the larger area
-    is kept. A component without a consistent winding, such as a Moebius strip, is unchanged.
+    Their reversal makes the winding of each component consistent, in the sense that most of its area already
+    has. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
     """
     count, pairs = len(mesh.triangles), mesh.sides.pairs
     forward = mesh.sides.start < mesh.sides.end
     links = pairs // 3
     conflict = forward[pairs[:, 0]] == forward[pairs[:, 1]]
     if not conflict.any():
-        return _label(count, links), np.zeros(count, bool)
+        return _label_components(count, links), np.zeros(count, bool)
     # graph with two nodes per triangle, one for each winding; edges connect consistent windings
     one, two = links.T
     first, second = np.concatenate((one, one + count)), np.concatenate((two, two + count))
     second = np.where(np.tile(conflict, 2), (second + count) % (2 * count), second)
-    kept, reversed_ = _label(2 * count, np.column_stack((first, second))).reshape(2, -1)
+    kept, reversed_ = _label_components(2 * count, np.column_stack((first, second))).reshape(2, -1)
     piece = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
     reverse = kept > reversed_
     size = triangle_areas(mesh.positions[mesh.triangles])
@@ -393,7 +395,7 @@ def _corner_normals(mesh: RawMesh) -> Doubles:
 
 @dataclass(frozen=True)
 class _Surface:
-    """Triangles with their connected components ("pieces").
+    """Triangles, and the connected component ("piece") of each.
 
     piece : (f,) index of each triangle's component
     area : (3, f) normals with twice the triangle's area as their length [mm²]
@@ -419,26 +421,26 @@ class _Surface:
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
-        """Return the mean cosine of normals and directions (3, f) by component; 0 without directions."""
+        """Return the mean cosine of normals and directions (3, f) for each component; 0 for null vectors."""
         length = np.bincount(self.piece, self.size * np.sqrt(dot_columns(direction, direction)))
         total = np.bincount(self.piece, dot_columns(self.area, direction))
         return total / np.where(length > 0, length, 1)
 
     def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
-        """Return the visible balance of front and back of each component, and whether backs prevail.
+        """Return how much of each component's front and back is visible, and whether backs prevail.
 
-        The balance is 1 if only fronts are visible from outside, -1 if only backs are, and 0 if hardly any
-        sample is. Backs prevail if two thirds of all visible samples are backs.
+        The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
+        is, and 0 if hardly any of it is. Backs prevail if they are two thirds of all visible samples.
 
-        doubtful : mask of components that get additional samples, so that small ones have enough
+        doubtful : mask of components that get additional samples, so that small components have enough
         """
-        own = np.bincount(self.piece, self.size)
-        more = _DOUBTFUL_SAMPLES * doubtful / (own * doubtful.sum())
+        size = np.bincount(self.piece, self.size)
+        more = _DOUBTFUL_FRACTION * doubtful / (size * doubtful.sum())
         triangle, sample = self._draw_samples(
-            self.size * ((1 - _DOUBTFUL_SAMPLES) / own.sum() + more[self.piece])
+            self.size * ((1 - _DOUBTFUL_FRACTION) / size.sum() + more[self.piece])
         )
         normal, piece = self.area[:, triangle] / self.size[triangle], self.piece[triangle]
-        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(own)), np.int64)
+        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(size)), np.int64)
         for view in fibonacci_sphere(_VIEWS):
             across = np.linalg.svd(view[None])[2][1:]
             cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
@@ -446,20 +448,25 @@ class _Surface:
             nearest[tuple(cell[:, order])] = order  # the last, nearest sample of a cell remains
             visible = nearest[nearest >= 0]
             cosine = view @ normal[:, visible]
-            for side, facing in zip(seen, (cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE), strict=True):
-                side += np.bincount(piece[visible[facing]], minlength=len(own))
-        cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # of an isolated convex component
-        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(own)) / 2)
+            facings = cosine > _MIN_VIEW_COSINE, cosine < -_MIN_VIEW_COSINE
+            for side, facing in zip(seen, facings, strict=True):
+                side += np.bincount(piece[visible[facing]], minlength=len(size))
+        cells = size / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # that a convex component would cover alone
+        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(size)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
 
     def _draw_samples(self, weight: Doubles) -> tuple[Index, Doubles]:
-        """Return random triangles by weight (f,), and points on them (3, n) about the mesh centre [mm]."""
+        """Return random points on the triangles: index of the triangle (n,), and position (3, n) [mm].
+
+        weight : (f,) relative probability of each triangle
+        Positions are relative to the centre of the mesh.
+        """
         total = np.cumsum(weight)
-        triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
-        shares = np.sort(np.random.default_rng(0).random((2, _VIEW_SAMPLES)), axis=0)
+        triangle = np.searchsorted(total, (np.arange(_SURFACE_SAMPLES) + 0.5) / _SURFACE_SAMPLES * total[-1])
+        shares = np.sort(np.random.default_rng(0).random((2, _SURFACE_SAMPLES)), axis=0)
         shares = np.diff(shares, axis=0, prepend=0, append=1)
         points = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
@@ -486,7 +493,7 @@ def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: lis
     place = weld(np.column_stack((mesh.point, mesh.uv)))
     corners = place[mesh.triangles]
     links = np.column_stack((corners.ravel(), np.roll(corners, -1, axis=1).ravel()))
-    chart = _label(int(place.max()) + 1, links)[place]
+    chart = _label_components(int(place.max()) + 1, links)[place]
     low, high = (np.full((int(chart.max()) + 1, 2), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, chart, mesh.uv)
     np.maximum.at(high, chart, mesh.uv)

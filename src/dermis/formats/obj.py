@@ -70,7 +70,7 @@ def obj_maps(
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, list[str]]:
-    """Return the maps of skin that has one material with untransformed pictures, and notes on maps left out.
+    """Return the maps of skin with a single material and untransformed pictures, and notes on omitted maps.
 
     The statements map_Kd, norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals,
     as many programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
@@ -100,7 +100,7 @@ def obj_maps(
 
 
 def _checked_texel_count(file: Path, remaining: int) -> int:
-    """Return the number of texels of a picture after checking it against the number still allowed."""
+    """Return the number of texels of a picture after checking that it is at most `remaining`."""
     width, height = read_size(file)
     if width * height > remaining:
         expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
@@ -113,7 +113,7 @@ def _load_map(
 ) -> dict[str, Any]:
     """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
 
-    The result has the role as key. For "bump" it is "height" for a grey picture, else "normal".
+    The result is {role: map}; the role "bump" becomes "height" for a grey picture, else "normal".
     """
     if role == "bump":
         role = "height" if _is_grey(file) else "normal"

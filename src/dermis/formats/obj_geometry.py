@@ -22,7 +22,7 @@ from dermis.formats.polygons import (
     check_polygon_sizes,
     missing_uv,
     refuse_without_faces,
-    without_small,
+    without_small_polygons,
 )
 from dermis.formats.text_files import listed, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
@@ -35,7 +35,7 @@ _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILI
 _LINE_FEED, _SPACE, _SLASH = b"\n /"
 _VERTEX_KINDS = ("v", "vt", "vn")
 _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
-_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers of a vertex that are used (position, colour), and allowed
+_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers in a statement that are used (position, colour) and allowed
 _POLYPAINT = "#MRGB"
 _CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
 _LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
@@ -127,12 +127,12 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
         notes += faults
     counts, corners = _faces(path, rows)
     pairs, pair = _groups(path, others, rows["f"].line)
-    counts, corners, kept, faults = without_small(counts, corners)
+    counts, corners, kept, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
     uv = np.column_stack((uv[:, 0], np.where(np.isnan(uv[:, 1]), 0.0, uv[:, 1])))
     polygons = Polygons(counts, corners, positions, uv, normals[:, :3], colours)
-    notes += [*faults, *missing_uv(polygons), *_unread(unread, others, has_normals=len(normals) > 0)]
+    notes += [*faults, *missing_uv(polygons), *_unread_notes(unread, others, has_normals=len(normals) > 0)]
     statements = "\n".join(f"{key} {value}" for _, key, value in others)
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
@@ -192,9 +192,10 @@ def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
 
 
 def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str = "") -> NoReturn:
-    """Refuse statement `index` of a kind.
+    """Raise the error for one of the statements in `rows`; the message names its line.
 
-    actual : clause of the error message; by default the text of the statement
+    index : index of the statement in `rows`
+    actual : clause that says what is wrong; by default, it quotes the statement
     """
     ends = np.append(rows.start[1:], len(rows.text))
     words = " ".join(rows.text[rows.start[index] : ends[index]].tobytes().decode(errors="replace").split())
@@ -236,7 +237,7 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
 
 
 def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return the first six numbers of statements (n, 6), NaN for missing ones, and the counts (n,)."""
+    """Return each statement's first six numbers (n, 6), NaN for missing ones, and its number of them (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))
@@ -247,7 +248,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     try:
         values = parse_numbers(rows.text, len(words), np.float64)
     except ValueError:
-        _refuse_line(path, rows, _first_fault(rows, np.float64), expected)
+        _refuse_line(path, rows, _first_non_numeric(rows, np.float64), expected)
     column = np.arange(_USED_NUMBERS)
     table = np.full((len(counts), _USED_NUMBERS), np.nan)
     given = column < counts[:, None]
@@ -255,7 +256,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     return table, counts
 
 
-def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
+def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
@@ -266,7 +267,7 @@ def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
 
 
 def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
-    """Return the number of corners of each face, and three indices per corner (c, 3), -1 for none."""
+    """Return each face's number of corners, and indices of position, uv, normal (c, 3) per corner or -1."""
     faces = rows["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
@@ -282,7 +283,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
     try:
         values = parse_numbers(spaced.text, len(index_start), np.int64)
     except ValueError:
-        _refuse_line(path, faces, _first_fault(spaced, np.int64), "faces by whole numbers")
+        _refuse_line(path, faces, _first_non_numeric(spaced, np.int64), "faces by whole numbers")
     refuse_at(values == 0, index_start, "faces by indices from 1", "there is a 0")
     corner = np.searchsorted(corner_start, index_start, side="right") - 1
     slashes = np.cumsum(slash, dtype=np.int32)
@@ -323,7 +324,7 @@ def _groups(
     return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
 
 
-def _unread(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
+def _unread_notes(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
     """Return notes on statements that have no effect.
 
     keys : first words of unknown statements

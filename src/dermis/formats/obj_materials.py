@@ -29,7 +29,8 @@ TEXTURE_ROLES = {
     "bump": "bump",
 }
 """Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
-NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
+NUMERIC_STATEMENTS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
+"""Number of values that each numeric statement of a material needs, by the statement in lower case."""
 MTL_PROPERTIES = (
     drawn("`newmtl`", "begins a material", "newmtl"),
     drawn("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
@@ -101,7 +102,7 @@ class MtlTexture:
     key : statement that references it, such as map_Kd
     name : file name as written
     factor : option -bm, by which the map is multiplied [-]
-    scale, offset : options -s and -o of u and v, with v up
+    scale, offset : options -s and -o along u and v, where v points up
     wrap : continuation beyond the picture, by option -clamp
     unused : options without effect, such as the turbulence -t
     """
@@ -127,9 +128,9 @@ class MtlTexture:
 class MtlMaterial:
     """Material of an .mtl file.
 
-    numbers : values of the statements in `NUMBERS`
+    numbers : values by statement, see `NUMERIC_STATEMENTS`
     textures : pictures by role, see `TEXTURE_ROLES`
-    unread : other statements
+    unread : first words of all other statements
     """
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
@@ -190,7 +191,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key in TEXTURE_ROLES and value.strip():
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
-        elif key in NUMBERS and len(numbers := _numbers(value)) >= NUMBERS[key]:
+        elif key in NUMERIC_STATEMENTS and len(numbers := _numbers(value)) >= NUMERIC_STATEMENTS[key]:
             current.numbers[key] = numbers
         elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
@@ -198,7 +199,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
 
 
 def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
-    """Return the file name of a texture's picture; for a sequence of UDIM tiles, that of the given tile."""
+    """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
     return _UDIM.sub(str(udim), texture.name)
 
 
@@ -247,7 +248,7 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts, whose first name is that of the material if it has one
+    parts : mesh parts; the first name of a part's group is the name of its material, if that has one
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]

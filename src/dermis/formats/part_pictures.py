@@ -1,4 +1,4 @@
-"""Pictures of the parts of a head that are not skin, as other programs read them."""
+"""Pictures of the parts of a head that are not skin, in the forms that other programs read."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from dermis.mesh.mesh import Material, Mesh
 PartRole = Literal[
     "colour", "cutout", "opacity", "roughness", "metalness", "surface", "alpha", "normal", "emission"
 ]
-"""Content of a picture: sRGB colour; sRGB colour with opacity, cut out at 0.5; opacity 0 or 1; perceptual
-roughness; metalness; roughness in green and metalness in blue, as in glTF; width alpha of the normal
-distribution, the square of the roughness; normals, green up; sRGB emission relative to its maximum."""
+"""Content of a picture. "colour": sRGB; "cutout": sRGB with opacity, cut out at 0.5; "opacity": 0 or 1;
+"roughness": perceptual; "surface": roughness in green and metalness in blue, as in glTF; "alpha": width of
+the distribution of normals, the square of the roughness; "normal": green up; "emission": sRGB, relative to
+its maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class PartPictures:
         return {role for role, used in needed.items() if used} if material.has_maps else set()
 
     def encode(self, roles: Iterable[PartRole]) -> dict[PartRole, bytes]:
-        """Return 8-bit PNG files by role, for those of the given roles that any part needs."""
+        """Return 8-bit PNG files by role; roles that no part needs are left out."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
         used = set[PartRole]().union(*map(self.roles, parts))
         levels = {role: _LEVELS[role](self.maps) for role in roles if role in used}

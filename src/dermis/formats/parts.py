@@ -70,7 +70,7 @@ class MeshPart:
     quads : (q, 2) pairs of triangles that are the halves of a quad
     separate : whether the vertices must not be welded to coincident vertices of other parts
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : (v, 2) further uv coordinates by their index in the file, which textures use
+    other_uv : additional uv sets (v, 2) that textures use, by their index in the file
     """
 
     group: MaterialGroup
@@ -105,7 +105,7 @@ class Bones:
 class MeshFile:
     """Geometry and bones of a mesh file.
 
-    weights : default weights of morph targets by name, without those of weight 0
+    weights : default weights of morph targets by name; weights of 0 are omitted
     materials : materials of the file, to which the groups refer
     notes : sentences for users on content that was repaired, replaced or left out
     unit_mm : length unit that the file states [mm], or None

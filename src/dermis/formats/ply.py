@@ -23,7 +23,7 @@ from dermis.formats.polygons import (
     check_polygon_sizes,
     missing_uv,
     refuse_without_faces,
-    without_small,
+    without_small_polygons,
 )
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text, listed, parse_numbers, run_starts
@@ -128,7 +128,7 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _List"]):
-    """Columns of an element by name, which record the columns that were used."""
+    """Columns of an element by name; also records which columns were used."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -172,13 +172,13 @@ def read_ply(path: Path) -> MeshFile:
     normals = vertices.take(("nx", "ny", "nz"))
     colours, notes = _colours(vertices)
     corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
-    counts, corners, _, faults = without_small(counts, corners)
+    counts, corners, _, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
     picture, unused = _picture(header.pictures, faces.take(("texnumber",)))
-    notes += [*faults, *missing_uv(polygons), *unused, *_unread(tables)]
+    notes += [*faults, *missing_uv(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
         materials = (FileMaterial(textures={"colour": Texture(file)}),)
@@ -221,7 +221,7 @@ def _read_header(path: Path, data: bytes) -> _Header:
 
 
 def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
-    """Return an element without its properties; refuse an implausible count for a mesh or the file size.
+    """Return an element without its properties; refuse a count too large for a mesh or for the file's size.
 
     words : words after "element"
     """
@@ -318,14 +318,15 @@ class _ElementReader:
             actual = f"it ends within its elements named {self.element.name!r}"
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
-    def _gather(self, start: Index, count: Index, dtype: str, size: Index) -> Numbers:
-        """Read `count` values of one type at each of the positions `start`, and concatenate them.
+    def _gather(self, start: Index, count: Index, dtype: str, row_size: Index) -> Numbers:
+        """Return the values of a property in all rows, concatenated.
 
-        size : size of one value [bytes]
+        start, count : (n,) position of each row's first value [bytes], and number of its values
+        row_size : (n,) size of each row [bytes]
         """
         stored = self._dtype(dtype)
-        if (size == size[0]).all() and (count == count[0]).all():
-            shape, strides = (len(count), int(count[0])), (int(size[0]), stored.itemsize)
+        if (row_size == row_size[0]).all() and (count == count[0]).all():
+            shape, strides = (len(count), int(count[0])), (int(row_size[0]), stored.itemsize)
             values = np.ndarray(shape, stored, self.data, int(start[0]), strides).reshape(-1)
         else:
             row, item = expand_runs(np.zeros_like(count), count)
@@ -394,7 +395,7 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """Step from one list of a row to the next: bytes to skip, type of the length, size of an item [bytes]."""
+    """List in a row: bytes between the previous list and this one, type of its length, size of an item."""
 
     skip: int
     length: np.dtype[Any]
@@ -423,7 +424,7 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
 
 
 def _strip_triangles(strips: _List) -> Index:
-    """Return the triangles (t, 3) of strips, which -1 separates; every second triangle is reversed."""
+    """Return the triangles (t, 3) of strips that are separated by -1; every second triangle is reversed."""
     index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
@@ -486,7 +487,7 @@ def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None,
     return chosen, [f"of several pictures {chosen} is used; left out: {listed(others)}"] if others else []
 
 
-def _unread(tables: Mapping[str, _Columns]) -> list[str]:
+def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
     """Return a note on elements and properties that have no effect."""
     ignored = [name for name, columns in tables.items() if not columns.used]
     ignored += [

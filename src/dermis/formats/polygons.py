@@ -101,10 +101,11 @@ def check_polygon_sizes(path: Path, counts: Index) -> None:
     limits.check_limit(path, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
 
 
-def without_small(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
+def without_small_polygons(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
     """Remove polygons of fewer than three corners.
 
-    Returns the remaining numbers of corners, corners and mask of polygons, and a note if any were removed.
+    Returns `counts` and `corners` of the remaining polygons, the mask (n,) that selects them, and a list with
+    a note if any were removed.
     """
     kept = counts >= 3
     if kept.all():
@@ -124,7 +125,7 @@ def refuse_without_faces(path: Path, points: int) -> NoReturn:
 
 
 def triangulate(counts: Index, order: TriangleOrder) -> tuple[Index, Index]:
-    """Triangulate polygons as fans; return triangle corners (f, 3), and pairs of triangles (q, 2) of quads.
+    """Triangulate polygons as fans; return the corners of triangles (f, 3), and the halves of quads (q, 2).
 
     counts : (n,) number of corners of each polygon; corners are numbered consecutively
     order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, their second

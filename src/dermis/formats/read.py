@@ -19,7 +19,7 @@ from dermis.formats.parts import MeshFile, MeshPart
 from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
-"""Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
+"""Largest valid absolute uv coordinate; larger ones are a sign of a damaged file, not of many tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
@@ -34,7 +34,7 @@ _SUFFIX_ADVICE = {
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
-    """Join mesh parts into one; vertices without normals get NaN."""
+    """Join mesh parts into one; the normals of vertices that have none become NaN."""
     uv = [_part_uv(part, source) for part in parts]
     for part, part_uv in zip(parts, uv, strict=True):
         check_arrays(part.positions, part_uv, part.triangles, source)
@@ -65,7 +65,7 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
 
 
 def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
-    """Join the vertex colours of all parts, white for parts without; None if no part has any."""
+    """Join the vertex colours of all parts; parts without colours become white. None if no part has any."""
     if all(part.colours is None for part in parts):
         return None
     return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in parts])
@@ -81,7 +81,7 @@ def select_vertices(part: MeshPart, used: Index) -> MeshPart:
 
     used : (n,) indices of the vertices; they may repeat
 
-    Triangles, uv and normals are unchanged.
+    Triangles, uv and normals still refer to the vertices of `part`.
     """
     order, count = np.argsort(used, kind="stable"), np.bincount(used, minlength=len(part.positions))
     first, targets = np.cumsum(count) - count, {}
@@ -170,7 +170,7 @@ def _without_unused_vertices(part: MeshPart) -> MeshPart:
     count, uv, normals = len(part.positions), part.uv, part.normals
     damaged = any(array is not None and len(array) != count for array in (uv, normals))
     if damaged or part.triangles.min() < 0 or part.triangles.max() >= count:
-        return part  # refused below
+        return part  # `join_parts` refuses it
     used, triangles = compact_vertices(part.triangles)
     if len(used) == count:
         return part

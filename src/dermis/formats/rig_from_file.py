@@ -13,14 +13,15 @@ from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
 SPLIT_TOLERANCE_MM = 0.01
-"""Coincident vertices that a target separates by more, such as those of touching lips, are two points."""
-_MAX_COINCIDENT = 64
+"""Coincident vertices that a morph target moves further apart, such as those of touching lips, are separate
+points."""
+_MAX_COINCIDENT = 64  # vertices at one position that move differently
 _WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
-_MIN_DISPLACEMENT_MM = 1e-4  # rounding errors of vertices that do not move
+_MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
 def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
-    """Return point indices (v,) in which coincident vertices become separate points if they move differently.
+    """Return point indices (v,) in which coincident vertices that move differently are separate points.
 
     point : (v,) index of the point of each vertex, welded by position
     part : vertices with their morph targets and bone weights

@@ -12,12 +12,12 @@ from dermis.mesh.geometry import triangle_areas
 
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 SKIN_WORDS = ("skin", "skins", "epidermis", "flesh")
-"""Words that make a group skin; all other groups are then not skin."""
+"""Words in the names of skin groups; if any group has such a word, groups without one are not skin."""
 BODY_WORDS = (
     *("face", "head", "body", "torso", "neck", "ear", "ears", "nose", "lip", "lips", "nostril", "nostrils"),
     *("arm", "arms", "hand", "hands", "leg", "legs", "foot", "feet", "limbs", "finger", "fingers", "forearm"),
 )
-"""Words that make a group skin in files where no group has one of `SKIN_WORDS`."""
+"""Words in the names of skin groups, for files in which no group has one of `SKIN_WORDS`."""
 OTHER_WORDS = (
     *("hair", "hairs", "brow", "brows", "eyebrow", "eyebrows", "lash", "lashes", "eyelash", "eyelashes"),
     *("beard", "mustache", "moustache", "scalp", "eye", "eyes", "eyeball", "eyeballs", "iris", "cornea"),
@@ -53,10 +53,10 @@ OTHER_WORDS = (
     *("earring", "earrings", "necklace", "jewelry", "jewellery", "nail", "nails", "accessory", "accessories"),
     *("eyeline", "eyeliner", "leather", "moleskin", "sheepskin", "horn", "horns", "background", "plinth"),
 )
-"""Words of groups that are never skin, unless another word of the group is in `SKIN_WORDS`."""
+"""Words in the names of groups that are not skin, unless another word of the name is in `SKIN_WORDS`."""
 HEAD_REGION = 0.3
-"""Upper part of a standing figure's height in which the skin of the head is searched [-]."""
-_MIN_COVERAGE = 0.1  # least part of the head region's area that skin of the head covers
+"""Top fraction of a mesh's height that counts as the head when its skin is identified by area [-]."""
+_MIN_COVERAGE = 0.1  # smallest fraction of the head's area that a part covers if it is skin
 
 
 def choose_skin(

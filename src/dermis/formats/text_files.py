@@ -46,14 +46,14 @@ def _decode_line(line: bytes) -> str:
 
 
 def listed(names: Collection[str]) -> str:
-    """Return the first few names of a list as text for a message."""
+    """Return the first eight names as text for a message, with the number of further names."""
     first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
     shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
 def run_starts(inside: Mask) -> Index:
-    """Return the positions of the first elements of runs of True in an array (n,)."""
+    """Return the index at which each run of consecutive True values in a mask (n,) starts."""
     first = inside.copy()
     first[1:] &= ~inside[:-1]
     return np.flatnonzero(first)
@@ -67,7 +67,7 @@ def parse_numbers(text: Bytes, count: int, dtype: type[T]) -> NDArray[T]:
 
     Raises ValueError if a word is not a number.
     """
-    # NumPy parses blanks alone as a number, and some versions only warn of a word that is none
+    # NumPy parses blanks alone as a number, and some versions only warn about words that are not numbers
     try:
         values = np.fromstring(text.tobytes(), dtype, sep=" ") if count else np.empty(0, dtype)
     except (ValueError, DeprecationWarning):

@@ -22,9 +22,10 @@ _SIZE_MM = (1.0, 3000.0)  # smallest and largest accepted size
 _SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit is assumed to be the millimetre
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
 _FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
-_INCH, _INCH_PENALTY = 25.4, {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # penalty of the log size
+_INCH = 25.4
+_INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of the log size
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
-_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # of figures and of other meshes
+_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
 
 
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
@@ -56,7 +57,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely unit of a mesh whose file states none [mm].
 
-    It is the millimetre if the mesh is then 100 to 1000 mm large and no standing figure. Otherwise it is the
+    It is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Else it is the
     unit of `UNITS_MM` for which the size is closest to that of an adult or a head, or of a hand if the mesh
     is flat or slender.
 
@@ -91,9 +92,9 @@ def _described(sizes: Floats) -> str:
 
 
 def _refuse_size(mesh: Mesh, unit: float, culprit: object) -> None:
-    """Refuse a mesh of impossible size; the advice names a unit only if the size is then usual.
+    """Refuse a mesh of impossible size; the advice names units with which the size would be usual.
 
-    unit : millimetres per unit of the file with which the mesh was read [mm]
+    unit : unit of the file with which the mesh was read [mm]
     """
     low, high = _ADVISED_MM[is_standing_figure(mesh.positions, mesh.triangles)]
     advice = "Set the millimetres per unit of the file with --unit-mm"

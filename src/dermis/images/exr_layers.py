@@ -31,16 +31,15 @@ class ExrLayer:
 
 
 def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
-    """Return the layer of an OpenEXR file that is read, and a note if there are several with colours.
+    """Choose the layer to read from an OpenEXR file; also return a note if several layers have colours.
 
-    Layers without a name have precedence over layers whose name means the whole picture, and these over
-    others.
+    Colours are preferred to grey; then a layer without a name, then one whose name means the whole picture.
 
     parts : name and channels of each part
 
-    Raises UnsupportedError for a file without such a layer, unless it has a single channel.
+    Raises UnsupportedError if no layer has R, G and B or Y, unless the file has a single channel.
     """
-    found = [layer for number, part in enumerate(parts) for layer in _layers(number, *part, len(parts) > 1)]
+    found = [layer for index, part in enumerate(parts) for layer in _layers(index, *part, len(parts) > 1)]
     if found:
         chosen = min(found, key=_rank)
         colours = [_display_name(layer.name) for layer in found if len(layer.channels) > 1]
@@ -55,10 +54,11 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
     raise UnsupportedError(f"it has channels {listed}, and no layer with R, G and B or Y")
 
 
-def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> Iterator[ExrLayer]:
+def _layers(index: int, part: str, channels: Sequence[str], several_parts: bool) -> Iterator[ExrLayer]:
     """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
 
-    several : whether the file has several parts, whose names then precede those of the layers
+    index, part : index and name of the part
+    several_parts : whether the file has several parts; the name of the part then precedes that of the layer
     """
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:
@@ -70,12 +70,12 @@ def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> I
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
         if names and not is_vector:
-            title = ".".join(filter(None, (part if several else "", layer)))
-            yield ExrLayer(number, title, tuple(letters[name] for name in names))
+            title = ".".join(filter(None, (part if several_parts else "", layer)))
+            yield ExrLayer(index, title, tuple(letters[name] for name in names))
 
 
 def _rank(layer: ExrLayer) -> tuple[bool, int]:
-    """Return a key that sorts layers with colours before grey ones, and the picture before its parts."""
+    """Return a sort key: layers with colours before grey ones, then the whole picture before components."""
     last = layer.name.rpartition(".")[2].lower()
     by_name = 0 if not layer.name else 1 if last in _MAIN_LAYERS else 2
     return len(layer.channels) == 1, by_name

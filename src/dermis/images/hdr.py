@@ -20,7 +20,7 @@ from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
-_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # by number of channels
+_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # names of the channels by their number
 _MAX_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 _ASPECT_TOLERANCE = 1e-3
@@ -38,7 +38,7 @@ _RADIANCE_VALUES = {
     "PIXASPECT": [1.0],
 }
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
-_UNUSED_VALUES = ("GAMMA", "PIXASPECT")
+_UNUSED_VALUES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
 EXR_PROPERTIES = (
     drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
     refused("deep pixels"),
@@ -74,7 +74,9 @@ _MAX_HEADER = 1 << 16
 _STRIP_PIXELS = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
 _DECODED_BYTES = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
+"""Number of decoded bytes by code."""
 _CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
+"""Number of stored bytes by code: the code itself and its data."""
 
 
 def decode_exr(data: bytes) -> Floats:
@@ -115,7 +117,7 @@ def exr_header(data: bytes) -> PictureHeader:
 
 
 def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of a part of an OpenEXR file, and a note unless that is linear Rec. 709."""
+    """Return the colour space of a part of an OpenEXR file, and a note if it is not linear Rec. 709."""
     import OpenEXR
 
     primaries, name = header.get("chromaticities"), header.get("colorInteropID", "")
@@ -173,9 +175,9 @@ def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
 
 
 def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
-    """Return the size of the display window, and two pairs of slices for the data window inside.
+    """Return the size of the display window, and slices for the part of the data window that is inside it.
 
-    The slices (rows, columns) are first relative to the data window, then to the display window.
+    The slices (rows, columns) are given twice: relative to the data window, and to the display window.
     """
     data, shown = (np.array(header[name], np.int64)[:, ::-1] for name in ("dataWindow", "displayWindow"))
     low, high = np.maximum(data[0], shown[0]), np.minimum(data[1], shown[1]) + 1
@@ -215,7 +217,7 @@ class _RadianceHeader:
 
     axes : directions of the scanlines and of the pixels in them, such as "-Y" and "+X"
     lengths : number of scanlines, and of pixels in each
-    values : numbers by name, such as EXPOSURE; those that may be repeated are multiplied
+    values : numbers by name, such as EXPOSURE; if a name occurs on several lines, the product of its numbers
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """

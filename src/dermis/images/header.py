@@ -17,9 +17,9 @@ class PictureHeader:
 
     size : width and height of the stored picture [pixel]
     colour_space : colour space of the decoded pixels
-    orientation : EXIF orientation, 1 to 8: rotation or reflection that turns the picture upright; 1 is none
+    orientation : EXIF orientation from 1 (upright) to 8: rotation or reflection that turns it upright
     notes : sentences about properties that are converted or not used
-    colour_note : sentence about the conversion of colours, for pictures whose pixels are colours
+    colour_note : sentence about the conversion of colours; it does not apply if pixels are read as numbers
     is_grey : whether the pixels have one colour channel
     """
 

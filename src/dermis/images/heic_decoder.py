@@ -12,7 +12,7 @@ from dermis.images.sizes import MAX_PIXELS
 
 
 def decode(request: Arrays) -> Arrays:
-    """Return size, ICC profile, three properties, and unless there are too many the pixels of a picture.
+    """Return a picture's size, ICC profile and three properties, and its pixels unless there are too many.
 
     The properties are the bits per channel in the file, whether the picture was turned upright, and
     whether the file has more pictures.

@@ -74,7 +74,7 @@ class EmbeddedPicture:
     data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name, which replaces a path in error messages."""
+        """Return the name, which error messages show where they show the path of other pictures."""
         return self.name
 
 
@@ -112,7 +112,7 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
 
 
 def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
-    """Issue the note of `read_image` or `read_colours` for a picture that is in a cache.
+    """Issue the note that `read_image` or `read_colours` would issue, for a picture taken from a cache.
 
     colours : whether the pixels are colours, to which colour profiles apply
     """
@@ -132,9 +132,9 @@ def _note(path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bo
 
 
 def repaired_radiance(name: object, radiance: Floats) -> Floats:
-    """Return radiance (H, W, C) without infinite, NaN and negative values, with a note of their number.
+    """Replace infinite, NaN and negative radiance (H, W, C); a note states how many pixels were changed.
 
-    Infinite values become the largest finite one, other values 0.
+    Infinite values become the largest finite value; NaN and negative values become 0.
 
     name : name of the file, for messages
 

@@ -187,7 +187,7 @@ class MovieWriter:
         while len(self._queue) > _QUEUE_LENGTH or (self._queue and self._queue[0].done()):
             self._queue.popleft().result()
 
-    def _encode(self, number: int, picture: NDArray[np.generic]) -> None:
+    def _encode(self, frame_index: int, picture: NDArray[np.generic]) -> None:
         import av
         from av.video.reformatter import ColorRange, Colorspace
 
@@ -198,7 +198,7 @@ class MovieWriter:
             src_color_range=ColorRange.JPEG,
             dst_color_range=ColorRange.MPEG,
         )
-        frame.pts, frame.time_base = number, 1 / self.rate
+        frame.pts, frame.time_base = frame_index, 1 / self.rate
         self._container.mux(self._stream.encode(frame))
 
     def _finish(self) -> None:

@@ -86,7 +86,7 @@ _GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
 _EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
 _ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
 _TIFF_SUBFILE, _TIFF_DNG_VERSION, _CANON_RAW = 254, 50706, b"CR"
-_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # as PNG files state it
+_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state sRGB
 
 
 def picture_format(data: bytes) -> str | None:
@@ -174,9 +174,9 @@ def pillow_header(data: bytes) -> PictureHeader:
 
 
 def table_transform(picture: Image) -> ImageCmsTransform | None:
-    """Return the conversion of a picture to 8-bit sRGB if its ICC profile consists of tables, else None.
+    """Return the conversion of a picture to 8-bit sRGB if its ICC profile has lookup tables, else None.
 
-    CMYK files and some scanners have profiles of tables. Conversion uses the relative colorimetric intent
+    CMYK files and files of some scanners have such profiles. The rendering intent is relative colorimetric,
     with black point compensation.
     """
     from PIL import ImageCms
@@ -263,7 +263,7 @@ def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
 
 
 def _is_adobe_rgb(exif: Exif) -> bool:
-    """Return whether a camera states Adobe RGB in EXIF, which most cameras do without a profile."""
+    """Return whether EXIF states Adobe RGB; most cameras state it there without embedding a profile."""
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (
@@ -274,7 +274,7 @@ def _is_adobe_rgb(exif: Exif) -> bool:
 
 
 def _png_space(picture: Image) -> ColourSpace:
-    """Return the colour space by the gamma and chromaticities in a PNG file; sRGB for other files."""
+    """Return the colour space given by a PNG file's gamma and chromaticities; sRGB for other files."""
     gamma, corners = picture.info.get("gamma"), picture.info.get("chromaticity")
     if picture.format != "PNG" or "srgb" in picture.info or not gamma:
         return SRGB
@@ -293,7 +293,7 @@ def _notes(data: bytes, picture: Image) -> Iterator[str]:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
         yield "it is turned upright as its EXIF says"
-    if _has_several(picture):
+    if _has_more_pictures(picture):
         yield "it has several pictures, and only the first is read"
 
 
@@ -306,7 +306,7 @@ def _bits(data: bytes, picture: Image) -> int:
     return int(picture.info.get("bit_depth", 8))
 
 
-def _has_several(picture: Image) -> bool:
+def _has_more_pictures(picture: Image) -> bool:
     """Return whether a file has further pictures: frames, pages, or the gain map of a phone's photograph."""
     if picture.format != "TIFF":
         return bool(getattr(picture, "is_animated", False))

@@ -23,7 +23,7 @@ _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
-    """Animated property of several nodes or morph targets, with the curve of its values.
+    """Animated property of one or more nodes or morph targets, with the curve of its values.
 
     path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
     names : (m,) names of the nodes or morph targets
@@ -49,7 +49,7 @@ class _Keyframes(NamedTuple):
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's animation clips; a clip without a name is called "clip" and its index."""
+    """Return the names of a file's animation clips; a clip without a name gets one by its index: "clip 0"."""
     return _document_clip_names(read_document(path))
 
 
@@ -86,8 +86,8 @@ def _read_tracks(document: Document, index: int, name: str) -> list[AnimationTra
     check_limit(culprit, len(clip["channels"]), MAX_CHANNELS, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
-    for number, channel in enumerate(clip["channels"]):
-        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
+    for channel_index, channel in enumerate(clip["channels"]):
+        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {channel_index}"
         if "node" not in target or target["path"] not in (*_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
         _check_node(nodes, target["node"], culprit)
@@ -115,7 +115,7 @@ def _weight_track(
     """Return the track of the morph target weights of a node.
 
     culprit : clip and channel, named in errors
-    known : names of morph targets by mesh index; this function adds those of the node's mesh
+    known : names of morph targets by mesh index; this function adds the names for the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in known:

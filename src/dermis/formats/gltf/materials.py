@@ -173,8 +173,8 @@ def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
 def eye_material(material: Material) -> Tree:
     """Return the glTF material of a textured eyeball, whose tear film is a clear coat.
 
-    Its normal map applies to the surface below the coat, which is specular only in programs without clear
-    coat.
+    The normal map applies to the surface below the coat. Programs that support clear coat show highlights
+    only on the coat; other programs show them on that surface.
     """
     surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]

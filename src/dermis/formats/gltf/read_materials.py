@@ -96,7 +96,7 @@ class _Reader:
 
     def read(self) -> FileMaterial:
         """Return the material."""
-        own = (self.material.get("extras") or {}).get("dermis")
+        own_extras = (self.material.get("extras") or {}).get("dermis")
         pbr: Tree = self.material.get("pbrMetallicRoughness") or {}
         if _GLOSS in self.extensions:
             pbr = self._from_glossiness(self.extensions[_GLOSS])
@@ -125,7 +125,7 @@ class _Reader:
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
             scatters=any(name in self.extensions for name in _SCATTERING),
-            maps=self._own_maps(own) if isinstance(own, dict) else None,
+            maps=self._own_maps(own_extras) if isinstance(own_extras, dict) else None,
             unused=tuple(self.unused),
         )
 
@@ -177,7 +177,10 @@ class _Reader:
         return r, g, b
 
     def _texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
-        """Return the texture of a reference, None if there is none or its picture cannot be read."""
+        """Return the texture that a material references; None without a reference or a readable picture.
+
+        channel : see `Texture`
+        """
         if reference is None:
             return None
         entry = self.document.item("textures", reference["index"])
@@ -208,7 +211,7 @@ class _Reader:
 
 
 def read_picture(document: Document, source: Any) -> EmbeddedPicture:
-    """Return an image of a document; its format is detected from its content.
+    """Return the image with an index in a document; its format is detected from its content.
 
     Raises DermisError for a file outside the folder.
     """
@@ -234,7 +237,7 @@ def _checked_relief(height_mm: object) -> float | None:
 
 
 def _transform(extension: Tree) -> UvTransform:
-    """Return the transform of KHR_texture_transform: scaled, rotated, then offset."""
+    """Return the uv transform that KHR_texture_transform states: first scale, then rotation, then offset."""
     if not extension:
         return IDENTITY
     (x, y), (scale_x, scale_y) = extension.get("offset", (0.0, 0.0)), extension.get("scale", (1.0, 1.0))

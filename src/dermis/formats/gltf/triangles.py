@@ -182,7 +182,7 @@ class _SceneReader:
     def _read_primitive(
         self, mesh: Tree, names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """Return a primitive in mesh space with morph targets at default weights, and all morph targets."""
+        """Return a primitive in mesh space, deformed by the default weights, and all its morph targets."""
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
@@ -214,7 +214,7 @@ class _SceneReader:
         ), targets
 
     def _other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
-        """Return the further uv coordinates (count, 2) that textures of a material use, by their index."""
+        """Return the additional uv sets (count, 2) that textures of a material use, by index of the set."""
         material = self.materials[group.material] if group.material >= 0 else FileMaterial()
         found = {}
         for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
@@ -276,9 +276,9 @@ def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], mat
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """Return the nearest rigid transform of a matrix (4, 4) that deviates from one only by rounding.
+    """Return the rigid transform that a matrix (4, 4) equals except for rounding errors.
 
-    Other matrices are returned unchanged. Exporters write scales such as 1.0000001.
+    Other matrices are returned unchanged. The errors come from exporters, which write scales like 1.0000001.
     """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:

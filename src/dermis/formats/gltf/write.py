@@ -99,7 +99,7 @@ def _primitive_sources(
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
     """Return the geometry of each glTF primitive and the material of each, in the same order.
 
-    pictures : PNG files by name; those of eyes, hairs and parts that are not skin are added
+    pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     roles : entries of the extras of skin, see `skin_pictures`
     """
     head = points.head
@@ -163,9 +163,9 @@ def _mesh_name(head: Head) -> str:
 
 
 def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """Return the glTF nodes, the indices of root nodes, and a list with the skin.
+    """Return the glTF nodes, the indices of the root nodes, and the list of skins.
 
-    Bones come first and the mesh last; the list is empty without bones.
+    The nodes are the bones, then the mesh. There is one skin, or none if the head has no bones.
     """
     skeleton = head.control.skeleton
     if skeleton is None:

@@ -19,7 +19,7 @@ from dermis.mesh.skeleton import Skeleton
 MAX_CLIP_BYTES = 48 << 20
 """Largest capture file."""
 MAX_FRAMES, MAX_NAMES = 200_000, 500
-"""Largest number of frames of a capture, almost an hour at 60 per second, and of its columns."""
+"""Largest numbers of frames (almost an hour at 60 per second) and of columns in a capture."""
 TIME_UNITS: Mapping[str, float | None] = {
     "time": 1.0,
     "times": 1.0,
@@ -31,9 +31,9 @@ TIME_UNITS: Mapping[str, float | None] = {
     "timestampus": 1e-6,
     "timestamp": None,
 }
-"""Unit of the time of a frame by its plain key [s]; None for a key that does not state it."""
+"""Unit [s] of a frame's time, by the plain key under which it is stored; None if the key states no unit."""
 FRAME_KEYS = ("frame", "frameindex", "framenumber", "frameid")
-"""Plain keys of the number of a frame."""
+"""Plain keys under which the number of a frame is stored."""
 NEUTRAL_SCORE = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
 MAX_TIME = 1e19
@@ -102,7 +102,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
-    """Raise the error for a motion without any name that is a morph target or bone of the head."""
+    """Raise the error for a motion of which no name is that of a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
@@ -125,7 +125,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None for the largest one in which frames are at most 2 s apart, with a note
+    unit : unit of the times [s]; None to assume, with a note, the largest in which frames are at most 2 s
+        apart
     """
     if unit is None:
         steps = np.diff(times)
@@ -136,7 +137,7 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
 
 
 def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
-    """Return the frame rate of a capture without times: the given one, or the default, with a note."""
+    """Return the frame rate of a capture without times: `fps` if given, else `default`, with a note."""
     if fps is None:
         assumed = f"{default:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
@@ -242,7 +243,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
     Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
     ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    necks the other half; a skeleton with only one of them applies all of it there.
+    necks the other half; without neck bones or without a head bone, the other gets all of it.
     """
     if skeleton is None:
         return RotationBones({}, {})
@@ -264,9 +265,9 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
 
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
-    """Return Euler angles (k, 3) [degrees] of head and neck bones that rotate the head.
+    """Return the Euler angles (k, 3) [degrees] of the head and neck bones, by bone name.
 
-    The bones together perform the rotations, quaternions (k, 4), of a capture.
+    rotations : (k, 4) quaternions of the head's rotation in a capture, which the bones perform together
     """
     parts = bones.head.items()
     return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}

@@ -64,7 +64,8 @@ class _CapturedFrame(NamedTuple):
 
     culprit : file with line or number of the frame, for errors
     number : number of the frame
-    time : time of the frame in units of `unit` [s], or in an unknown unit if that is None; NaN if it has none
+    time : time of the frame, in the unit `unit`; NaN if the frame has none
+    unit : unit of the time [s]; None if it is not stated
     columns, weights : (n,) indices of the blend shapes of the frame, and their weights; empty without a face
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces
@@ -89,9 +90,9 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
     first face is used. Frames without a face are interpolated. Assumptions are noted.
 
-    fps : frame rate if the frames have no time; by default that of the file, or 30
+    fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
-    Raises DermisError for a file without a face, and for invalid frames, which it names.
+    Raises DermisError for a file without a face, and for invalid frames; the message names the frame.
     """
     rate, records = _read_records(path)
     columns: dict[str, int] = {}
@@ -169,7 +170,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
     if not isinstance(record, dict | None):
         refuse(culprit, "an object in JSON", f"got {format_value(record)}", _LINE_ADVICE)
     fields = _plain_fields(record)
-    for value in tuple(fields.values()):  # a result in the record
+    for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
             fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
     shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
@@ -195,7 +196,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
 def _first_face(value: object) -> tuple[object, int]:
     """Return the blend shapes of the first face, None for no face, and the number of faces.
 
-    value : blend shapes of a face, an object with a list of them, or a list of either
+    value : blend shapes of one face, an object around their list, or a list of such values, one for each face
     """
     faces = 1
     while True:
@@ -208,7 +209,7 @@ def _first_face(value: object) -> tuple[object, int]:
 
 
 def _is_list_object(value: object) -> bool:
-    """Return whether a value is an object that holds a list: one of categories, or an Optional of Java."""
+    """Return whether a value is an object around the blend shapes: MediaPipe's lists, or a Java Optional."""
     return isinstance(value, dict) and (bool(value.keys() & _LIST_KEYS) or value.keys() == {"value"})
 
 
@@ -263,7 +264,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
 
 
 def _is_row(value: object) -> bool:
-    """Return whether the first entry of a list belongs to a matrix, and is not a matrix itself."""
+    """Return whether the first entry of a list is a row or a number of a matrix, not a whole matrix."""
     is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
     return not is_nested and not isinstance(value, dict)
 

@@ -73,7 +73,7 @@ def frame_files(path: Path) -> list[Path]:
             actual,
             "Use a pattern for one of them, such as face_%05d.obj",
         )
-    return sorted(files, key=_by_number)
+    return sorted(files, key=_frame_sort_key)
 
 
 def load_sequence(
@@ -202,14 +202,14 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _by_number(file: Path) -> tuple[int, str]:
-    """Return the sort key of a file: the last number in its name, then the name."""
+def _frame_sort_key(file: Path) -> tuple[int, str]:
+    """Return the sort key of a file: the last number in its name, then the whole name."""
     numbers = re.findall(r"\d+", file.stem)
     return int(numbers[-1]) if numbers else -1, file.name
 
 
 class FrameVertices(NamedTuple):
-    """Vertices of one mesh file, without those that no triangle uses.
+    """Vertices of one mesh file that its triangles use.
 
     positions_mm : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
@@ -222,24 +222,24 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """Pattern of an OBJ file: all but its positions, to recognise files that differ only in these.
+    """All of an OBJ file except its positions, to recognise files that differ only in positions.
 
     digest : hash of all lines except `v` and `vn`
-    lines : number of `v` lines
-    line : (v,) index of the `v` line of each vertex
+    line_count : number of `v` lines
+    line_of_vertex : (v,) index of the `v` line of each vertex
     """
 
     digest: bytes
-    lines: int
-    line: Index
+    line_count: int
+    line_of_vertex: Index
 
 
 @dataclass
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    If an OBJ file differs from the first one only in positions, only these are parsed, which is 20 times as
-    fast.
+    If an OBJ file differs from the first one only in positions, only its positions are parsed, which is 20
+    times as fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
     to_head : (3, 3) rotation from the axes of the files to those of the head
@@ -278,7 +278,7 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the pattern of the first file; None if its positions are not the numbers of its lines."""
+        """Return the pattern of the first file; None if its positions are not those in its `v` lines."""
         assert self._first is not None
         data = read_obj_text(path).encode()
         pattern = _find_pattern(path, data)
@@ -304,7 +304,8 @@ def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
 
     data : text of the file in UTF-8
 
-    The file is parsed with the index of each `v` line as x coordinate, which shows the line of each vertex.
+    The file is parsed with the index of each `v` line as its x coordinate, so that the x of a parsed vertex
+    is the index of its line.
     """
     positions, digest = _split_vertex_lines(data)
     count = iter(range(len(positions)))
@@ -321,10 +322,10 @@ def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
     data : bytes of the file
     """
     rows, digest = _split_vertex_lines(data)
-    if len(rows) != pattern.lines or digest != pattern.digest:
+    if len(rows) != pattern.line_count or digest != pattern.digest:
         return None
     try:
-        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line]
+        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line_of_vertex]
     except ValueError:  # the parser raises a better error
         return None
     return positions if np.isfinite(positions).all() else None

@@ -23,7 +23,7 @@ _ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
 class OpenedStage(NamedTuple):
-    """Stage of a USD file, and the folder of its layers, which are copied there from a package."""
+    """Stage of a USD file, and the folder of its layers; the layers of a package were copied there."""
 
     stage: Usd.Stage
     folder: Path

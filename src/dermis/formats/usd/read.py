@@ -20,7 +20,7 @@ from dermis.formats.axes import Axes, Axis
 from dermis.formats.maps import PathLike
 from dermis.formats.materials import FileMaterial, Role, Texture, check_pictures
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, parse_colour
-from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small
+from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small_polygons
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES
 from dermis.images.io import EmbeddedPicture
@@ -56,13 +56,14 @@ USD_PROPERTIES = (
     refused("layers in other places, value clips", "before any of them is opened"),
     noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
 )
-"""Properties of USD files without their materials."""
+"""Properties of USD files, except those of materials."""
 
 
 def read_usd(path: Path) -> MeshFile:
     """Read the meshes of a USD file at its first time, with their materials.
 
-    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder.
+    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder of
+    the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
@@ -73,9 +74,9 @@ def read_usd(path: Path) -> MeshFile:
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
     for number, mesh in enumerate(scene["meshes"]):
-        own, own_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
-        parts += own
-        notes |= dict.fromkeys(own_notes)
+        mesh_parts, mesh_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
+        parts += mesh_parts
+        notes |= dict.fromkeys(mesh_notes)
     axes = Axes(cast(Axis, scene["up"]))
     return MeshFile(parts, materials=materials, notes=tuple(notes), unit_mm=scene["unit_mm"], axes=axes)
 
@@ -95,7 +96,8 @@ def _parts(
 ) -> tuple[list[MeshPart], list[str]]:
     """Return the parts of a mesh, one for each group, and notes.
 
-    prefix : prefix of the names of the mesh's arrays
+    answer : arrays of all meshes, see `_SceneReader.read`
+    prefix : prefix of the names of this mesh's arrays
     """
     mesh = {name.removeprefix(prefix): own for name, own in answer.items() if name.startswith(prefix)}
     check_polygon_sizes(path, mesh["counts"])
@@ -103,8 +105,8 @@ def _parts(
     missing = np.full(len(vertex), -1)
     columns = [vertex, mesh.get("uv index", missing), mesh.get("normals index", missing)]
     kept: Mask = np.asarray(mesh["group"] >= 0)
-    counts, corners = _selected(mesh["counts"], np.column_stack(columns).astype(np.int64), kept)
-    counts, corners, polygons, notes = without_small(counts, corners)
+    counts, corners = _select_polygons(mesh["counts"], np.column_stack(columns).astype(np.int64), kept)
+    counts, corners, polygons, notes = without_small_polygons(counts, corners)
     if not len(counts):
         return [], notes
     geometry = Polygons(
@@ -118,7 +120,7 @@ def _parts(
     return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
 
 
-def _selected(counts: Index, corners: Index, mask: Mask) -> tuple[Index, Index]:
+def _select_polygons(counts: Index, corners: Index, mask: Mask) -> tuple[Index, Index]:
     """Return the polygons that a mask (n,) selects: their numbers of corners, and their corners."""
     corner = expand_runs((np.cumsum(counts) - counts)[mask], counts[mask])[1]
     return counts[mask], corners[corner]
@@ -143,7 +145,7 @@ class _Pictures:
         """
         textures, missing = dict[Role, Texture](), dict[str, str]()
         for role, one in tree["textures"].items():
-            picture = self._find(one["file"])
+            picture = self._find_picture(one["file"])
             if picture is None:
                 missing[role] = f"its picture {one['file']!r} is not in the {self._picture_location()}"
             else:
@@ -159,7 +161,7 @@ class _Pictures:
     def _picture_location(self) -> str:
         return "folder of the file" if self.package is None else "package"
 
-    def _find(self, name: str) -> PathLike | None:
+    def _find_picture(self, name: str) -> PathLike | None:
         """Return the picture with a name relative to the layers, or None."""
         if self.package is None:
             return find_referenced_file(self.path, name) if name else None

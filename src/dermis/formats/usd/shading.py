@@ -60,7 +60,7 @@ _BLACK = (0.0, 0.0, 0.0)
 
 
 class _Source(NamedTuple):
-    """Output of a shader that an input is connected to."""
+    """Output of a shader to which an input is connected."""
 
     shader: UsdShade.Shader
     output: str
@@ -95,15 +95,15 @@ class MaterialReader:
                 self._add_source(tree, name, role, source)
         self._add_opacity(tree, surface, values)
         self._list_unused_inputs(tree, surface)
-        return _as_unlit(tree)
+        return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
+    def _add_source(self, tree: Tree, input_name: str, role: str, source: _Source) -> None:
         """Add the texture or the vertex colours to which an input is connected."""
         kind = str(source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             tree |= {"vertex_colours": self._text(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
         elif kind != "UsdUVTexture":
-            tree["unused"].append(f"{name} from {kind}")
+            tree["unused"].append(f"{input_name} from {kind}")
         else:
             texture = self._texture(source, tree)
             tree["textures"][role] = texture
@@ -111,7 +111,7 @@ class MaterialReader:
             if role == "normal":
                 tree["normal_scale"] = 0.5 * factor[0] if bias[0] else 1.0
             elif any(bias[: len(factor)]):
-                tree["unused"].append(f"bias of the picture of {name}")
+                tree["unused"].append(f"bias of the picture of {input_name}")
             if role in ("colour", "emission"):
                 tree[role] = factor[:3]
             elif role != "normal":
@@ -180,38 +180,38 @@ class MaterialReader:
             return file.relative_to(self.folder).as_posix() if file.is_relative_to(self.folder) else name
         return ""
 
-    def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
-        """Return the attributes that provide an input's value, resolved through material interfaces."""
-        entry = shader.GetInput(name)
+    def _attributes(self, shader: UsdShade.Shader, input_name: str) -> list[Usd.Attribute]:
+        """Return the attributes from which an input gets its value, found through its connections."""
+        entry = shader.GetInput(input_name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
-    def _source(self, shader: UsdShade.Shader, name: str) -> _Source | None:
-        """Return the output of a shader that an input is connected to, or None."""
-        for attribute in self._attributes(shader, name):
+    def _source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
+        """Return the output to which an input of a shader is connected, or None."""
+        for attribute in self._attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
                 return _Source(self.shade.Shader(attribute.GetPrim()), output)
         return None
 
-    def _value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
+    def _value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
         """Return the constant value of an input as numbers, or the default."""
-        for attribute in self._attributes(shader, name):
+        for attribute in self._attributes(shader, input_name):
             if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
                 numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
                 if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
-                    actual = f"{name} of {shader.GetPath()} is not"
+                    actual = f"{input_name} of {shader.GetPath()} is not"
                     refuse(self.path, "finite numbers in materials", actual, "Correct it, or export again")
                 return numbers
         return default
 
-    def _text(self, shader: UsdShade.Shader, name: str) -> str:
-        values = [attribute.Get(self.time) for attribute in self._attributes(shader, name)]
+    def _text(self, shader: UsdShade.Shader, input_name: str) -> str:
+        values = [attribute.Get(self.time) for attribute in self._attributes(shader, input_name)]
         return str(next((value for value in values if value is not None), ""))
 
 
-def _as_unlit(tree: Tree) -> Tree:
-    """Return a material in which the emission of an unlit scan becomes the surface colour."""
+def _emission_to_colour(tree: Tree) -> Tree:
+    """Return a material; a picture of emission over a black colour, as in unlit scans, becomes the colour."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]
