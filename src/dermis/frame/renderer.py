@@ -49,7 +49,7 @@ def pipeline_frames(
     device: Callable[[], Device],
     frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
-    """Yield the result of each frame in order, while the next frames are already submitted.
+    """Yield the result of each frame in order, while later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -83,7 +83,7 @@ class Renderer:
     adapter : str
         "auto", "cpu" or part of the name of an adapter.
     cache_size : int
-        Number of variants of each resource that are cached, for callers that alternate between a few.
+        Number of variants of each resource that are cached, for callers that alternate between a few scenes.
     cache_ttl : int
         Number of frames after which unused resources are released.
     reopens : bool

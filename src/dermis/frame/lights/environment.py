@@ -102,8 +102,8 @@ def environment_record(
 ) -> UniformRecord:
     """Return the uniform record of the environment: rotation, exposure and lobes of reflections.
 
-    albedo : (3,) albedo of the profile as the frame uses it [-]
-    occluded : whether the head hides part of the environment from its skin
+    albedo : (3,) albedo of skin where its colour map is white [-]
+    occluded : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
         return program.record("Environment")

@@ -90,9 +90,9 @@ class ScreenSpace(Technique):
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
         """Declare the passes that diffuse the light below the skin, and return the finished picture."""
-        own = inputs.resources.technique
-        assert isinstance(own, SubsurfaceLayers) and own.kernel is not None
-        return draw(graph, own, own.kernel, inputs.window, radiance)
+        layers = inputs.resources.technique
+        assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
+        return draw(graph, layers, layers.kernel, inputs.window, radiance)
 
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs

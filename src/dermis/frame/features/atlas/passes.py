@@ -43,9 +43,9 @@ def _placeholder_edge_map(device: Device) -> Texture:
 
 
 def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
-    """Declare the passes that fill the gutters of a texture with its light from across the seams.
+    """Declare the passes that copy light of a texture from across the seams to its gutters.
 
-    A buffer holds the light in between, because a pass cannot read and write the same texture.
+    The light is first copied to a buffer, because a pass cannot read and write the same texture.
 
     stage : name of the stage in timings
     light : texture of light over the atlas

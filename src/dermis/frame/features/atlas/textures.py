@@ -24,7 +24,7 @@ _TEXTURE_NAME = "map of the atlas"
 _LIGHT_BYTES = 16  # size of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
 SAME_SOURCE_TEXELS = 4.0
-"""Largest distance between the sources of four gutter neighbours that are averaged [texels]."""
+"""Largest distance between sources of gutter texels that are averaged at half the resolution [texels]."""
 
 
 def atlas_constants() -> dict[str, int | float]:
@@ -43,11 +43,13 @@ def atlas_constants() -> dict[str, int | float]:
 class AtlasTextures:
     """Textures and buffers of an atlas.
 
-    resources : textures by their shader names: atlas, stretch_map (filled by its pass), reach_map, and
-        edge_map for two layouts and for feathered stretch; coarser resolutions have stretch_map and reach_map
+    resources : textures by their names in shaders: atlas, stretch_map (filled by `draw_stretch`), reach_map,
+        and edge_map for two layouts or feathered seams; coarser resolutions only have stretch_map and
+        reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, or None
+    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, None without
+        gutters
     gutter, gutter_light : buffers of the gutter texels and of their light, None without gutters
     gutter_texels : (a, 2) gutter texels, x and y
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
@@ -79,7 +81,7 @@ def upload_atlas(
 
     stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes the same
         texel density everywhere
-    seams : treatment of seams, which decides on the edge map and on feathering
+    seams : how seams are treated; determines whether an edge map is uploaded, and whether seams are feathered
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
@@ -226,7 +228,7 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
 
 
 def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), with their corners in row order."""
+    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), the first axis over the texels of a square."""
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 

@@ -11,7 +11,7 @@ from dermis.frame.programs import FLOAT_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
-"""Number of the narrowest Gaussians whose light is corrected within texels when the picture is shaded."""
+"""Largest number of Gaussians, narrowest first, whose light is corrected within texels in the picture."""
 TEXEL_FILTER_SIGMA = 0.5
 """Standard deviation of the filter that keeps light on the atlas from aliasing [texels]."""
 
@@ -54,7 +54,7 @@ def draw(
     texel : format of the texture
     scale : factor from irradiance to the texels of `into`
     filter_sigma : standard deviation of the filter of light finer than texels [texels]; 0 samples texel
-        centres, for texels whose neighbours in the texture are no neighbours on the surface
+        centres, for textures whose adjacent texels are not adjacent on the surface
     """
     if filter_sigma:  # neighbouring texels are neighbours on the surface
         constants = oblique_constants(constants)

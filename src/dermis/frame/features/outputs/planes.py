@@ -14,7 +14,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder
 from dermis.scene.outputs import OUTPUTS
 
-_WORD_BYTES = 4  # bytes
+_WORD_BYTES = 4  # size of a word [bytes]
 PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 """Array of an output: float32, int32 or uint8, see `OUTPUTS`."""
 

@@ -26,7 +26,7 @@ DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map [-]."""
 _EYE_SEEDS = 1000  # number of different eyes
 _NO_BAND = -1.0
-_MAX_OFFSET_MM = 3.0  # limit, as the surface is flat only near a texel
+_MAX_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[ShaderListMember]:

@@ -26,13 +26,13 @@ _SOFTWARE_CONSTANTS: Constants = (
 )  # barriers are slow on software adapters
 _SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 Floats = NDArray[np.float64]
-# Least variance of a Gaussian over the squared spacing of its samples, for a sum that is even to 1e-6.
+# Least ratio of a Gaussian's variance to the squared sample spacing, for a sum that is constant to 1e-6.
 _MIN_VARIANCE_RATIO = 0.72
 _PAIRS_PER_ROW, _PAIRS_PER_GROUP = (
     1024,
     64,
 )  # pairs of a row of workgroups, and of a workgroup in translucency_weights.wgsl
-_MIN_SMOOTHNESS = 0.45  # least standard deviation of the light that sources sample, over their spacing
+_MIN_SMOOTHNESS = 0.45  # least ratio of the deviation of the light that sources sample to their spacing
 
 
 def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:

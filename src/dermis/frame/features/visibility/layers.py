@@ -112,9 +112,9 @@ def _word_buffer(device: Device, count: int) -> Buffer:
 def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
     name = "visibility buffer" if triangles else "shadow maps"
 
-    def layered(texel: str, number: int) -> tuple[Texture, list[TextureView]]:
-        texture = make_texture(device, size, texel, layers=max(2, number), use="raster", name=name)
-        return texture, [make_view(texture, layer=k) for k in range(number)]
+    def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
+        texture = make_texture(device, size, texel, layers=max(2, layer_count), use="raster", name=name)
+        return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not triangles:
         texture, depth = layered("depth32float", count)
