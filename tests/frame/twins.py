@@ -10,9 +10,9 @@ from scipy.ndimage import map_coordinates
 
 from dermis.atlas.atlas import Atlas
 from dermis.frame.features.diffusion.kernels import (
+    CHAINED_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    CHAINED_TRUNCATION_SIGMAS,
     kernel_table,
 )
 from dermis.mesh.head import Head

@@ -1,6 +1,6 @@
 // Skin of all samples of a pixel.
 
-const MAX_SLOPE: f32 = 4.0; // change of depth over width within one surface
+const MAX_SLOPE: f32 = 4.0; // largest ratio of a change of depth to the width within one surface
 const MAX_STEP: f32 = 2.0; // step in depth that light below the skin can cross [mm]
 
 // Skin of a pixel; the other members are multiplied by its coverage.

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.kernels import (
+    CHAINED_TRUNCATION_SIGMAS,
     MAX_CHAINED_DEVIATION,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    CHAINED_TRUNCATION_SIGMAS,
     TRUNCATION_SIGMAS,
     kernel_table,
 )
