@@ -70,7 +70,7 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c) from one set of coefficients with different factors.
+    """Return k panoramas (k, height, 2 height, c) from one set of coefficients, scaled by k sets of factors.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
     factors : (k, degree + 1) factor of each panorama for each degree, such as those of `zonal_factors`

@@ -25,9 +25,8 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
-_POINTS_PER_PASS = (
-    1 << 20
-)  # surface points per pass; their results fit a buffer of the default limits of WebGPU
+# Surface points per pass, whose results fit in a buffer of the default size limit of WebGPU.
+_POINTS_PER_PASS = 1 << 20
 _PICTURE_SIZE = (64, 64)  # size of the picture, which is discarded: the frame only has to light the atlas
 _ALBEDO_ATLAS = 512  # side of the atlas where only albedo is baked [texels]
 _ALBEDO_SIDE = 2048  # side of the maps that sets the filter width where only albedo is baked [texels]

@@ -73,7 +73,7 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
 
 
 def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
-    """Return the longitudinal scattering function, which integrates to 1 over the sine of the light [-].
+    """Return the longitudinal scattering function, whose integral over the light's sine sin_i is 1 [-].
 
     sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
     v : variance of the lobe

@@ -74,7 +74,7 @@ fn towards_light(light: Light, p: vec3f) -> vec3f {
     return normalize(light.position - p);
 }
 
-// Number of directions from which light is sampled.
+// Number of directions in which a light is sampled.
 fn parts_of(light: Light) -> u32 {
     return select(1u, light.side * light.side, SHAPES);
 }

@@ -36,9 +36,8 @@ _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
 _WIDTH_PER_COVER_PX = 0.2  # added width per unit of cover: where hair hides hair, fewer strands suffice
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
-_STRAND_DTYPE = np.dtype(
-    [("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)]
-)  # row of the table in strands_pose.wgsl
+# Row of the table of strands in strands_pose.wgsl.
+_STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
@@ -166,7 +165,7 @@ class StrandTables:
     shadow_casters : number of coarse strands that cast the shadows of all coarse strands
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : mean over the coarse roots of the projected hair area around a root, per area of skin [-]
+    mean_cover : projected area of hair per area of skin around the root of a coarse strand, on average [-]
     """
 
     strands: Buffer

@@ -84,7 +84,7 @@ def make_interreflection(
     albedo : (3,) albedo of the profile
     has_occlusion : whether there is a map of the visible fraction of the sky
     light_key : cache key of the light, for callers that draw several scenes in turn
-    owner : name of the atlas layout in the memo
+    owner : name of the atlas layout in the cache
     """
     form_factors = memo.get(_form_factors, head, atlas, owner=owner)
     if not len(form_factors.cell_factor):

@@ -39,7 +39,7 @@ def draw(
     graph: Recorder,
     layout: LitAtlas,
     constants: Constants,
-    into: TextureOrView,
+    target: TextureOrView,
     side: int,
     texel: str = FLOAT_FORMAT,
     scale: float = 1.0,
@@ -49,10 +49,10 @@ def draw(
 
     layout : atlas with the resources that light its texels
     constants : pipeline constants of the lights
-    into : texture of `side` x `side` texels
+    target : texture of `side` x `side` texels to write to
     side : side of the atlas [texels]
     texel : format of the texture
-    scale : factor from irradiance to the texels of `into`
+    scale : factor from irradiance to the texels of `target`
     filter_sigma : standard deviation of the filter of light finer than texels [texels]; 0 samples texel
         centres, for textures whose adjacent texels are not adjacent on the surface
     """
@@ -60,5 +60,5 @@ def draw(
         constants = oblique_constants(constants)
     shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel)
     entering = shader.record("Entering", scale=scale, area=filter_sigma)
-    bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": into}
+    bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": target}
     graph.compute("irradiance", shader, bound, (side, side))

@@ -16,7 +16,7 @@ from dermis.human.labels.fields import MeshLabels, hair_classes, mesh_labels
 from dermis.mesh.head import Head
 
 LABEL_STAGE = "label"
-"""Name of the stage that writes labels, with which the names of label outputs begin."""
+"""Name of the stage that writes labels, and prefix of the names of label outputs."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,7 +100,7 @@ def make_translucency(
     tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
-    owner : name of the atlas layout in the memo
+    owner : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
@@ -126,7 +126,7 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def find(self, cells: Cells) -> PairBuffers:
-        """Return the pairs that are near enough for the widest Gaussian of the cells."""
+        """Return the pairs for a division into cells; they are searched unless they are in the cache."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:
