@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
 MIN_SMOOTHNESS = 0.45
-"""Least standard deviation [mm] at which light may be stored in larger texels, relative to their squared side
-[mm^2]."""
+"""Factor of the squared texel side [mm^2]: light is stored in larger texels only if its standard deviation [mm]
+is at least the product."""
 MIN_WEIGHT_SUM = 1e-12
 """Least divisor of a sum of weights, for channels without any weight."""
 
@@ -106,7 +106,8 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Py
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of levels that each resolution stores, finest first.
 
-    A coarser resolution also stores a reduced copy of the last finer level. Ranges suffice for all layouts.
+    A coarser resolution also stores a reduced copy of the last finer level. Each range covers the levels of
+    all layouts.
     """
     coarsest = max(map(max, halvings))
     return tuple(
