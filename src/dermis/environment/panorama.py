@@ -19,7 +19,7 @@ UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _MIN_ROWS, _MAX_ROWS = 256, 512
 """Least and largest number of rows of a loaded panorama; others are resampled, for accuracy and for speed."""
-_MAX_RADIANCE = 1e12  # far above that of the sun; prevents overflow of single precision
+_MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of single precision
 MAX_SUNS = 4
 _PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
 _CLUSTER_DEGREES = 8.0

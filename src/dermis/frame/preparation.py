@@ -161,7 +161,7 @@ class Preparation:
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
         """Return the profiles of the skin and their blend weights.
 
-        For techniques that cannot blend profiles, these are the first profile alone, and None.
+        Techniques that cannot blend profiles get the first profile alone, and None in place of weights.
         """
         if technique.mixes_profiles:
             return self.profiles.mixture(skin)
@@ -191,7 +191,7 @@ class Preparation:
         return PreviousScene(None if motion == inputs.motion else motion, view)
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
-        """Return the pose, outline and eyes of a head; for None as motion, those in the rest pose."""
+        """Return the pose, outline and eyes of a head, in its rest pose if `motion` is None."""
         at_rest = self.memo.get(_rest_motion, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 

@@ -207,7 +207,7 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
 
 
 def _largest_tangents(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
-    """Return, for each view, the tangent of the half angle that contains all points, across and upwards [-].
+    """Return, for each view, the tangent of half the square field of view that contains all points [-].
 
     sides : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
     depth : (k, n) depths of the points

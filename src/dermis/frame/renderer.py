@@ -212,7 +212,7 @@ class Renderer:
         settings : Settings, optional
             Size, technique and other settings.
         force : bool
-            True runs all passes instead of only stale ones.
+            True runs all passes, instead of only those whose inputs have changed.
         timed : bool or "whole"
             True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame
             as one pass. False returns when the frame is submitted, and waits only if three frames are in

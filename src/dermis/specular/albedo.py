@@ -55,7 +55,7 @@ def directional_albedo(
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
     reflected = n_l * lobe(Cosines(n_l, c, n_h, v_h), m, fresnel)
-    # The solid angle of the half vector is n_h^3 dx dy, that of the light 4 v_h times it; 2 is for y and -y.
+    # The half vector's solid angle is n_h^3 dx dy; the light's is 4 v_h times as large. 2 is for y and -y.
     albedo: Floats = (8.0 * reflected * v_h * n_h**3 * dx * dy).sum(axis=(-2, -1))
     return albedo
 

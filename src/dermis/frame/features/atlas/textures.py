@@ -126,7 +126,9 @@ def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> 
     return float(middle.astype(np.uint16).view(np.float16).astype(np.float64).mean())
 
 
-def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **more: Any) -> AtlasTextures:
+def _upload_mip(
+    device: Device, mip: AtlasMip, resources: dict[str, Texture], **members: Any
+) -> AtlasTextures:
     reach = mip.reach.copy()
     reach[..., 0] |= np.where(mip.covered & ~mip.lit, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
@@ -136,12 +138,12 @@ def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **
         ),
     }
     if not len(mip.gutter):
-        return AtlasTextures(resources, **more)
+        return AtlasTextures(resources, **members)
     entries = np.concatenate([mip.source.view(np.uint32), mip.gutter.astype(np.uint32)], axis=1)
     gutter_light = mark_scratch(device, device.storage_buffer(_LIGHT_BYTES * len(entries)))
     gutter = device.buffer(entries, "STORAGE")
     return AtlasTextures(
-        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **more
+        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **members
     )
 
 

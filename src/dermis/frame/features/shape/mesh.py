@@ -116,7 +116,7 @@ def rest_geometry(
     """Return the triangles of an atlas layout with the vertices of the head at rest.
 
     geometry : triangles of the layout, with the vertices of the posed head
-    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for those of the head
+    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for the head itself
     index : index of the atlas layout
     """
     positions, owner = rest_positions_mm, "person"

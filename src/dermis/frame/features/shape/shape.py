@@ -25,7 +25,7 @@ VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 _VERTEX_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
 _VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
 MIN_TANGENT = 1e-3
-"""Least ratio of the part of dpdu orthogonal to the normal to dpdu itself; shorter tangents are replaced."""
+"""Least length of the part of dpdu orthogonal to the normal, relative to dpdu; shorter ones are replaced."""
 
 
 @dataclass(frozen=True, eq=False)

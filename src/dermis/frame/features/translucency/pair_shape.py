@@ -1,4 +1,4 @@
-"""Shape in which translucent pairs are searched: that of the head at rest, until the surface is strained."""
+"""Shape in which translucent pairs are searched: the head at rest, or another shape that is too strained."""
 
 from __future__ import annotations
 

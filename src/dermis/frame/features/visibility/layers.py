@@ -233,7 +233,7 @@ def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, in
     """
     fewest, most = _GROUP_TRIANGLES
     per_group = min(most, max(fewest, 1 << (triangles * views // _TARGET_GROUPS).bit_length() >> 1))
-    many = per_group == most  # many triangles are small ones
+    many = per_group == most  # meshes of many triangles have small ones
     threads = 256 if many or samples > 1 else 128
     run, small = (_RUN_TRIANGLES, 32) if many else (1, 16)
     constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)
