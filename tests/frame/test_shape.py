@@ -14,7 +14,7 @@ from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas import gutters
-from dermis.frame.features.atlas.gutters import make_gutter_tracing, with_own_gutters
+from dermis.frame.features.atlas.gutters import make_gutter_tracing, with_separate_gutters
 from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import AtlasMip, halve_mip, upload_atlas
 from dermis.frame.features.shape import shape
@@ -169,7 +169,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     made = make_shape(device, shape_tables(device, head))
     walks, walked = (
         make_gutter_tracing(device, head.mesh, atlas, textures),
-        with_own_gutters(device, textures),
+        with_separate_gutters(device, textures),
     )
     shape.draw(frame, made, MotionBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))

@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _MIN_ROWS, _MAX_ROWS = 256, 512
-"""Rows of a loaded panorama: smaller ones are resampled for accurate integrals, larger ones averaged."""
-_MAX_RADIANCE = 1e12  # far above that of the sun; prevents overflow of single precision
+"""Least and largest number of rows of a loaded panorama; others are resampled, for accuracy and for speed."""
+_MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of single precision
 MAX_SUNS = 4
 _PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
 _CLUSTER_DEGREES = 8.0
@@ -174,7 +174,7 @@ def _luminance_sum(light: Floats) -> float:
 
 
 def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
-    """Return the sun for a cluster of n texels: a uniform disc with equal mean square radiance.
+    """Return the sun for a cluster of n texels: a uniform disc with the same light and mean square radiance.
 
     light : (n, 3) radiance of each texel times its solid angle
     towards : (n, 3) unit vectors to the texels
@@ -187,7 +187,7 @@ def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
 
 
 def _bright_clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Group n bright texels into clusters; return the mask (n,) of each, from the brightest peak on.
+    """Group n bright texels into clusters; return the mask (n,) of each, that of the brightest peak first.
 
     brightness : (n,) luminance
     towards : (n, 3) unit vectors to the texels

@@ -25,14 +25,14 @@ class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
     profile : diffusion profile of the skin, the first one if a map blends several
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None where they equal the topology's
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are the topology's
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
-    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None without any
+    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
     outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """
 
@@ -75,10 +75,10 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the Gaussians that the technique relights and blurs, other profiles included."""
+        """Return the profile, and any other profiles, split into relit and blurred Gaussians."""
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
-        fine = {} if others else first.fine  # where widths vary, a stripe is as fine as texels
+        fine = {} if others else first.fine  # with blends, stripes are as fine as texels
         return replace(first, others=tuple(others), fine=fine)
 
     @property
@@ -104,7 +104,7 @@ class FrameRequest:
 
     @cached_property
     def seam_method(self) -> SeamMethod:
-        """Return the treatment of seams that the settings and the technique select."""
+        """Return how seams are treated, which depends on the settings and the technique."""
         return seam_method(self.settings.seams, self.technique.stitches_seams)
 
     @property
@@ -117,7 +117,7 @@ class FrameRequest:
 
     @property
     def has_fine_relief(self) -> bool:
-        """Return whether the skin has relief finer than its maps; painted gloss maps store its strength."""
+        """Return whether the skin has relief finer than its maps, whose strength painted gloss maps store."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 

@@ -17,13 +17,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Profile split into a narrow Gaussian, evaluated per pixel, and Gaussians that blur the atlas.
+    """Profile split into a narrow Gaussian that is relit per pixel, and Gaussians that blur the atlas.
+
+    To relight means to use unblurred light, evaluated per pixel, in place of light blurred by the Gaussian.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
     others : splits of the profiles that a map blends with this one; they have the same Gaussians
-    fine : members of the shader's struct Fine for light that varies within a texel, empty without it
+    fine : members of the shader's struct Fine, for light that varies within a texel; empty if it is ignored
     """
 
     relit: Floats
@@ -35,7 +37,7 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return (o, 3) relit weights of the o other profiles minus those of this profile [-]."""
+        """Return (o, 3) weights of the relit Gaussian in the o other profiles, minus that in this one [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
@@ -45,7 +47,7 @@ class ProfileSplit:
 
 
 class TechniqueResources:
-    """Tables and textures of a technique; base class without any."""
+    """Tables and textures of a technique; this base class has none."""
 
 
 class TechniqueTraits:

@@ -24,8 +24,8 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
-    The factor (s + 2) / 8 pi is a quarter of that of a normalised slope distribution. The lobe has no masking
-    and no division by n.l n.v, so it fades at grazing angles, where that of skin does not.
+    The factor (s + 2) / 8 pi is a quarter of the factor that normalises the slope distribution. The lobe has
+    no masking and no division by n.l n.v, so it fades at grazing angles, where the lobe of skin does not.
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cosines:
-    """Cosines n.l, n.v, n.h and v.h of the normal n, light l, view v and half vector h, of one array shape.
+    """Cosines n.l, n.v, n.h and v.h of normal n, light l, view v and half vector h, as arrays of equal shape.
 
     The half vector is (l + v) / |l + v|. These cosines suffice for isotropic microfacet lobes, as l.v is 2
     (v.h)^2 - 1.

@@ -25,10 +25,10 @@ _CACHE_SIZE = 4
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Textures for skin whose profile is blended by a map from a first profile and one or two others.
+    """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture of the blend weights of the other profiles over uv
-    entering : one pyramid for each other profile: the light that enters, times its blend weight
+    entering : one pyramid for each other profile: the light that enters, times the profile's blend weight
     atlas_weights : textures of these blend weights over the atlas, one for each layout
     sums : texture array of exitance: layer 0 for the first profile alone, then two layers for each other
         profile with its difference from the first: of all light, and of the light in its `entering` pyramid
@@ -124,7 +124,7 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, inde
 def draw_entering(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of another profile: the entering light times its blend weight.
+    """Declare the pass that fills level 0 of another profile with the entering light times its blend weight.
 
     levels : pyramid whose level 0 holds all light that enters
     index : index of the atlas layout

@@ -50,7 +50,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     var hidden = 0u;
     for (var i = 0u; i < rays; i += 4u) {
         let points = four_points(light, i);
-        let rising = bits(rise(light, at, points)) & ((1u << min(rays - i, 4u)) - 1u);
+        let rising = bits(are_above_plane(light, at, points)) & ((1u << min(rays - i, 4u)) - 1u);
         if (rising == 0u) {
             continue; // below the tangent plane
         }
@@ -94,7 +94,7 @@ fn bits(which: vec4<bool>) -> u32 {
 }
 
 // Whether points of the light are above the tangent plane.
-fn rise(light: Light, at: Receiver, points: FourPoints) -> vec4<bool> {
+fn are_above_plane(light: Light, at: Receiver, points: FourPoints) -> vec4<bool> {
     let x = points.x * light.extent.x;
     let y = points.y * light.extent.y;
     if (is_parallel(light)) {

@@ -36,7 +36,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # range of the tables, in standard deviations
+_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # thickest part in the tables: in standard deviations, and in mm
 _STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
 _CACHE_SIZE = 4
 _UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
@@ -98,9 +98,9 @@ def make_translucency(
     rest_surface : the same resources for the shape in which pairs are searched
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
     tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
-    shares_pairs : whether skins with similar profiles use the same pairs, as for skins that change between
-        frames
-    owner : name of the atlas layout in the memo
+    shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
+        between frames
+    owner : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
@@ -126,7 +126,7 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def find(self, cells: Cells) -> PairBuffers:
-        """Return the pairs that are near enough for the widest Gaussian of the cells."""
+        """Return the pairs for a division into cells; they are searched unless they are in the cache."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:

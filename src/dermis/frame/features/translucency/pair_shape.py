@@ -1,4 +1,4 @@
-"""Shape in which translucent pairs are searched: that of the head at rest, until the surface is strained."""
+"""Shape in which translucent pairs are searched: the head at rest, or another shape that is too strained."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.mesh.head import Head
 MAX_STRAIN = 0.2
 """Relative change of lengths on the surface up to which the pairs of the head at rest are used."""
 _SAMPLES, _SEED = 2000, 0
-_QUANTILE = 0.9  # of the lengths, which ignores the few that connect parts such as the lips
+_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few lengths from lip to lip
 
 
 class StrainGauge:
@@ -30,7 +30,7 @@ class StrainGauge:
         self._rest_lengths = self._lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the relative change of lengths that nine in ten do not exceed [-].
+        """Return the relative change that nine in ten lengths do not exceed [-].
 
         positions_mm : (p, 3) control points of another shape [mm]
         """
