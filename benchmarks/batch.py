@@ -43,13 +43,13 @@ from dermis.cli.options import parse_size
 from dermis.frame.renderer import Renderer
 
 OUTPUTS, LANDMARKS = ("depth", "normal", "label"), ("ibug-68",)
-_FROM, _TO = 0.25, 0.9  # of the images: processes that start, and those that have nothing left, lie beyond
+_FROM, _TO = 0.25, 0.9  # measured part of the images, without start and end of the processes
 _STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
-_SHARDS = 10  # of each worker, because progress is reported by complete shards
+_SHARDS = 10  # shards per worker, because progress is reported by complete shards
 MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
-"""Images of a worker after which its memory is read."""
+"""Numbers of images after which the memory of a worker is read."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> S
 class Clock:
     """Times at which images were finished, and the memory of the workers.
 
-    resident : resident bytes of the largest worker by number of images of each
+    resident : resident memory of the largest worker, by number of images per worker [byte]
     """
 
     seen: list[tuple[float, int]] = field(default_factory=list)
@@ -141,7 +141,7 @@ def dask(plan: Plan, count: int) -> JsonObject:
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
     threads = {"LP_NUM_THREADS": str(slots[0].threads)} if slots[0].threads else {}
     plain = measured_run(plan, ProcessPool(slots), spec, encoders)
-    quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md says
+    quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md recommends
     with (
         _environment(threads),
         import_extra("dask", "the comparison with dask").config.set(quiet),
@@ -150,7 +150,7 @@ def dask(plan: Plan, count: int) -> JsonObject:
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
-            memory_limit=0,  # of its own dask pauses workers at a share of what the machine had at first
+            memory_limit=0,  # otherwise dask pauses workers at a fraction of the machine's memory
         ) as made,
     ):
         there = measured_run(plan, DaskCluster(made.scheduler_address, None, plan.adapter), spec, encoders)
@@ -172,7 +172,7 @@ def steps(plan: Plan) -> JsonObject:
         scene, settings = _timed(times_ms, "scene", maker.build, parameters)
         observation = _timed(times_ms, "draw_and_read", observe, scene, settings)
         _timed(times_ms, "encode", encode_record, number, observation, parameters, spec)
-    return {name: median(times[2:]) for name, times in times_ms.items()}  # the first ones fill caches
+    return {name: median(times[2:]) for name, times in times_ms.items()}  # the first images fill caches
 
 
 def disk(plan: Plan) -> JsonObject:
@@ -287,7 +287,7 @@ def main(
 def measure(
     plan: Plan, counts: list[int], parts: list[str], keep: Callable[[JsonObject], None]
 ) -> JsonObject:
-    """Return all figures; call `keep` with those known so far after each part."""
+    """Return all figures; after each part, call `keep` with the figures so far."""
     figures: JsonObject = {"machine": machine_description(plan), **_about()}
     jobs: dict[str, Callable[[], Any]] = {
         "steps": lambda: steps(plan),

@@ -62,12 +62,12 @@ def _machine(figures: JsonObject) -> str:
 
 
 def _remarks(figures: JsonObject) -> str:
-    """Return remarks on the figures of a machine, to be appended to a sentence."""
+    """Return remarks on the figures of a machine, which continue a sentence."""
     return f" {figures['note']}" if "note" in figures else ""
 
 
 def _memory(figures: JsonObject) -> str:
-    """Return the text about the memory of a worker by number of images, if it was measured."""
+    """Return a text on the memory of a worker by number of images, if it was measured."""
     rows = [
         (_KINDS[name], one["workers"], mark, f"{size / 1e6:.0f}")
         for name in _KINDS

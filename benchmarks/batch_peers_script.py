@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-with suppress(ImportError):  # which only Blender's Python has
+with suppress(ImportError):  # only Blender's Python has this module
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Vector  # type: ignore[import-not-found,unused-ignore]
 
-_RADIUS_M = (0.0037, 0.0014, 0.0007)  # of Blender's own default for skin, in proportion
-_LIGHTS = (((-0.8, -1.0, 0.5), 12.0), ((0.9, -0.8, 0.2), 5.0), ((0.3, 0.9, 0.8), 8.0))  # places [m], watts
+_RADIUS_M = (0.0037, 0.0014, 0.0007)  # in the proportions of Blender's default subsurface radius
+_LIGHTS = (((-0.8, -1.0, 0.5), 12.0), ((0.9, -0.8, 0.2), 5.0), ((0.3, 0.9, 0.8), 8.0))  # position [m], W
 _LIGHT_M, _LENS_MM, _FAR_M = 0.5, 120.0, 0.95
-_MIDDLE_M = 0.02  # of the face, below the middle between the eyes
+_MIDDLE_M = 0.02  # distance of the face's centre below the midpoint of the eyes
 
 
 def main(folder: Path) -> None:
@@ -66,10 +66,10 @@ def make_scene(person: Path, size: list[int]) -> None:
     world.use_nodes = True
     world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.2
     middle = Vector((0.0, 0.0, -_MIDDLE_M))
-    for place, watts in _LIGHTS:
+    for location, watts in _LIGHTS:
         light = bpy.data.lights.new("light", "AREA")
         light.energy, light.size = watts, _LIGHT_M
-        aim(add("light", light), Vector(place), middle)
+        aim(add("light", light), Vector(location), middle)
     camera = bpy.data.cameras.new("camera")
     camera.lens, camera.clip_start = _LENS_MM, 0.01
     bpy.context.scene.camera = add("camera", camera)
@@ -96,7 +96,7 @@ def set_render(size: list[int]) -> None:
 def written_as(kind: str) -> None:
     """Set the file format of the pictures."""
     settings = bpy.context.scene.render.image_settings
-    if hasattr(settings, "media_type"):  # since Blender 5.0
+    if hasattr(settings, "media_type"):  # required since Blender 5.0
         settings.media_type = "MULTI_LAYER_IMAGE" if kind.endswith("MULTILAYER") else "IMAGE"
     settings.file_format = kind
 
@@ -129,10 +129,10 @@ def combined(path: Path) -> Any:
     return pixels.reshape(height, width, 4)
 
 
-def aim(thing: Any, place: Vector, target: Vector) -> None:
+def aim(item: Any, location: Vector, target: Vector) -> None:
     """Place an object and turn it towards a target."""
-    thing.location = place
-    thing.rotation_euler = (target - place).to_track_quat("-Z", "Y").to_euler()
+    item.location = location
+    item.rotation_euler = (target - location).to_track_quat("-Z", "Y").to_euler()
 
 
 def add(name: str, data: Any) -> Any:

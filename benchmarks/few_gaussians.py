@@ -46,7 +46,7 @@ def main(
     adapter: str = "auto",
     atlas: int = 0,
 ) -> int:
-    """Measure, print, and write the figures if a file is named.
+    """Measure, print, and write the figures if a file is given.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 
-_WARM = 2  # runs after each cold one
+_WARM = 2  # warm runs after each cold run
 
 
 def main(
@@ -35,7 +35,7 @@ def main(
     adapter: str = "auto",
     runs: int = 3,
 ) -> int:
-    """Measure, print, and write the figures if a file is named.
+    """Measure, print, and write the figures if a file is given.
 
     Parameters
     ----------

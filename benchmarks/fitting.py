@@ -39,12 +39,12 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import DEFAULT_ROUGHNESS, Pigments
 
 FOLDER = Path(gettempdir()) / "dermis-fitting"
-"""Of panoramas, which scenes name as files."""
+"""Folder of the panoramas, which scenes reference as files."""
 SCENES = 30
-_SEED = 2411  # of scenes on which no setting was chosen: those were of 24
-_MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # the first two as decimal exponents
+_SEED = 2411  # the settings were chosen on scenes of seed 24
+_MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # melanin, blood: log10
 LOBE = "torrance-sparrow-smith"
-"""The lobe of the truth, of one kind of slopes."""
+"""Specular lobe of the true skin, with a single slope distribution."""
 _PAINT = 1024
 _ROWS = 32
 _FACE_MM = 250.0
@@ -141,7 +141,7 @@ def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
 
 RESULTS = Path(__file__).parent / "results" / "fitting.json"
 _NO_LIMIT = 1e9
-"""Noise of paths has long tails, which a robust loss would take for highlights to be left out."""
+"""Residual limit that disables the robust loss, which would discard the long tails of path noise."""
 
 
 def main(
@@ -192,7 +192,7 @@ def main(
 
 
 def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
-    """Return the estimates of a case beside the true values.
+    """Return the estimates of a case together with the true values.
 
     The fit knows only the true eumelanin, oxygenation, epidermal thickness and kind of surface.
     """

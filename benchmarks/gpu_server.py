@@ -69,7 +69,7 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
         words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as program:
         assert program.stderr is not None
-        listener = threading.Thread(target=_pass_on, args=(program.stderr, last))
+        listener = threading.Thread(target=_forward_output, args=(program.stderr, last))
         listener.start()
         try:
             failed = program.wait(longest_s)
@@ -77,7 +77,7 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
             actual = f"expected it to end within {longest_s:g} s, but it did not. Last words: {last[0]}"
             raise DermisError(f"{name}: {actual}") from fault
         finally:
-            with suppress(ProcessLookupError):  # and what it has started
+            with suppress(ProcessLookupError):  # and its child processes
                 os.killpg(program.pid, signal.SIGKILL)
             listener.join()
     if failed:
@@ -85,8 +85,8 @@ def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
     return time.perf_counter() - started
 
 
-def _pass_on(said: IO[str], last: deque[str]) -> None:
-    for line in said:
+def _forward_output(stream: IO[str], last: deque[str]) -> None:
+    for line in stream:
         if line.strip():
             last.append(line.strip())
             note(line.rstrip())
@@ -290,8 +290,8 @@ def _consume_s(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
 
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
-"""What matters most first; lobes while the device is at work, for an idle one is three times as slow."""
-_NEEDED_S = {"bench": 0, "film": 120, "viewer": 120}  # that a part may take on a slow server
+"""Parts by importance; lobes early, because an idle device is three times as slow."""
+_NEEDED_S = {"bench": 0, "film": 120, "viewer": 120}  # duration of a part on a slow server [s]
 _DIGITS = 5
 
 
@@ -324,11 +324,11 @@ def main(
     target = check_output(output, (".json",), "Choose such a name")
     name = ("lee_perry_smith" if is_available("lee_perry_smith") else "human") if head == "auto" else head
     plan = (quick_plan if quick else plan_of)(adapter, name)
-    measure(plan, _chosen(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
+    measure(plan, _parse_parts(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
 
 
 def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonObject], None]) -> JsonObject:
-    """Return all figures; call `keep` with those known so far after each part."""
+    """Return all figures; after each part, call `keep` with the figures so far."""
     began = time.perf_counter()
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
     figures = _about(plan, renderer)
@@ -369,7 +369,7 @@ def _about(plan: Plan, renderer: Renderer) -> JsonObject:
     }
 
 
-def _chosen(parts: str) -> list[str]:
+def _parse_parts(parts: str) -> list[str]:
     names = parts.split(",")
     for name in names:
         if name not in PARTS:

@@ -43,7 +43,7 @@ _ON_GPU = BenchmarkCase()  # 1920 x 1080, atlas 2048, three shadowed lights, six
 _ON_CPU = BenchmarkCase((1024, 1024), atlas=1024)
 _TARGETS, _MOMENTS = 52, 60
 _PEOPLE = 4
-_SAMPLES = 40  # of the memory
+_SAMPLES = 40  # number of memory samples
 
 
 def main(
@@ -54,7 +54,7 @@ def main(
     frames: int = 0,
     interreflection: bool = True,
 ) -> int:
-    """Measure, print, and write the figures if a file is named.
+    """Measure, print, and write the figures if a file is given.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ def moving(
     for each in endless.values():
         sequence_ms(renderer, each, max(2, effort.warmup), settings)
     times: dict[str, list[float]] = {name: [] for name in endless}
-    for _ in range(3):  # in turn, so that a busy machine slows both down
+    for _ in range(3):  # alternately, so that other load slows both down
         for name, each in endless.items():
-            sequence_ms(renderer, each, 2, settings)  # another head: its tables
+            sequence_ms(renderer, each, 2, settings)  # a new head has new tables
             times[name].append(sequence_ms(renderer, each, effort.sequence, settings) / effort.sequence)
     for name, each in endless.items():
         sequence_ms(renderer, each, 2, settings)

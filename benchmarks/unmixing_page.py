@@ -19,7 +19,7 @@ RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
 FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
 
-_TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting.py has them
+_TRUE_STRENGTH = 1.0  # specular strength of all fitted faces, as in fitting.py
 
 
 def main() -> None:
@@ -37,7 +37,11 @@ def figures() -> tuple[JsonObject, JsonObject]:
 def page(results: JsonObject, widths: JsonObject) -> str:
     """Return the text of the page."""
     text = TEXT.read_text("utf-8")
-    tables = {"known": _known(results), "mistaken": _mistaken(results), "counted": _counted(results)}
+    tables = {
+        "known": _known_skin_table(results),
+        "mistaken": _mistaken(results),
+        "counted": _counted(results),
+    }
     tables["fitting"] = _fitting(json.loads(FITTED.read_text("utf-8")))
     tables |= {
         "shading": _shading(results["shading"]),
@@ -49,7 +53,7 @@ def page(results: JsonObject, widths: JsonObject) -> str:
     return text
 
 
-def _known(results: JsonObject) -> str:
+def _known_skin_table(results: JsonObject) -> str:
     heads = (
         "epidermis [mm]",
         "melanin",

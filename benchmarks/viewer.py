@@ -33,38 +33,40 @@ from dermis.gpu import Device, open_device
 _SECTIONS = ("speed", "delay", "page", "memory")
 
 
-def tables(found: JsonObject) -> str:
+def tables(results: JsonObject) -> str:
     """Return all available figures as Markdown tables."""
-    parts = [_title(found), _speed(found), _delay(found)]
-    if "samples" in found.get("memory", {}):
-        parts.append(_memory(found["memory"]))
+    parts = [_title(results), _speed(results), _delay(results)]
+    if "samples" in results.get("memory", {}):
+        parts.append(_memory(results["memory"]))
     ended = [
-        f"{name} ended early: {found[name]['ended']}" for name in _SECTIONS if "ended" in found.get(name, {})
+        f"{name} ended early: {results[name]['ended']}"
+        for name in _SECTIONS
+        if "ended" in results.get(name, {})
     ]
     return "\n\n".join([*parts, *ended])
 
 
-def _figures(found: JsonObject, section: str) -> JsonObject:
+def _figures(results: JsonObject, section: str) -> JsonObject:
     """Return the figures of a section, without the reason why it ended."""
-    return {name: one for name, one in found.get(section, {}).items() if name != "ended"}
+    return {name: one for name, one in results.get(section, {}).items() if name != "ended"}
 
 
-def _title(found: JsonObject) -> str:
-    plan = found["plan"]
+def _title(results: JsonObject) -> str:
+    plan = results["plan"]
     size = " x ".join(map(str, plan["size"]))
     what = f"{plan['head']}, {size}, atlas {plan['atlas']}, samples {plan['samples']}"
-    return f"{found['adapter']}, {what}, {found['date'][:10]}"
+    return f"{results['adapter']}, {what}, {results['date'][:10]}"
 
 
-def _speed(found: JsonObject) -> str:
+def _speed(results: JsonObject) -> str:
     rows = [
         "| motion | frames/s | frame [ms] | 95 % within, longest [ms] | processor time [ms] | stages |",
         "|---|---|---|---|---|---|",
     ]
-    for name, one in _figures(found, "speed").items():
+    for name, one in _figures(results, "speed").items():
         numbers = f"{one['frames_per_s']:.1f} | {one['frame_ms']:.1f} | {_late(one)}"
         rows.append(f"| {name} | {numbers} | {one['processor_ms']:.1f} | {', '.join(one['stages'])} |")
-    page = _figures(found, "page")
+    page = _figures(results, "page")
     for name in ("camera", "light", "melanin"):
         if name in page:
             one = page[name]
@@ -77,9 +79,9 @@ def _late(one: dict[str, float]) -> str:
     return f"{one['late_frame_ms']:.1f}, {one['longest_frame_ms']:.1f}"
 
 
-def _delay(found: JsonObject) -> str:
+def _delay(results: JsonObject) -> str:
     rows = ["| latency from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
-    page, several = _figures(found, "page"), _figures(found, "delay")
+    page, several = _figures(results, "page"), _figures(results, "delay")
     if "delay" in page:
         several["in the page, from rest"] = page["delay"]
     for name, one in several.items():
@@ -112,7 +114,7 @@ def _memory(memory: JsonObject) -> str:
 
 RESULTS = Path(__file__).resolve().parent / "results" / "viewer.json"
 _PACKAGES = ("dermis", "wgpu", "rendercanvas", "numpy", "pillow")
-_SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # of the time that is left
+_SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # fractions of the remaining time
 
 
 def main(
@@ -166,23 +168,23 @@ def main(
         samples or (1 if software else 4),
         frames or (16 if software else 300),
     )
-    found = Results(_about(device, plan), output, clock)
+    results = Results(_about(device, plan), output, clock)
     del device
     driver = offscreen(plan)
-    found.record("speed", partial(speeds, driver, plan))
-    found.record("delay", partial(delays, driver, plan))
+    results.record("speed", partial(speeds, driver, plan))
+    results.record("delay", partial(delays, driver, plan))
     if browser:
-        found.record("page", partial(page_figures, plan, slider_position(driver, "melanin")))
+        results.record("page", partial(page_figures, plan, slider_position(driver, "melanin")))
     del driver
     if minutes or changes:
         watched = _halved(plan) if software else plan  # a thousand changes in ten minutes
-        found.record(
+        results.record(
             "memory", lambda _: memory_samples(offscreen(watched), watched, minutes, changes).items()
         )
-    found.all_figures["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    found.write()
-    print_lines(tables(found.all_figures))
-    return 1 if found.ended else 0
+    results.all_figures["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    results.write()
+    print_lines(tables(results.all_figures))
+    return 1 if results.ended else 0
 
 
 class Results:
@@ -205,7 +207,7 @@ class Results:
                 figures[name] = figure
                 self._log(f"{section}, {name}")
                 self.write()
-        except Exception as fault:  # whatever ends one section leaves the others
+        except Exception as fault:  # an error of a section does not affect the others
             figures["ended"] = f"{type(fault).__name__}: {fault}"
             self.ended.append(section)
             self._log(f"{section} ended: {figures['ended']}")

@@ -54,12 +54,12 @@ class Clock:
 
 
 Change = Callable[[ViewerState, int], ViewerState]
-_SETTLING = 2  # frames before any is counted
-PIGMENTED = "light"  # a profile that sliders of pigments move
+_SETTLING = 2  # frames before the first that is counted
+PIGMENTED = "light"  # profile with pigment sliders
 _TARGETS = 52
-STEP = 0.02  # of turns [rad]
-_REST_S = 30.0  # at most, which some tenths of a second are enough for
-FEWEST = 3  # that a median is made of, however little time is left
+STEP = 0.02  # rotation per frame [rad]
+_REST_S = 30.0  # time limit; usually tenths of a second suffice
+FEWEST = 3  # least number of values of a median, regardless of the remaining time
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class InputDriver:
                 raise RuntimeError(f"the picture does not come to rest within {_REST_S:.0f} s")
             self.frame()
 
-    def go_on(self, state: ViewerState) -> None:
+    def set_state(self, state: ViewerState) -> None:
         """Change to another state within one gesture, so that the undo history does not grow."""
         self.viewer.session.change(state, "benchmark")
 
@@ -162,7 +162,7 @@ def offscreen(plan: Plan) -> InputDriver:
 def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | None:
     """Return the position of a pigment slider in the window; None if it must be scrolled into view."""
     driver.viewer.panel.is_visible = True
-    driver.go_on(driver.first.with_skin(profile=PIGMENTED))
+    driver.set_state(driver.first.with_skin(profile=PIGMENTED))
     for _ in range(FEWEST):
         driver.frame()
     driver.viewer.panel.is_visible = False
@@ -186,13 +186,13 @@ def _to_and_fro(k: int) -> float:
     return 0.5 + 0.5 * math.sin(0.2 * k)
 
 
-def _same(state: ViewerState) -> ViewerState:
+def _unchanged(state: ViewerState) -> ViewerState:
     return state
 
 
 MOTIONS: dict[str, Motion] = {
-    "camera": Motion(_same, lambda state, k: state.with_camera(orbit(state.scene.camera, STEP, 0.0))),
-    "light": Motion(_same, lambda state, k: drag_light(state, 0, STEP, 0.0)),
+    "camera": Motion(_unchanged, lambda state, k: state.with_camera(orbit(state.scene.camera, STEP, 0.0))),
+    "light": Motion(_unchanged, lambda state, k: drag_light(state, 0, STEP, 0.0)),
     "roughness": Motion(
         _with_constant_roughness, lambda state, k: state.with_skin(roughness=0.2 + 0.3 * _to_and_fro(k))
     ),
@@ -203,7 +203,7 @@ MOTIONS: dict[str, Motion] = {
     "expression": Motion(
         _with_targets, lambda state, k: state.with_pose(pose_at_moment(state.scene.head, k))
     ),
-    "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
+    "exposure": Motion(_unchanged, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 
 
@@ -215,14 +215,14 @@ def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 
 def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> JsonObject:
     session = driver.viewer.session
-    driver.go_on(motion.start(driver.first))
+    driver.set_state(motion.start(driver.first))
     for k in range(_SETTLING):
-        driver.go_on(motion.change(session.state, k))
+        driver.set_state(motion.change(session.state, k))
         driver.frame()
     times, prepared, processor = [], [], processor_s()
     for k in counted(frames, clock):
         began = time.perf_counter()
-        driver.go_on(motion.change(session.state, _SETTLING + k))
+        driver.set_state(motion.change(session.state, _SETTLING + k))
         driver.frame()
         times.append(time.perf_counter() - began)
         prepared.append(session.view_renderer.rendered.setup_ms if session.view_renderer.rendered else 0.0)

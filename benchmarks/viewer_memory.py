@@ -20,8 +20,8 @@ from dermis.gpu.memory import allocated_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.lights import light_presets
 
-_PATIENCE = 100  # frames
-_PIXELS = 6.0  # of a drag between two frames
+_PATIENCE = 100  # largest number of frames to wait
+_PIXELS = 6.0  # distance of a drag between two frames
 
 
 def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, float]]]:
@@ -29,7 +29,7 @@ def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 
     The camera takes some tenths of a second to come to rest, independent of the frame rate.
     """
-    driver.go_on(driver.first)
+    driver.set_state(driver.first)
     x, y = (0.5 * side for side in plan.size)
     driver.event("pointer_down", x, y)
     driver.frame()
@@ -48,7 +48,7 @@ def _frame_s(driver: InputDriver) -> float:
     times = []
     for _ in range(FEWEST):
         began = time.perf_counter()
-        driver.go_on(MOTIONS["camera"].change(driver.viewer.session.state, 0))
+        driver.set_state(MOTIONS["camera"].change(driver.viewer.session.state, 0))
         driver.frame()
         times.append(time.perf_counter() - began)
     return min(times)
@@ -59,7 +59,7 @@ def _delay(driver: InputDriver, x: float, y: float) -> float:
     driver.rest()
     before, began = driver.frame(), time.perf_counter()
     driver.event("pointer_move", x, y)
-    for _ in range(_PATIENCE):  # quick frames show the camera when it has hardly begun to glide
+    for _ in range(_PATIENCE):  # fast frames show the camera when it has hardly moved
         picture, now = driver.frame(), time.perf_counter()
         if not np.array_equal(before, picture):
             return now - began
@@ -77,7 +77,7 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
 
     mover = threading.Thread(target=move)
     mover.start()
-    driver.go_on(
+    driver.set_state(
         driver.viewer.session.state.with_camera(orbit(driver.viewer.session.state.scene.camera, STEP, 0.0))
     )
     driver.frame()
@@ -87,11 +87,11 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
 
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
-_SAMPLES = 60  # of the memory, over all the time
+_SAMPLES = 60  # memory samples over the whole measurement
 _ACTIONS = ("split", "undo", "redo", "size", "panel", "preset", "start again")
 
 
-def _one(chance: random.Random, *names: Any) -> Any:
+def _choice(chance: random.Random, *names: Any) -> Any:
     return chance.choice(names)
 
 
@@ -100,59 +100,63 @@ KINDS: dict[str, Kind] = {
     "pan": lambda s, r: s.with_camera(pan(s.scene.camera, r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1))),
     "dolly": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
     "light": lambda s, r: drag_light(s, 0, r.uniform(-0.5, 0.5), r.uniform(-0.2, 0.2)),
-    "rig": lambda s, r: s.with_rig(_one(r, *light_presets())),
-    "environment": lambda s, r: s.with_environment(_one(r, None, Environment(name="uniform", exposure=0.5))),
+    "rig": lambda s, r: s.with_rig(_choice(r, *light_presets())),
+    "environment": lambda s, r: s.with_environment(
+        _choice(r, None, Environment(name="uniform", exposure=0.5))
+    ),
     "reflection": lambda s, r: s.with_skin(rho_s=r.uniform(0.05, 0.5), roughness=r.uniform(0.2, 0.6)),
     "oil": lambda s, r: s.with_skin(oiliness=r.uniform(0.0, 1.0)),
     "mix": lambda s, r: s.with_skin(mix=r.uniform(0.0, 1.0)),
-    "lobe": lambda s, r: s.with_skin(specular=_one(r, "kelemen", "two-lobe", "phong", "none")),
-    "fresnel": lambda s, r: s.with_skin(fresnel=_one(r, "schlick", "exact")),
-    "energy": lambda s, r: s.with_skin(energy=_one(r, "full", "published", "none")),
-    "profile": lambda s, r: s.with_skin(profile=_one(r, "gpu-gems-3", "dj3", "skin1"), pigments=None),
+    "lobe": lambda s, r: s.with_skin(specular=_choice(r, "kelemen", "two-lobe", "phong", "none")),
+    "fresnel": lambda s, r: s.with_skin(fresnel=_choice(r, "schlick", "exact")),
+    "energy": lambda s, r: s.with_skin(energy=_choice(r, "full", "published", "none")),
+    "profile": lambda s, r: s.with_skin(profile=_choice(r, "gpu-gems-3", "dj3", "skin1"), pigments=None),
     "pigments": lambda s, r: s.with_skin(profile="light").with_pigments(
         melanin=r.uniform(0.01, 0.2), blood=r.uniform(0.01, 0.1)
     ),
-    "colour": lambda s, r: s.with_skin(albedo=_one(r, "map", "profile")),
+    "colour": lambda s, r: s.with_skin(albedo=_choice(r, "map", "profile")),
     "technique": lambda s, r: s.with_settings(
-        technique=_one(r, "texture-space", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated", "none")
+        technique=_choice(
+            r, "texture-space", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated", "none"
+        )
     ),
-    "stretch": lambda s, r: s.with_settings(stretch=_one(r, "full", "axes", "none")),
-    "seams": lambda s, r: s.with_settings(seams=_one(r, "stitch", "none", "alpha", "multi-uv")),
-    "transmission": lambda s, r: s.with_settings(transmission=_one(r, "thin", "none")),
-    "gamma": lambda s, r: s.with_settings(gamma=_one(r, "right", "wrong")),
-    "picture": lambda s, r: s.with_settings(exposure=r.uniform(0.5, 2.0), tone=_one(r, "none", "filmic")),
-    "bloom": lambda s, r: s.with_settings(bloom=_one(r, 0.0, 0.1)),
-    "samples": lambda s, r: s.with_settings(samples=_one(r, 1, 2)),
-    "atlas": lambda s, r: s.with_settings(atlas=_one(r, s.settings.atlas, 256, 512)),
+    "stretch": lambda s, r: s.with_settings(stretch=_choice(r, "full", "axes", "none")),
+    "seams": lambda s, r: s.with_settings(seams=_choice(r, "stitch", "none", "alpha", "multi-uv")),
+    "transmission": lambda s, r: s.with_settings(transmission=_choice(r, "thin", "none")),
+    "gamma": lambda s, r: s.with_settings(gamma=_choice(r, "right", "wrong")),
+    "picture": lambda s, r: s.with_settings(exposure=r.uniform(0.5, 2.0), tone=_choice(r, "none", "filmic")),
+    "bloom": lambda s, r: s.with_settings(bloom=_choice(r, 0.0, 0.1)),
+    "samples": lambda s, r: s.with_settings(samples=_choice(r, 1, 2)),
+    "atlas": lambda s, r: s.with_settings(atlas=_choice(r, s.settings.atlas, 256, 512)),
     "view": lambda s, r: s.with_view(
-        _one(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")
+        _choice(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")
     ),
 }
-"""Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
+"""Changes of a state; combinations that cannot be rendered leave the last picture, as for users."""
 
 
 def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
     """Return the memory over at least the given minutes and changes; each change is drawn."""
     chance, session = random.Random(11), driver.viewer.session
-    done, taken = 0, list[dict[str, float]]()
+    done, samples = 0, list[dict[str, float]]()
     counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
-    for kind in counts:  # all that is ever compiled and loaded, before anything is counted
+    for kind in counts:  # compile and load everything before the first sample
         _change(driver, kind, chance, plan)
         driver.frame()
     session.change(driver.first)
     begun = time.perf_counter()
     while (now := time.perf_counter() - begun) < 60.0 * minutes or done < changes:
         part = min(now / max(1e-9, 60.0 * minutes), done / max(1, changes))
-        if part * _SAMPLES >= len(taken):
-            taken.append(_sample(now, done))
+        if part * _SAMPLES >= len(samples):
+            samples.append(_sample(now, done))
         kind = chance.choice(list(counts))
         _change(driver, kind, chance, plan)
         driver.frame()
         counts[kind] += 1
         done += 1
-    taken.append(_sample(time.perf_counter() - begun, done))
-    result = {"plan": plan.__dict__, "minutes": taken[-1]["s"] / 60.0, "changes": done, "kinds": counts}
-    return result | {"samples": taken} | growth(taken)
+    samples.append(_sample(time.perf_counter() - begun, done))
+    result = {"plan": plan.__dict__, "minutes": samples[-1]["s"] / 60.0, "changes": done, "kinds": counts}
+    return result | {"samples": samples} | growth(samples)
 
 
 def _sample(seconds: float, changes: int) -> dict[str, float]:
@@ -184,9 +188,9 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
         session.change(driver.first)
 
 
-def growth(taken: Sequence[dict[str, float]]) -> JsonObject:
+def growth(samples: Sequence[dict[str, float]]) -> JsonObject:
     """Return the slopes of the second half of the samples [MB per 1000 changes]."""
-    late = taken[len(taken) // 2 :]
+    late = samples[len(samples) // 2 :]
     x = [one["changes"] / 1e3 for one in late]
     names = ("resident_mb", "device_mb")
     return {f"{name}_per_1000": float(np.polyfit(x, [one[name] for one in late], 1)[0]) for name in names}

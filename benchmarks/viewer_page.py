@@ -45,7 +45,7 @@ def served(plan: Plan, clock: Clock) -> Iterator[tuple[str, int]]:
                 f"{fault or type(fault).__name__}; dermis view: {_last_words(said)}"
             ) from fault
         finally:
-            _ended(server)
+            _stop_server(server)
 
 
 def _address(output: IO[str], patience_s: float) -> str:
@@ -64,7 +64,7 @@ def _last_words(said: IO[str]) -> str:
     return lines[-1] if lines else "it said nothing"
 
 
-def _ended(server: subprocess.Popen[str], patience_s: float = 10.0) -> None:
+def _stop_server(server: subprocess.Popen[str], patience_s: float = 10.0) -> None:
     server.terminate()
     try:
         server.wait(patience_s)
@@ -74,9 +74,9 @@ def _ended(server: subprocess.Popen[str], patience_s: float = 10.0) -> None:
 
 
 _QUIET_S, _PATIENCE_S = 0.6, 120.0
-_MOVES_PER_S = 50.0  # what rendercanvas' page sends at most
+_MOVES_PER_S = 50.0  # maximum of rendercanvas' page
 _WATCHED_S = 8.0
-_FIRST_S = 30.0  # until a motion is seen: what it is made of may have to be found first
+_FIRST_S = 30.0  # time limit for the first picture of a motion, whose data may have to be computed
 _REPEATS = 20
 _PIXELS = 6.0
 Place = tuple[float, float]
@@ -107,8 +107,8 @@ class Page:
         self.size, self.clock = size, clock
         self._last: Picture | None = None
         self.send("resize", width=size[0], height=size[1], pwidth=size[0], pheight=size[1], ratio=1.0)
-        self.next_picture(self.patience_s)  # there is no panel before
-        self.send("key_down", key="Tab", modifiers=[])  # hides it
+        self.next_picture(self.patience_s)  # the panel exists from then on
+        self.send("key_down", key="Tab", modifiers=[])  # hides the panel
 
     def send(self, kind: str, **fields: Any) -> None:
         """Send an event."""
@@ -149,7 +149,7 @@ class Page:
         raise RuntimeError(f"the page does not come to rest: the last picture is {kind}")
 
     @property
-    def shown(self) -> bytes:
+    def picture_hash(self) -> bytes:
         """Return the hash of the last picture, empty before the first."""
         return self._last.name if self._last else b""
 
@@ -197,7 +197,7 @@ def page_figures(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tup
         page.close()
 
 
-def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
+def _motion(page: Page, position: Place, *modifiers: str) -> dict[str, float]:
     """Return the frame rate of a drag back and forth; repeated frames do not count.
 
     The time runs from the second picture, because the first may still be the picture at rest.
@@ -205,12 +205,12 @@ def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
     remaining_s = page.clock.remaining_s
     watched_s, patience_s = min(_WATCHED_S, 0.13 * remaining_s), min(_FIRST_S, 0.3 * remaining_s)
     moves, began = count(), time.perf_counter()
-    page.pointer("pointer_down", *place, *modifiers)
-    first = next(islice(_dragged(page, place, modifiers, moves, patience_s), 1, None), None)
+    page.pointer("pointer_down", *position, *modifiers)
+    first = next(islice(_dragged(page, position, modifiers, moves, patience_s), 1, None), None)
     if first is None:
         raise RuntimeError(f"no picture comes within {patience_s:.1f} s")
-    frames = [first, *_dragged(page, place, modifiers, moves, watched_s)]
-    page.pointer("pointer_up", *place, *modifiers)
+    frames = [first, *_dragged(page, position, modifiers, moves, watched_s)]
+    page.pointer("pointer_up", *position, *modifiers)
     page.settle()
     gaps = np.diff([frame.at for frame in frames]) if len(frames) > 1 else [watched_s]
     return {
@@ -224,12 +224,12 @@ def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
 
 
 def _dragged(
-    page: Page, place: Place, modifiers: Sequence[str], moves: Iterator[int], seconds: float
+    page: Page, position: Place, modifiers: Sequence[str], moves: Iterator[int], seconds: float
 ) -> Iterator[Picture]:
     """Yield distinct pictures while a pointer moves back and forth."""
-    x, y = place
+    x, y = position
     began = time.perf_counter()
-    due_s, known = 0.0, page.shown
+    due_s, known = 0.0, page.picture_hash
     while (now := time.perf_counter() - began) < seconds:
         if now >= due_s:
             due_s += 1.0 / _MOVES_PER_S
@@ -240,15 +240,15 @@ def _dragged(
             yield actual
 
 
-def _slide(page: Page, place: Place) -> dict[str, float]:
+def _slide(page: Page, position: Place) -> dict[str, float]:
     """Return the frame rate while a slider of the panel moves back and forth.
 
     Raises RuntimeError if the skin does not change.
     """
     page.send("key_down", key="Tab", modifiers=[])
-    page.send("pointer_move", x=place[0], y=place[1], button=0, buttons=[], modifiers=[])
+    page.send("pointer_move", x=position[0], y=position[1], button=0, buttons=[], modifiers=[])
     before = _pixels(page.settle())
-    found = _motion(page, place)
+    found = _motion(page, position)
     after, half = _pixels(page.settle()), page.size[0] // 2
     if np.array_equal(before[:, half:], after[:, half:]):
         raise RuntimeError("the slider does not alter the skin")
@@ -263,9 +263,9 @@ def _pixels(picture: Picture) -> NDArray[np.uint8]:
     return np.array(Image.open(io.BytesIO(picture.data)).convert("RGBA"))
 
 
-def _delays(page: Page, place: Place) -> list[float]:
+def _delays(page: Page, position: Place) -> list[float]:
     """Return latencies from a move at rest to the first different picture [s]; fewer if time is short."""
-    x, y = place
+    x, y = position
     page.pointer("pointer_down", x, y)
     found, one_s = list[float](), 0.0
     while len(found) < _REPEATS and (not found or page.clock.remaining_s > 2.0 * one_s):

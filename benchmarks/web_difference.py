@@ -24,7 +24,7 @@ from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.capture import capture_renderer
 
-ATLAS, MAP = 512, 1024  # as exported
+ATLAS, MAP = 512, 1024  # sizes of the exported page
 SHOWN = ("software", 512), ("gpu", 256)
 LINEAR = """async () => {
   const page = dermis, frame = page.player.frame, device = page.gpuScene.device, [width, height] = frame.size;
@@ -60,12 +60,12 @@ def main(head: str, adapter: str = "auto") -> None:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "head.html"
             file.write_text(page_html(made, (), head, ""), encoding="utf-8")
-            found = drawn(file, side)
-        off, lost = distance(found, references[0]), distance(references[0], given)
+            picture = render_page(file, side)
+        off, lost = distance(picture, references[0]), distance(references[0], given)
         print_lines(f"| {head} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
 
 
-def drawn(file: Path, side: int) -> NDArray[np.float32]:
+def render_page(file: Path, side: int) -> NDArray[np.float32]:
     """Return the (h, w, 3) linear picture that a browser renders of a page."""
     with chromium_page(side, [*FLAGS, *SOFTWARE]) as page:
         page.goto(file.as_uri())
@@ -74,9 +74,9 @@ def drawn(file: Path, side: int) -> NDArray[np.float32]:
     return np.frombuffer(raw, np.float32).reshape(side, side, 4)[..., :3]
 
 
-def distance(found: NDArray[np.float32], wanted: NDArray[np.float32]) -> float:
+def distance(picture: NDArray[np.float32], reference: NDArray[np.float32]) -> float:
     """Return the relative RMSE."""
-    return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
+    return float(np.sqrt(((picture - reference) ** 2).mean() / (reference**2).mean()))
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ def resident_mb() -> float:
     return total / 1e3
 
 
-def turned(page: Page, minutes: float) -> None:
+def turn_head(page: Page, minutes: float) -> None:
     """Turn the head for some minutes, and print the memory each minute."""
     began, frames, minute = time.monotonic(), 0, 0
     while minute <= minutes:
@@ -105,7 +105,7 @@ def main(
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=300_000)
         first = time.perf_counter() - began, processor_s() - used
         if minutes:
-            turned(page, minutes)
+            turn_head(page, minutes)
             return
         rows = {"first picture": first, "frame at rest, camera turned": timed(page, STILL, FRAMES)}
         rows["frame in motion"] = timed(page, MOVE, FRAMES)

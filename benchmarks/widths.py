@@ -37,9 +37,9 @@ PAIRS: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
     "twice the scattering": ((0.05, 0.05), (1.0, 2.0)),
     "half the width, same colour": ((0.05, 0.1), (1.0, 2.0)),
 }
-"""Absorption and reduced scattering left and right [1/mm]."""
+"""Absorption and reduced scattering coefficients of the left and the right medium [1/mm]."""
 HALF_MM, STRIPS, PHOTONS, SEED = 14.0, 140, 40_000, 3
-_JUDGED, _CENTRAL = slice(40, 100), slice(20, 120)  # strips around the border; those whose light counts
+_JUDGED, _CENTRAL = slice(40, 100), slice(20, 120)  # strips to compare, and strips to light
 _FRAMES = 12
 
 
@@ -126,7 +126,7 @@ def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[f
     made, wanted = tint * ((light * tint) @ kernel), light @ true
     off = np.sqrt(((made - wanted)[_JUDGED] ** 2).mean()) / wanted[_JUDGED].max()
     energy = made[_CENTRAL].sum() / wanted[_CENTRAL].sum() - 1.0
-    near = light[_JUDGED]  # far from where strips end
+    near = light[_JUDGED]  # far from the outer edges of the strips
     return float(off), float(energy), float((near @ kernel[_JUDGED]).sum() / near.sum() - 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Sphinx: guide and explanations as they are written; gallery, reference, bibliography from the code."""
+"""Configuration of Sphinx: written pages, and gallery, settings, reference and bibliography from the code."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ sys.path[:0] = [str(HERE)]
 
 project = "dermis"
 author = "The dermis authors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "made_from_code", "turning_head"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "generated_pages", "turning_head"]
 exclude_patterns = ["templates", "images"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 suppress_warnings = [
     "myst.xref_missing"
-]  # links from a page to the project's sources, for readers of the repository
+]  # links to source files of the project, which only exist in the repository
 
 html_theme = "furo"
 html_title = "dermis"
@@ -26,3 +26,5 @@ html_show_sphinx = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Doubles", "Mapping")}
+napoleon_google_docstring = False
+napoleon_use_rtype = False

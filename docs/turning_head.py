@@ -1,4 +1,4 @@
-"""The front page turns a head: in its picture's place is a page that draws it, made when the pages are."""
+"""Sphinx extension that replaces the first picture of the front page by an interactive head."""
 
 from __future__ import annotations
 
@@ -10,21 +10,24 @@ _STYLE = "width:100%;aspect-ratio:4/3;border:0;background:#000"
 
 
 def turning(text: str, head: str) -> str:
-    """Return the front page with the page of the turning head in place of its first picture.
+    """Return the text of the front page with an embedded web page in place of its first picture.
 
-    head : "" leaves the picture
+    head : name of the head; "" keeps the picture
     """
     if not head:
         return text
     begin = text.index("![")
     end = text.index("\n", begin)
-    frame = f'<iframe src="{FILE}" title="A head to turn" loading="lazy" style="{_STYLE}"></iframe>'
-    told = "Drag to turn it; [how this page is made](web.md). Without WebGPU it is a still picture."
-    return f"{text[:begin]}```{{raw}} html\n{frame}\n```\n\n{told}{text[end:]}"
+    frame = f'<iframe src="{FILE}" title="Interactive head" loading="lazy" style="{_STYLE}"></iframe>'
+    caption = "Drag to rotate the head ([about this page](web.md)). Without WebGPU it is a still picture."
+    return f"{text[:begin]}```{{raw}} html\n{frame}\n```\n\n{caption}{text[end:]}"
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Sphinx calls this. `-D turning_head=` leaves the head out, which takes half a minute to make."""
+    """Register the extension; Sphinx calls this function.
+
+    `-D turning_head=` omits the head, whose export takes half a minute.
+    """
     app.add_config_value("turning_head", "human", "env")
     app.connect("source-read", _read)
     app.connect("build-finished", _finished)

@@ -20,6 +20,8 @@ class GltfFile:
 
     def __init__(self) -> None:
         self.data = bytearray()
+        self.more_buffers: list[dict[str, int]] = []
+        self.more_scenes: list[dict[str, Any]] = []
         self.tree: dict[str, Any] = {"asset": {"version": "2.0"}}
         for key in ("bufferViews", "accessors", "meshes", "nodes", "skins", "animations"):
             self.tree[key] = []
@@ -66,9 +68,9 @@ class GltfFile:
     def write(self, path: Path, *roots: int) -> Path:
         """Write the file with a scene of the given nodes."""
         tree = {key: value for key, value in self.tree.items() if value}
-        tree["buffers"] = [{"byteLength": len(self.data)}]
+        tree["buffers"] = [{"byteLength": len(self.data)}, *self.more_buffers]
         if roots:
-            tree |= {"scene": 0, "scenes": [{"nodes": list(roots)}]}
+            tree |= {"scene": 0, "scenes": [{"nodes": list(roots)}, *self.more_scenes]}
         if path.suffix == ".glb":
             text = json.dumps(tree).encode()
             text += b" " * (-len(text) % 4)

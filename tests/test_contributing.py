@@ -13,7 +13,7 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("head", "container"), [("package", "dermis"), ("package in `apps`", "dermis.apps")])
-def test_floors_are_those_of_the_import_linter(head: str, container: str) -> None:
+def test_layers_match_the_import_linter(head: str, container: str) -> None:
     rows = TEXT.partition(f"| {head} | contents |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
     layered = [set(re.findall(r"`(\w+)`", row.split("|")[1])) for row in rows]
     document = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -23,7 +23,7 @@ def test_floors_are_those_of_the_import_linter(head: str, container: str) -> Non
 
 
 @pytest.mark.parametrize(("head", "folder"), [("part of `frame`", "frame"), ("feature", "frame/features")])
-def test_tables_list_what_the_folders_hold(head: str, folder: str) -> None:
+def test_tables_list_the_contents_of_the_folders(head: str, folder: str) -> None:
     table = TEXT.partition(f"| {head} | contents ")[2].partition("\n\n")[0]
     rows = [row.split("|")[1] for row in table.splitlines()[2:]]
     listed = sorted(name for row in rows for name in re.findall(r"`([\w.]+)`", row))

@@ -56,20 +56,20 @@ def only(folder: Path) -> Path:
     return path
 
 
-def test_a_hit_is_the_same(folder: Path, built: list[int]) -> None:
+def test_cached_value_equals_the_original(folder: Path, built: list[int]) -> None:
     first, second = (cached_atlas(uv_sphere(40.0, 12, 6), 64) for _ in range(2))
     assert same(first, second)
     assert built == [64]
     assert only(folder)
 
 
-def test_mesh_and_size_are_told_apart(folder: Path, built: list[int]) -> None:
+def test_mesh_and_size_are_part_of_the_key(folder: Path, built: list[int]) -> None:
     for mesh, size in ((plane(10.0), 64), (plane(20.0), 64), (plane(10.0), 65), (plane(10.0, 2), 64)):
         cached_atlas(mesh, size)
     assert len(built) == 4 and len(list(folder.iterdir())) == 4
 
 
-def test_layouts_and_reaches_are_told_apart(folder: Path, built: list[int]) -> None:
+def test_layout_and_reach_are_part_of_the_key(folder: Path, built: list[int]) -> None:
     sphere = uv_sphere(40.0, 24, 12)
     made = [
         cached_atlas(sphere, 64, *how)
@@ -123,7 +123,7 @@ def headed(head: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("broken", BROKEN)
-def test_a_broken_file_is_made_again(folder: Path, built: list[int], broken: str) -> None:
+def test_broken_file_is_recomputed(folder: Path, built: list[int], broken: str) -> None:
     first = cached_atlas(plane(10.0), 64)
     path = only(folder)
     path.write_bytes(BROKEN[broken](path.read_bytes()))
@@ -134,7 +134,7 @@ def test_a_broken_file_is_made_again(folder: Path, built: list[int], broken: str
     assert only(folder) == path
 
 
-def test_a_file_under_another_name_is_made_again(folder: Path, built: list[int]) -> None:
+def test_renamed_file_is_recomputed(folder: Path, built: list[int]) -> None:
     """It is valid, but of another mesh, size or kind."""
     first = cached_atlas(plane(10.0), 64)
     path = only(folder)
@@ -167,9 +167,7 @@ def test_a_large_file_is_checked_block_by_block(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
-def test_a_folder_that_cannot_be_used_does_no_harm(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blocked: str
-) -> None:
+def test_unusable_folder_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blocked: str) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "here"))
     if blocked == "a file":
         (tmp_path / "here").write_text("")
@@ -205,7 +203,7 @@ def test_a_full_disk_leaves_no_part_file(
     assert list(folder.iterdir()) == []
 
 
-def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_least_recently_used_files_are_removed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cached_atlas(plane(10.0), 64)
     one = only(folder).stat().st_size
     monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", int(2.5 * one))
@@ -220,7 +218,7 @@ def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.Monk
     assert first in left and second not in left and len(left) == 2
 
 
-def test_what_a_killed_process_left_goes_after_a_day(folder: Path) -> None:
+def test_leftovers_of_killed_processes_are_removed_after_a_day(folder: Path) -> None:
     folder.mkdir()
     old, new = folder / "a.1.2.part", folder / "b.1.2.part"
     for path in (old, new):
@@ -230,7 +228,7 @@ def test_what_a_killed_process_left_goes_after_a_day(folder: Path) -> None:
     assert not old.exists() and new.exists()
 
 
-def test_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arrays_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     source = np.random.default_rng(1).random((6, 9)).astype(np.float32)
     made: list[str] = []
@@ -247,7 +245,7 @@ def test_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert made[1:] == ["again"] * 3
 
 
-def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_order_of_sources_is_part_of_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     a, b = np.zeros(3), np.ones(3)
     made = [
@@ -257,7 +255,9 @@ def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert made == [0, 1, 2, 0]
 
 
-def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_larger_than_the_folder_limit_are_not_stored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It would evict all others, and itself, each time."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", 1000)
@@ -266,9 +266,7 @@ def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: py
         assert cached_array(np.zeros(1), "small", lambda k=k: np.full(20, k))[0] == 1  # type: ignore[misc]
 
 
-def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_folder_limit_keeps_some_of_several_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The maps of one head may exceed the limit; otherwise each start would compute and write all of them."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     monkeypatch.setattr(disk, "_MAX_FOLDER_BYTES", 100_000)
@@ -289,7 +287,7 @@ def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
     assert made == [13]
 
 
-def test_all_kinds_of_arrays_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_array_types_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     arrays = {
         "none": np.zeros((0, 3), np.float16),
@@ -307,7 +305,7 @@ def test_all_kinds_of_arrays_come_back(tmp_path: Path, monkeypatch: pytest.Monke
         assert np.array_equal(found[name], array) and found[name].flags.writeable
 
 
-def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mesh_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     mesh, made = uv_sphere(20.0), []
 
@@ -329,7 +327,7 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(made) == 3
 
 
-def test_a_flipped_bit_anywhere_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flipped_bits_are_detected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The file is removed, so that the next start does not read it."""
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     disk.save_arrays("few", "one", {"a": np.arange(3, dtype=np.uint8)})
@@ -343,7 +341,7 @@ def test_a_flipped_bit_anywhere_is_found(tmp_path: Path, monkeypatch: pytest.Mon
         path.touch(0o600)
 
 
-def test_a_head_takes_no_memory_before_its_file_is_long_enough(
+def test_memory_is_allocated_only_after_the_size_check(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
@@ -363,7 +361,7 @@ def test_a_head_takes_no_memory_before_its_file_is_long_enough(
         assert disk.load_arrays("few", "one", ["a"]) is None
 
 
-def test_two_processes_at_once_leave_whole_files(tmp_path: Path) -> None:
+def test_concurrent_processes_leave_complete_files(tmp_path: Path) -> None:
     code = """
 import sys
 import numpy as np

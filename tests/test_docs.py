@@ -25,6 +25,9 @@ def test_pages_build(tmp_path: Path) -> None:
         "dermis.Camera(position: tuple[float, float, float], *, target: tuple[float, float, float] = (0.0"
         in " ".join(text.split())
     )
+    assert "-----" not in text  # numpydoc sections are fields
+    for section in ("Parameters", "Returns", "Raises"):
+        assert f"{section}:" in text
     assert "from_opencv" in text and "irradiance" in text.partition("dermis.SpotLight")[2][:3000]  # inherited
     assert {"african", "asian", "caucasian", "weights", "bones"} <= set(re.findall(r"\w+", text))
     assert "math notranslate" in (tmp_path / "profiles.html").read_text("utf-8")
@@ -45,7 +48,7 @@ def test_the_front_page_turns_a_head(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_equations_of_the_gallery_are_ones_that_tex_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(DOCS)
-    from made_from_code import gallery
+    from generated_pages import gallery
     from matplotlib.mathtext import MathTextParser
 
     drawn = re.findall(r"^\$\$(.*)\$\$$", gallery(), re.MULTILINE)

@@ -53,7 +53,7 @@ def words(command: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_commands_are_understood(page: Path) -> None:
+def test_documented_commands_are_parsed(page: Path) -> None:
     made, refused = app(), []
     for command in commands(page):
         name, *rest = words(command)
@@ -73,13 +73,13 @@ def test_the_readme_lists_every_command() -> None:
     assert set(listed) == set(COMMANDS)
 
 
-def test_an_option_that_is_none_would_be_found() -> None:
+def test_invalid_options_would_be_detected() -> None:
     with pytest.raises(Exception, match="frobnicate"):
         app().parse_args(["render", "--frobnicate"], exit_on_error=False, print_error=False)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_python_names_what_there_is(page: Path) -> None:
+def test_documented_python_names_exist(page: Path) -> None:
     blocks = [found["text"] for found in FENCE.finditer(page.read_text("utf-8")) if found["kind"] == "python"]
     for node in (node for block in blocks for node in ast.walk(ast.parse(block))):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "dermis":
@@ -87,7 +87,7 @@ def test_python_names_what_there_is(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_files_are_there(page: Path) -> None:
+def test_documented_files_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     folders = [ROOT, ROOT / "src" / "dermis", page.parent]
     folders += [folder for folder in (ROOT / "src" / "dermis").iterdir() if folder.is_dir()]

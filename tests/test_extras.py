@@ -49,14 +49,14 @@ def test_a_picture_needs_no_extra(tmp_path: Path) -> None:
         (("gallery", "--only", "13_gaussians", "-o", "out"), "plots"),
     ],
 )
-def test_what_needs_an_extra_says_which(options: tuple[str, ...], extra: str, tmp_path: Path) -> None:
+def test_missing_package_error_names_the_extra(options: tuple[str, ...], extra: str, tmp_path: Path) -> None:
     write_moving_head(tmp_path / "face.glb")
     made = run(*options, folder=tmp_path)
     assert made.returncode == 2, made.stdout + made.stderr
     assert f"dermis[{extra}]" in " ".join(made.stderr.split()) and "Traceback" not in made.stderr
 
 
-def test_a_picture_that_needs_one_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_picture_that_needs_an_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     average = 3  # of left and above, as this package does not write it
     (tmp_path / "deep.png").write_bytes(png(4, 4, 16, 2, bytes([average, *bytes(4 * 6)]) * 4))
     monkeypatch.setitem(sys.modules, "av", None)
@@ -64,20 +64,20 @@ def test_a_picture_that_needs_one_is_named(tmp_path: Path, monkeypatch: pytest.M
         read_image(tmp_path / "deep.png")
 
 
-def test_each_extra_is_one_of_the_packages() -> None:
+def test_each_extra_is_declared_by_the_package() -> None:
     text = (SOURCE.parent / "pyproject.toml").read_text("utf-8")
     for module, extra in EXTRAS.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"{extra} = [")]
         assert distribution_name(module) in line
 
 
-def test_what_is_missing_is_named() -> None:
+def test_missing_package_is_named() -> None:
     sys.modules["matplotlib.nothing"] = None  # type: ignore[assignment]
     with pytest.raises(DermisError, match=r"plots: expected the package matplotlib, .*dermis\[plots\]"):
         import_extra("matplotlib.nothing", "plots")
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
-def test_deep_pictures_come_back_bit_for_bit(channels: int) -> None:
+def test_16_bit_pictures_round_trip_bit_for_bit(channels: int) -> None:
     levels = np.random.default_rng(1).integers(0, 65536, (9, 13, channels), np.uint16)
     np.testing.assert_array_equal(decode_with_pillow(encode_png(levels)).reshape(levels.shape), levels)

@@ -17,7 +17,7 @@ LINE = "| Cycles 4.5 | skin1 | 0.056 / -0.080 | 9.95 % | 27674 |"
         LINE.replace("9.95 %", "10.0 %"),
     ],
 )
-def test_rounding_passes(text: str) -> None:
+def test_rounded_numbers_match(text: str) -> None:
     assert differences(text, LINE) == differences(LINE, text) == []
 
 
@@ -37,7 +37,7 @@ def test_rounding_passes(text: str) -> None:
         "",
     ],
 )
-def test_all_else_is_found(text: str) -> None:
+def test_other_differences_are_detected(text: str) -> None:
     assert differences(text, LINE) and differences(LINE, text)
 
 
@@ -60,5 +60,5 @@ def test_each_line_that_differs_is_shown() -> None:
         ("1.1.1", "1.1.2", False),  # a version
     ],
 )
-def test_one_in_the_last_digit(one: str, other: str, same: bool) -> None:
+def test_one_unit_in_the_last_digit_is_accepted(one: str, other: str, same: bool) -> None:
     assert (differences(one, other) == []) is same

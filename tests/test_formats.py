@@ -32,14 +32,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_scene(folder: Path) -> None:
+def test_scene_example_loads(folder: Path) -> None:
     scene, settings = dermis.load_scene(folder / "scene.toml")
     assert scene.lights == dermis.load_lights("window") and settings.atlas == 256
     assert scene.camera.frame_mm == 320 and scene.skin.profile == "medium"
     assert isinstance(scene.pose, dermis.Pose) and scene.pose.weights["mouthSmileLeft"] == 0.6
 
 
-def test_the_lights_are_one_of_each_kind(folder: Path) -> None:
+def test_lights_example_has_each_type(folder: Path) -> None:
     lights = dermis.load_lights(folder / "lights.toml")
     assert {light.kind for light in lights} == set(LIGHTS)
 
@@ -52,7 +52,7 @@ def test_every_key_of_a_light_is_explained() -> None:
         assert set(kind.model_fields) <= told
 
 
-def test_the_table_of_regions_and_its_landmarks(folder: Path) -> None:
+def test_region_table_and_landmarks_example_loads(folder: Path) -> None:
     table = load_region_table(folder / "regions.toml")
     assert table.landmarks == folder / "landmarks.csv"
     places, head = load_landmarks(folder / "landmarks.csv"), average_head()
@@ -64,7 +64,7 @@ def test_the_table_of_regions_and_its_landmarks(folder: Path) -> None:
     assert all(name.removeprefix("left ").removeprefix("right ") in section for name in average_landmarks())
 
 
-def test_the_tissue_and_the_profile(folder: Path) -> None:
+def test_tissue_and_profile_examples_load(folder: Path) -> None:
     medium = load_tissue(str(folder / "tissue.toml")).medium
     assert medium.name == "thin over thick" and len(medium.layers) == 2 and medium.semi_infinite
     table = find_gaussians(folder / "profile.csv")
@@ -73,6 +73,6 @@ def test_the_tissue_and_the_profile(folder: Path) -> None:
     np.testing.assert_allclose(table.weight, published.weight)
 
 
-def test_the_person(folder: Path) -> None:
+def test_person_example_loads(folder: Path) -> None:
     assert read_person(folder / "person.json").age == 62
     assert json.loads((folder / "person.json").read_text())["person"]["sex"] == 1

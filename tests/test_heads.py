@@ -145,7 +145,7 @@ def test_the_face_is_upright(subjects: dict[str, Subject]) -> None:
     assert mean["lips"][0] / mean["lips"][1] > 1.5 * mean["forehead"][0] / mean["forehead"][1]
 
 
-def test_a_face_upside_down_would_be_noticed(subjects: dict[str, Subject]) -> None:
+def test_test_detects_an_inverted_face(subjects: dict[str, Subject]) -> None:
     scan = subjects["scan"]
     mesh = replace(scan.head.mesh, uv=scan.head.mesh.uv * np.float32([1, -1]) + np.float32([0, 1]))
     wrong = replace(scan.head, mesh=mesh, maps=Maps(colour=scan.head.maps.colour))

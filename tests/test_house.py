@@ -101,7 +101,7 @@ def test_no_shader_text_in_python() -> None:
     assert guilty == []
 
 
-def test_no_path_of_a_machine_is_tracked() -> None:
+def test_no_local_path_is_tracked() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{number} {line.strip()[:80]}"
         for path in tracked_files()
@@ -120,7 +120,7 @@ def test_no_path_of_a_machine_is_tracked() -> None:
         ("docs/" + "work/plan", False),
     ],
 )
-def test_machine_paths_are_told_from_others(line: str, caught: bool) -> None:
+def test_local_paths_are_recognised(line: str, caught: bool) -> None:
     assert bool(MACHINE_PATH.search(line)) is caught
 
 
@@ -146,7 +146,7 @@ def test_lock_names_no_package_index(name: str) -> None:
     assert not re.search(r"://|--(extra-)?index-url|--find-links", lock)
 
 
-def test_importing_dermis_is_light() -> None:
+def test_importing_dermis_loads_few_modules() -> None:
     code = "import dermis, sys; print([m for m in ('wgpu', 'trimesh', 'scipy') if m in sys.modules])"
     environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
     run = subprocess.run(

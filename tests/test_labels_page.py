@@ -27,7 +27,7 @@ def test_all_sets_are_listed_with_their_counts(name: str) -> None:
     assert len({row["landmark"] for row in rows}) == len(rows)
 
 
-def test_its_python_runs(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
+def test_examples_of_the_labels_page_run(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
     """At a small size."""
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     text = "".join(re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))

@@ -52,7 +52,7 @@ def _files(folder: Path) -> list[Path]:
     return sorted((folder / "machine-code").iterdir())
 
 
-def test_it_is_found_again_and_lies_nowhere_else(folder: Path) -> None:
+def test_compiled_code_is_reused_and_stored_in_one_folder(folder: Path) -> None:
     beside = set(Path(__file__).parent.rglob("*.nb[ic]"))
     assert not _was_found(_outer()) and len(_files(folder)) == 2
     assert _was_found(_outer())
@@ -60,7 +60,7 @@ def test_it_is_found_again_and_lies_nowhere_else(folder: Path) -> None:
     assert all(file.stat().st_mode & 0o777 == 0o600 for file in _files(folder))
 
 
-def test_other_types_and_other_texts_have_other_code(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_types_and_sources_compile_separately(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     function = _outer()
     assert function(20) == 41 and function(0.5) == 2.0
     assert _outer()(0.5) == 2.0 and len(_files(folder)) == 4
@@ -98,9 +98,7 @@ def test_damaged_code_is_not_run(folder: Path, broken: str) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes are POSIX's")
-def test_code_that_others_could_have_written_is_not_run(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_code_writable_by_others_is_not_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import numpy as np
 
     assert not _was_found(_outer())
@@ -113,7 +111,7 @@ def test_code_that_others_could_have_written_is_not_run(
     assert not (folder / "mark").exists()
 
 
-def test_without_a_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_is_recompiled_without_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", os.devnull)
     for _ in range(2):
         assert not _was_found(_outer())

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "outputs.md").read_text("utf-8")
 
 
-def test_the_table_is_that_of_the_registry(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_table_lists_the_registered_outputs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Updated by python tools/outputs_page.py."""
     monkeypatch.syspath_prepend(ROOT / "tools")
     from outputs_page import page
@@ -22,7 +22,7 @@ def test_the_table_is_that_of_the_registry(monkeypatch: pytest.MonkeyPatch) -> N
     assert all(f"| `{name}` |" in PAGE for name in OUTPUTS)
 
 
-def test_its_python_runs(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
+def test_examples_of_the_outputs_page_run(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
     """At a small size."""
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     text = "".join(re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))

@@ -54,7 +54,7 @@ def _give_away(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(os, "geteuid", lambda: _NOBODY)
 
 
-def test_what_is_kept_is_this_users_alone(place: Path) -> None:
+def test_cache_files_are_readable_by_the_user_only(place: Path) -> None:
     umask = os.umask(0)
     try:
         assert _kept()
@@ -68,7 +68,7 @@ def test_what_is_kept_is_this_users_alone(place: Path) -> None:
 
 @pytest.mark.parametrize("name", ["", "cache", "cache/arrays"])
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o773])
-def test_a_folder_that_others_write_to_is_not_used(place: Path, name: str, mode: int) -> None:
+def test_folder_writable_by_others_is_not_used(place: Path, name: str, mode: int) -> None:
     make_private_folder(place / name)
     (place / name).chmod(mode)
     if mode == 0o1777 and name != "cache/arrays":  # others cannot rename there what is not theirs
@@ -107,7 +107,7 @@ def test_links_are_followed_step_by_step(place: Path) -> None:
         other_writers(place / "round" / "more")
 
 
-def test_a_file_that_others_write_to_is_made_again(place: Path) -> None:
+def test_file_writable_by_others_is_recomputed(place: Path) -> None:
     assert _kept()
     (file,) = place.rglob("*.arrays")
     file.chmod(0o666)
@@ -116,7 +116,7 @@ def test_a_file_that_others_write_to_is_made_again(place: Path) -> None:
     assert made == [1] and file.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_pipe_does_not_hold_the_reader_up(place: Path) -> None:
+def test_pipe_does_not_block_the_reader(place: Path) -> None:
     os.mkfifo(place / "pipe", 0o600)
     with pytest.raises(ValueError, match="not a private file of this user"):
         open_private_file(place / "pipe")
@@ -126,7 +126,7 @@ def test_a_pipe_does_not_hold_the_reader_up(place: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder", "link to nowhere"])
-def test_something_else_in_a_files_place_costs_only_time(place: Path, kind: str) -> None:
+def test_non_file_at_a_cache_path_is_tolerated(place: Path, kind: str) -> None:
     assert _kept()
     (file,) = place.rglob("*.arrays")
     whole = file.read_bytes()
@@ -148,7 +148,7 @@ def test_something_else_in_a_files_place_costs_only_time(place: Path, kind: str)
 @pytest.mark.parametrize(
     "name", ["/dev/null", "/proc/dermis", "/dev/full/dermis", "x" * 300, "/dev/null/a/b"]
 )
-def test_a_place_that_cannot_be_a_folder_costs_only_time(
+def test_unusable_cache_folder_is_tolerated(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -156,7 +156,7 @@ def test_a_place_that_cannot_be_a_folder_costs_only_time(
     assert _kept() == (".." in name)
 
 
-def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_user_without_home_has_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No folder called ~ is created in the current folder."""
     monkeypatch.chdir(tmp_path)
     for name in ("DERMIS_CACHE", "HOME", "XDG_CACHE_HOME"):
@@ -165,7 +165,7 @@ def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest
     assert not _kept() and not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_costs_only_time(place: Path) -> None:
+def test_full_disk_is_tolerated(place: Path) -> None:
     resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))

@@ -22,13 +22,13 @@ from dermis.gpu.device import Device
 from dermis.images.io import read_image
 
 
-def test_names_are_listed_in_order_and_each_has_a_home() -> None:
+def test_names_are_listed_in_order_with_their_modules() -> None:
     assert dermis.__all__ == sorted(dermis.__all__, key=lambda name: (name[0].islower(), name))
     assert set(dermis.__all__) == set(dermis._MODULE_OF_NAME)
 
 
 @pytest.mark.parametrize("name", dermis.__all__)
-def test_each_name_resolves_and_is_explained(name: str) -> None:
+def test_each_name_resolves_and_has_a_docstring(name: str) -> None:
     thing = getattr(dermis, name)
     assert thing.__name__ == name
     assert inspect.getmodule(thing).__name__ == f"dermis.{dermis._MODULE_OF_NAME[name]}"
@@ -44,7 +44,7 @@ def test_unknown_names_are_attribute_errors(name: str) -> None:
         getattr(dermis, name)
 
 
-def test_all_names_are_listed_before_they_are_used() -> None:
+def test_dir_lists_all_names_before_import() -> None:
     code = "import dermis; assert set(dermis.__all__) <= set(dir(dermis)); assert '_HOME' not in dir(dermis)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -63,7 +63,7 @@ def test_the_version_is_that_of_the_project(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("module", [dermis, dermis.scene])
-def test_a_name_of_the_last_release_warns_and_works(module: ModuleType) -> None:
+def test_old_names_warn_and_work(module: ModuleType) -> None:
     with pytest.warns(DeprecationWarning, match=r"profile is now dermis\.(scene\.)?side; .*") as warned:
         assert module.profile is dermis.side
     assert [one.filename for one in warned] == [__file__]
@@ -91,21 +91,19 @@ assert Change is unmix.PigmentChange
 """
 
 
-def test_modules_of_the_last_release_warn_and_are_the_new_ones(tmp_path: Path) -> None:
+def test_old_modules_warn_and_alias_the_new_ones(tmp_path: Path) -> None:
     script = tmp_path / "old.py"
     script.write_text(OLD_MODULES)
     subprocess.run([sys.executable, str(script)], check=True)
 
 
-def test_import_by_star_gives_what_is_promised() -> None:
+def test_star_import_gives_the_public_names() -> None:
     names: dict[str, object] = {}
     exec("from dermis import *", names)
     assert set(dermis.__all__) <= set(names)
 
 
-def test_the_lines_of_the_description(
-    tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_readme_example_lines_run(tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     head = dermis.load_head(write_head(tmp_path / "head.obj"))
     scene = dermis.Scene(head, lights=dermis.studio(), camera=dermis.portrait(head))
@@ -116,7 +114,7 @@ def test_the_lines_of_the_description(
     assert (tmp_path / "head.exr").stat().st_size > 1000
 
 
-def test_a_renderer_is_kept_for_many_frames(
+def test_render_function_reuses_its_renderer(
     tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
@@ -131,7 +129,7 @@ def test_a_renderer_is_kept_for_many_frames(
     np.testing.assert_array_equal(first, again)
 
 
-def test_a_head_alone_is_drawn_as_its_portrait(
+def test_single_head_is_drawn_as_a_portrait(
     tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
@@ -145,7 +143,7 @@ def test_a_head_alone_is_drawn_as_its_portrait(
         dermis.render(head, dermis.Settings())  # type: ignore[arg-type]
 
 
-def test_a_picture_is_written_by_what_it_is(tmp_path: Path) -> None:
+def test_write_image_accepts_levels_and_linear_values(tmp_path: Path) -> None:
     levels = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
     dermis.write_image(tmp_path / "a.png", levels)
     np.testing.assert_array_equal(read_image(tmp_path / "a.png"), levels)
@@ -173,13 +171,13 @@ def test_a_picture_is_written_by_what_it_is(tmp_path: Path) -> None:
         (lambda path: dermis.Human(targets=["nose"]), "targets: expected weights of targets by name"),
     ],
 )
-def test_slips_get_a_sentence(slip: Callable[[Path], object], said: str, tmp_path: Path) -> None:
+def test_usage_errors_have_a_message(slip: Callable[[Path], object], said: str, tmp_path: Path) -> None:
     with pytest.raises(dermis.DermisError, match=said):
         slip(write_head(tmp_path / "head.obj"))
 
 
 @pytest.mark.parametrize("name", ["bust", "bust_many_charts"])
-def test_heads_that_are_gone_say_what_replaced_them(name: str, tmp_path: Path) -> None:
+def test_removed_heads_name_their_replacement(name: str, tmp_path: Path) -> None:
     with pytest.raises(dermis.DermisError, match=rf"^{name}: .* replaced by .*'human'\. Write human instead"):
         dermis.load_head(name)
     scene = tmp_path / "scene.toml"
@@ -188,7 +186,7 @@ def test_heads_that_are_gone_say_what_replaced_them(name: str, tmp_path: Path) -
         dermis.load_scene(scene)
 
 
-def test_errors_are_of_one_kind() -> None:
+def test_errors_share_one_base_class() -> None:
     with pytest.raises(dermis.DermisError, match=r"expected .* but .*\."):
         dermis.load_head("nobody.obj")
     with pytest.raises(dermis.DermisError, match=r"expected .* but .*\."):

@@ -11,17 +11,17 @@ from dermis.base.errors import DermisError
 from dermis.base.quantities import checked_array
 
 
-def test_an_array_of_the_shape_is_taken() -> None:
+def test_array_of_the_shape_is_accepted() -> None:
     assert np.array_equal(checked_array("place", [[1, 2, 3]], (0, 3), -5, 5), [[1, 2, 3]])
 
 
 @pytest.mark.parametrize("values", [[["1"]], [[True]], [1, [2, 3]], "123", [[6.0]], [[float("nan")]]])
-def test_what_is_no_array_of_numbers_is_refused(values: object) -> None:
+def test_invalid_arrays_are_refused(values: object) -> None:
     with pytest.raises(DermisError, match=r"place: expected n x 1 numbers from -5 to 5, but"):
         checked_array("place", values, (0, 1), -5, 5)
 
 
-def test_lists_without_end_are_refused() -> None:
+def test_endless_lists_are_refused() -> None:
     nested: list[Any] = []
     for _ in range(5000):
         nested = [nested]

@@ -46,7 +46,7 @@ def test_unknown_names_are_refused() -> None:
         Owner(animal=5)
 
 
-def test_a_name_is_registered_once() -> None:
+def test_duplicate_names_are_refused() -> None:
     with pytest.raises(DermisError, match="animal cat: expected an unused name"):
         ANIMALS.register("cat", 2)
 

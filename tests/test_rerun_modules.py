@@ -12,13 +12,13 @@ TESTS = Path(__file__).parent
 OTHERWISE = re.compile(r"\b(flaky|reruns?(_delay)?|only_rerun)\b")
 
 
-def test_those_that_are_listed_exist_and_have_a_reason() -> None:
+def test_listed_modules_exist_and_have_a_reason() -> None:
     modules = {path.stem for path in TESTS.rglob("test_*.py")}
     assert set(RERUN) <= modules
     assert all(len(reason.split()) > 5 for reason in RERUN.values())
 
 
-def test_nothing_else_asks_for_another_run(request: pytest.FixtureRequest) -> None:
+def test_other_modules_are_not_rerun(request: pytest.FixtureRequest) -> None:
     marked = {
         path.stem
         for path in TESTS.rglob("*.py")
@@ -28,6 +28,6 @@ def test_nothing_else_asks_for_another_run(request: pytest.FixtureRequest) -> No
     assert not request.config.getoption("reruns", None)
 
 
-def test_the_mark_is_on_the_listed_modules_alone(request: pytest.FixtureRequest) -> None:
+def test_only_listed_modules_are_marked(request: pytest.FixtureRequest) -> None:
     for item in request.session.items:
         assert (item.get_closest_marker("flaky") is not None) is (item.path.stem in RERUN)

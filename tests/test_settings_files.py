@@ -110,7 +110,7 @@ def test_a_name_without_a_file_to_read_is_refused(tmp_path: Path, head: Head, na
 
 @pytest.mark.parametrize("place", [place for place in PLACES if place != "name with NUL"])
 @pytest.mark.parametrize("part", NAMED)
-def test_likewise_where_a_scene_names_it(tmp_path: Path, part: str, place: str) -> None:
+def test_scene_that_names_a_missing_settings_file_is_refused(tmp_path: Path, part: str, place: str) -> None:
     write_head(tmp_path / "head.obj")
     named = _placed(tmp_path, "other.toml", place).name
     tables = {
@@ -126,7 +126,7 @@ def test_likewise_where_a_scene_names_it(tmp_path: Path, part: str, place: str) 
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 @pytest.mark.parametrize("name", KINDS)
-def test_a_text_that_cannot_be_taken_is_refused(tmp_path: Path, head: Head, name: str, text: bytes) -> None:
+def test_invalid_text_is_refused(tmp_path: Path, head: Head, name: str, text: bytes) -> None:
     (tmp_path / name).write_bytes(text)
     with pytest.raises(DermisError, match=rf"{re.escape(name)}.*expected ") as caught:
         KINDS[name].load(tmp_path / name, head)
@@ -135,7 +135,7 @@ def test_a_text_that_cannot_be_taken_is_refused(tmp_path: Path, head: Head, name
 
 @pytest.mark.parametrize("number", ["9" * 400, "9" * 5000, "1e999", "nan", "[1]", "1e308"])
 @pytest.mark.parametrize("name", KINDS)
-def test_a_number_that_cannot_be_is_refused(tmp_path: Path, head: Head, name: str, number: str) -> None:
+def test_invalid_number_is_refused(tmp_path: Path, head: Head, name: str, number: str) -> None:
     kind, path = KINDS[name], tmp_path / name
     path.write_text(kind.text.replace(kind.number, number, 1))
     with pytest.raises(DermisError, match=rf"{re.escape(name)}.*expected "):

@@ -69,7 +69,7 @@ def test_every_value_is_in_the_signature_and_in_the_help(kind: type) -> None:
 
 
 @pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind.__name__)
-def test_models_show_defaults_and_nothing_of_pydantic(kind: type[FrozenModel]) -> None:
+def test_signatures_of_models_show_defaults_only(kind: type[FrozenModel]) -> None:
     parameters, text = inspect.signature(kind).parameters, helped(kind)
     assert {name: one.default for name, one in parameters.items()} == {
         name: default_of(kind, name) for name in kind.model_fields
@@ -89,7 +89,7 @@ def test_a_model_lists_its_fields() -> None:
     assert dir(Sample) == ["replace"]
 
 
-def test_the_signature_stays_when_a_model_is_used() -> None:
+def test_signature_is_unchanged_after_use() -> None:
     class Used(Sample):
         """Model that equals the sample until it is used."""
 

@@ -20,7 +20,7 @@ def person() -> Head:
     return Human().head(subdivide=0)
 
 
-def test_a_head_tells_its_name_size_maps_and_what_moves_it(person: Head) -> None:
+def test_head_summary_has_name_size_maps_and_rig(person: Head) -> None:
     first, second = repr(person).splitlines()
     assert first == f"<Head 'human': {len(person.mesh.triangles):,} triangles at level 0 of subdivision"
     assert second.split("; ")[:3] == [" maps: painted", "52 targets", "10 bones"]
@@ -28,7 +28,7 @@ def test_a_head_tells_its_name_size_maps_and_what_moves_it(person: Head) -> None
     assert repr(ball).splitlines()[1] == " maps: colour>"
 
 
-def test_nothing_that_a_head_holds_prints_its_numbers(person: Head) -> None:
+def test_summaries_omit_arrays(person: Head) -> None:
     pose = dermis.Pose({f"target {k}": 1.0 for k in range(99)}, positions_mm=person.positions_mm)
     rig = person.control
     parts = [getattr(person, one.name) for one in fields(person)]
@@ -38,7 +38,7 @@ def test_nothing_that_a_head_holds_prints_its_numbers(person: Head) -> None:
     assert "float32[" in repr(pose)
 
 
-def test_short_values_print_as_they_are() -> None:
+def test_short_values_are_printed_unchanged() -> None:
     assert short_repr((1, 2)) == "(1, 2)"
     assert short_repr("a name") == "'a name'"
     assert short_repr(list(range(1000))) == "<1,000 in a list>"

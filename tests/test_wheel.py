@@ -41,7 +41,7 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_it_renders(empty: Path) -> None:
+def test_installed_wheel_renders(empty: Path) -> None:
     write_head(empty / "head.obj")
     command = str(binaries(empty / "env") / "dermis")
     small = ["--size", "32x32", "--atlas", "64", "--samples", "1"]
@@ -51,14 +51,14 @@ def test_it_renders(empty: Path) -> None:
     assert image.shape == (32, 32, 3) and np.ptp(image) > 50
 
 
-def test_nothing_of_the_checkout_is_found(empty: Path) -> None:
+def test_wheel_does_not_import_from_the_checkout(empty: Path) -> None:
     python = str(binaries(empty / "env") / "python")
     home, *path = json.loads(run([python, "-c", WHERE], empty))
     assert Path(home).is_relative_to(empty)
     assert not [entry for entry in path if Path(entry).is_relative_to(ROOT) and "site-packages" not in entry]
 
 
-def test_all_that_is_no_python_is_in_it(empty: Path) -> None:
+def test_wheel_contains_all_data_files(empty: Path) -> None:
     """Shaders, tables, presets, and the scripts of the gallery."""
     python = str(binaries(empty / "env") / "python")
     installed = Path(json.loads(run([python, "-c", WHERE], empty))[0]).parent

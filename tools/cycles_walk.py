@@ -18,11 +18,11 @@ from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 ROOTS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.48, 0.56, 0.64, 0.72, 0.8, 0.8945)
-"""sqrt(1 - albedo); Cycles takes no albedo below 0.2."""
+"""Values of sqrt(1 - albedo); Cycles accepts no albedo below 0.2."""
 RADII = np.concatenate([[0.0], np.geomspace(0.03, 200.0, 32)])
-"""Within which light is counted [mean free paths]."""
+"""Radii within which light is counted [mean free paths]."""
 MOST = 256
-"""Steps after which Cycles gives a walk up."""
+"""Number of steps after which Cycles ends a walk."""
 ETA = 1.4
 ENTRIES = ("straight", "skin")
 PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
@@ -43,7 +43,7 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
     """Return the initial direction of a walk, with z downwards."""
     if not skin:
         return 0.0, 0.0, 1.0
-    facing = math.sqrt(random_uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
+    facing = math.sqrt(random_uniform(rng))  # for facets of roughness 1 and diffuse light
     turn = 2.0 * math.pi * random_uniform(rng)
     angle = math.acos(facing)
     if random_uniform(rng) >= 0.5:
@@ -52,8 +52,8 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
 
 
 @compiled
-def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, found: Floats) -> None:
-    """Add the weights of photons that leave to their ring in `found` (albedos, radii + 1).
+def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, tally: Floats) -> None:
+    """Add the weights of photons that leave to their ring in `tally` (albedos, radii + 1).
 
     powers : (albedos, MOST) albedo^n
     """
@@ -65,7 +65,7 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomS
             if z + path * uz < 0.0:
                 path = -z / uz
                 ring = np.searchsorted(radii, math.hypot(x + path * ux, y + path * uy))
-                found[:, ring] += powers[:, step]
+                tally[:, ring] += powers[:, step]
                 break
             x, y, z = x + path * ux, y + path * uy, z + path * uz
             ux, uy, uz = scatter_direction(ux, uy, uz, 0.0, rng)
@@ -77,10 +77,10 @@ def main(photons: int = 4_000_000) -> None:
     powers = albedo[:, None] ** np.arange(MOST)
     lines = []
     for number, entry in enumerate(ENTRIES):
-        found = np.zeros((len(ROOTS), len(RADII) + 1))
+        tally = np.zeros((len(ROOTS), len(RADII) + 1))
         words = np.random.default_rng([7, number]).integers(0, 2**64, 4, np.uint64)
-        _walks(photons, entry == "skin", powers, RADII, words, found)
-        within = np.cumsum(found, axis=1)[:, 1:-1] / photons
+        _walks(photons, entry == "skin", powers, RADII, words, tally)
+        within = np.cumsum(tally, axis=1)[:, 1:-1] / photons
         for root, row in zip(ROOTS, within, strict=True):
             lines += [
                 f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)

@@ -28,8 +28,8 @@ KINDS = {"skin": (1.4, False), "matched": (1.0, False), "walk": (1.0, True)}
 ABSORBED = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])
 EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 3e3, 96)])
 PHOTONS, BATCHES = 3_000_000, 40
-DARK, MORE = 0.2, 8  # what is absorbed at least where few photons count, and how many times more are traced
-EVENTS, FEW_EVENTS = 200_000, 200  # after which a photon counts next to nothing, or a seventh at 1e-5
+DARK, MORE = 0.2, 8  # least absorption at which few photons count, and factor of their number
+EVENTS, FEW_EVENTS = 200_000, 200  # then weights are negligible, or 1/7 for absorption 1e-5
 HEAD = """\
 # quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that
 #   leaves; total is that of what enters; kind skin has a smooth surface of index 1.4 lit at right angles,
@@ -48,8 +48,8 @@ def main(photons: int = PHOTONS) -> None:
         dark = ABSORBED >= DARK
         bright_left = trace_photons(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
         dark_left = trace_photons(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)
-        left = np.hstack([bright_left, dark_left])
-        total, within = left.sum(axis=0), np.cumsum(left[:-1], axis=0)
+        escaped = np.hstack([bright_left, dark_left])
+        total, within = escaped.sum(axis=0), np.cumsum(escaped[:-1], axis=0)
         for i, absorbed in enumerate(ABSORBED):
             shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
             lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
@@ -61,10 +61,10 @@ def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, eve
     """Return the (k, m) light that leaves through each ring and beyond the last, for each albedo [-]."""
 
     def batch(seeds: np.random.SeedSequence) -> Floats:
-        left = np.zeros((len(EDGES), len(absorbed)))
+        escaped = np.zeros((len(EDGES), len(absorbed)))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
-        _walk(photons // BATCHES, events, eta, diffuse, EDGES**2, np.log1p(-absorbed), rng, left)
-        return left
+        _walk(photons // BATCHES, events, eta, diffuse, EDGES**2, np.log1p(-absorbed), rng, escaped)
+        return escaped
 
     with ThreadPoolExecutor() as pool:
         parts = list(pool.map(batch, np.random.SeedSequence(0).spawn(BATCHES)))
@@ -80,12 +80,12 @@ def _walk(
     edges2: Floats,
     log_albedo: Floats,
     rng: Words,
-    left: Floats,
+    escaped: Floats,
 ) -> None:
     for _ in range(photons):
         x = y = z = ux = uy = 0.0
         uz = math.sqrt(random_uniform(rng)) if diffuse else 1.0
-        ux = math.sqrt(1.0 - uz * uz)  # rings are round: one azimuth stands for all
+        ux = math.sqrt(1.0 - uz * uz)  # rings are symmetric, so one azimuth suffices
         scatterings = 0
         path = -math.log(random_uniform(rng))
         for _event in range(events):
@@ -101,7 +101,7 @@ def _walk(
             if eta == 1.0 or random_uniform(rng) >= refract(-uz, eta)[0]:
                 ring = int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
                 for k in range(len(log_albedo)):
-                    left[ring, k] += math.exp(scatterings * log_albedo[k])
+                    escaped[ring, k] += math.exp(scatterings * log_albedo[k])
                 break
             uz = -uz
 

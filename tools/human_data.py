@@ -23,28 +23,28 @@ Index = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "human.npz"
-MM = 100.0  # in a unit of the published positions
+MM = 100.0  # length of a unit of the published positions
 MEAN = {
     f"macrodetails/{people}-{sex}-young": 1 / 6
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
-"""Weights of the targets of the person that edges, seams and densities are chosen on."""
-BONES = {  # what each stands for: bones of the file by the beginning of their names
+"""Target weights of the mean person, on whom edges, seams and densities are defined."""
+BONES = {  # bones of the file, by the beginning of their names, that each bone replaces
     "spine": ("spine", "breast"),
     "clavicle.L": ("clavicle.L", "shoulder01.L", "upperarm01.L", "upperarm02.L", "lowerarm01.L"),
     "clavicle.R": ("clavicle.R", "shoulder01.R", "upperarm01.R", "upperarm02.R", "lowerarm01.R"),
     "neck01": ("neck01",),
     "neck02": ("neck02",),
     "neck03": ("neck03",),
-    "head": (),  # all others
+    "head": (),  # all other bones
     "jaw": ("jaw", "tongue", "special04", "oris05", "oris07"),
     "eye.L": ("eye.L",),
     "eye.R": ("eye.R",),
 }
-CORNER_MM = 25.0  # radius, roughly, of the cut's corners
-RELAXING = 40  # rounds of smoothing along the edge of the cut: it crosses the folds of the armpits
-ACROSS = 4  # quads of the cap from front to back
+CORNER_MM = 25.0  # approximate radius of the cut's corners
+RELAXING = 40  # smoothing steps along the edge of the cut, which crosses the folds of the armpits
+ACROSS = 4  # number of quads of the cap from front to back
 
 
 def main(folder: Path) -> None:
@@ -56,7 +56,7 @@ def main(folder: Path) -> None:
     quads, kept, mix = clip_to_bust(data, mean)
     shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix, mean)
     published, uv = data["quads_uv"][kept].astype(np.int64), data["uv"].astype(np.float64)
-    own, corner = human_layout(shape.places(mean), shape.quads, published, uv, shape.group)
+    own, corner = human_layout(shape.points_mm(mean), shape.quads, published, uv, shape.group)
     made = bust(data, shape) | {"uv": own.astype(np.float32), "quads_uv": corner.astype(np.uint16)}
     made |= {"uv1": data["uv"], "quads_uv1": data["quads_uv"][kept]}
     OUT.parent.mkdir(exist_ok=True)
@@ -75,7 +75,7 @@ class Shape(NamedTuple):
     group: Index
     mix: Any
 
-    def places(self, published: Doubles) -> Doubles:
+    def points_mm(self, published: Doubles) -> Doubles:
         """Return the (n, 3) positions of the points for given published positions [mm]."""
         return np.asarray(self.mix @ published)
 
@@ -95,12 +95,12 @@ def person(data: Arrays, weights: dict[str, float]) -> Doubles:
     return added
 
 
-def edge_distance_mm(places: Doubles) -> Doubles:
+def edge_distance_mm(points_mm: Doubles) -> Doubles:
     """Return the (n,) signed distances of positions (n, 3) from the edge of the bust, negative inside [mm].
 
     The cut is level above the breasts and rises outwards through the shoulders.
     """
-    x, y = np.abs(places[:, 0]), places[:, 1]
+    x, y = np.abs(points_mm[:, 0]), points_mm[:, 1]
     below, beside = 385.0 - y, 0.93 * (x - 118.0) - 0.37 * (y - 385.0)
     return np.asarray(CORNER_MM * np.logaddexp(below / CORNER_MM, beside / CORNER_MM))
 
@@ -115,30 +115,30 @@ def without_groups(data: Arrays, kind: str) -> Arrays:
     return data | named | {name: data[name][kept] for name in ("quads", "quads_uv")}
 
 
-def clip_to_bust(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
+def clip_to_bust(data: Arrays, points_mm: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
     """Return the quads of the bust, the mask of the kept quads, and the mixing weights of the points.
 
     Points outside the edge are moved to it along the shortest path into the bust.
     """
     quads, group = data["quads"].astype(np.int64), data["quad_group"].astype(np.int64)
-    away = edge_distance_mm(places)
+    away = edge_distance_mm(points_mm)
     inside = away <= 0
     kept = inside[quads].any(axis=1) | (group > 0)
     quads = quads[kept]
-    into, share, least = np.arange(len(places)), np.zeros(len(places)), np.full(len(places), np.inf)
-    for steps in (1, 2, 3):  # along sides; across quads for corners that have no side into the bust
+    into, share, least = np.arange(len(points_mm)), np.zeros(len(points_mm)), np.full(len(points_mm), np.inf)
+    for steps in (1, 2, 3):  # along sides, or across quads for corners without a side into the bust
         pairs = np.stack([quads, np.roll(quads, -steps, axis=1)], axis=-1).reshape(-1, 2)
         for outer, inner in pairs[inside[pairs[:, 1]] & ~inside[pairs[:, 0]]].tolist():
-            part = crossing(places[outer], places[inner])
-            way = part * np.linalg.norm(places[outer] - places[inner]) + (1e6 if steps == 2 else 0.0)
+            part = crossing(points_mm[outer], points_mm[inner])
+            way = part * np.linalg.norm(points_mm[outer] - points_mm[inner]) + (1e6 if steps == 2 else 0.0)
             if way < least[outer]:
                 into[outer], share[outer], least[outer] = inner, part, way
     used = np.unique(quads)
     rows = np.arange(len(used))
     values = np.concatenate([1 - share[used], share[used]])
     columns = np.concatenate([used, into[used]])
-    mix = coo_array((values, (np.tile(rows, 2), columns)), shape=(len(used), len(places))).tocsr()
-    number = np.full(len(places), -1, np.int64)
+    mix = coo_array((values, (np.tile(rows, 2), columns)), shape=(len(used), len(points_mm))).tocsr()
+    number = np.full(len(points_mm), -1, np.int64)
     number[used] = rows
     return number[quads], kept, mix
 
@@ -153,14 +153,14 @@ def crossing(outer: Doubles, inner: Doubles) -> float:
     return high
 
 
-def capped(quads: Index, group: Index, mix: Any, places: Doubles) -> Shape:
+def capped(quads: Index, group: Index, mix: Any, points_mm: Doubles) -> Shape:
     """Return the bust with its opening closed by a strip of quads from front to back."""
     loop = border(quads[group == 0])
-    where = mix[loop] @ places
-    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back part
+    where = mix[loop] @ points_mm
+    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back separate
     loop = np.roll(loop, -top)
     mix, half = relaxed(mix, loop), len(loop) // 2
-    # points of its own: normals are not smooth around the edge
+    # separate points, as normals are not smooth around the edge
     copies = np.arange(mix.shape[0], mix.shape[0] + len(loop))
     mix, loop = vstack([mix, mix[loop]]).tocsr(), copies
     front, back = loop[: half + 1], np.r_[loop[0], loop[: half - 1 : -1]]
@@ -226,9 +226,9 @@ def bust(data: Arrays, shape: Shape) -> Arrays:
         deltas.append(moved[which])
         first.append(first[-1] + len(which))
     bone, weight = influences(data, shape.mix)
-    places = mix @ (MM * data["positions_dm"].astype(np.float64))
+    points_mm = mix @ (MM * data["positions_dm"].astype(np.float64))
     return {
-        "positions_mm": places.astype(np.float32),
+        "positions_mm": points_mm.astype(np.float32),
         "quads": shape.quads.astype(np.uint16),
         "group": shape.group.astype(np.uint8),
         "group_names": np.append(data["group_names"], "cap"),

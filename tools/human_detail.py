@@ -20,22 +20,22 @@ Doubles = NDArray[np.float64]
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "detail.png"
 PORES_A_SIDE = 30
 PORE_MM = (0.06, 0.19)
-"""Radius of the smallest and the largest [mm], artist's values: 0.05 to 0.3 across, and a little over."""
+"""Radius of the smallest and the largest pore [mm], an artist's choice."""
 PORE_DEPTH_MM = (0.03, 0.085)
 CELLS_A_SIDE, FINE_CELLS_A_SIDE = 44, 92
-"""Of the two nets of furrows: cushions of 0.7 and of 0.35 mm."""
+"""Cells per side of the coarse and the fine net of furrows, 0.7 and 0.35 mm wide."""
 FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016
 FINE_SHARE = 0.4
 SOFT = 0.6
-"""Standard deviation of the blur over all [texels]."""
+"""Standard deviation of the final blur [texels]."""
 
 
 def main() -> None:
     """Build the tiles and write the file."""
     rng = np.random.default_rng(0)
     across = (np.arange(TILE_SIDE) + 0.5) * TILE_LENGTH_MM / TILE_SIDE
-    places = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
-    layers = [pores(places, rng), furrows(places, rng), np.zeros(len(places))]
+    positions = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
+    layers = [pores(positions, rng), furrows(positions, rng), np.zeros(len(positions))]
     heights = gaussian_filter(
         np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (SOFT, SOFT, 0), mode="wrap"
     )
@@ -52,17 +52,17 @@ def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Dou
     )
 
 
-def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
+def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
     """Return the (n,) height of skin with pores, smooth pits of different inclination [mm]."""
     middle = scattered(PORES_A_SIDE, rng)
     share = rng.random(len(middle)) ** 1.3
     radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
     depth *= rng.random(len(middle)) < 0.85
     turn, long = rng.uniform(0, np.pi, len(middle)), rng.uniform(1.0, 1.5, len(middle))
-    _, near = nearest(places, middle, 3)
-    height = np.zeros(len(places))
+    _, near = nearest(positions, middle, 3)
+    height = np.zeros(len(positions))
     for which in near.T:
-        off = wrapped(places - middle[which])
+        off = wrapped(positions - middle[which])
         c, s = np.cos(turn[which]), np.sin(turn[which])
         along, beside = c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0]
         square = (along / long[which]) ** 2 + beside**2
@@ -70,27 +70,27 @@ def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
     return height
 
 
-def furrows(places: Doubles, rng: np.random.Generator) -> Doubles:
+def furrows(positions: Doubles, rng: np.random.Generator) -> Doubles:
     """Return the (n,) height of skin with a coarse and a fine net of furrows [mm]."""
-    coarse = net(places, CELLS_A_SIDE, 1.0, rng)
-    return np.asarray(coarse + FINE_SHARE * net(places, FINE_CELLS_A_SIDE, 0.55, rng))
+    coarse = net(positions, CELLS_A_SIDE, 1.0, rng)
+    return np.asarray(coarse + FINE_SHARE * net(positions, FINE_CELLS_A_SIDE, 0.55, rng))
 
 
-def net(places: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
+def net(positions: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
     """Return the (n,) height of a net of furrows between convex cells [mm]."""
     middle = scattered(count, rng, 0.8)
     uneven = 0.5 + rng.random(len(middle))
-    distance, near = nearest(places, middle, 2)
+    distance, near = nearest(positions, middle, 2)
     between = distance[:, 1] - distance[:, 0]
     depth = FURROW_DEPTH_MM * 0.5 * uneven[near].sum(axis=1)
     cushion = CUSHION_MM * np.minimum(between / (TILE_LENGTH_MM / count), 1.0)
     return np.asarray(cushion - depth * np.exp(-((between / (size * FURROW_MM)) ** 2)))
 
 
-def nearest(places: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
+def nearest(positions: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
     """Return the (n, k) distances to the nearest positions on the tile, and their indices."""
     box: Any = TILE_LENGTH_MM
-    distance, which = cKDTree(middle, boxsize=box).query(places, k=k)
+    distance, which = cKDTree(middle, boxsize=box).query(positions, k=k)
     return np.asarray(distance), np.asarray(which)
 
 

@@ -26,15 +26,15 @@ from dermis.mesh.mesh import Mesh
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "average.npz"
 AVERAGE = Human(sex=0.5, age=35.0)
-"""The person on whom skin is painted: left and right are alike."""
+"""Person on whom skin is painted; left and right are symmetric."""
 LEVEL = 3
-"""Of the subdivision that distances are measured on."""
+"""Level of the subdivision on which distances are measured."""
 FARTHEST_MM = 25.0
-"""Where fields end: nothing is painted so far from a border."""
+"""Distance at which fields end; nothing is painted farther from a border."""
 SMOOTH = 0.05
-"""Weight of a control point's own value in the fit, which leaves points that move nothing where they are."""
+"""Weight of a control point's own value in the fit, which keeps points without influence."""
 ROOT_MM = 1.5
-"""How far the roots of the strips of lashes are from the skin at most."""
+"""Largest distance of the roots of lash strips from the skin."""
 
 
 def main(folder: Path) -> None:
@@ -44,7 +44,7 @@ def main(folder: Path) -> None:
     stencils = head.rig.stencils
     places = morphed_points_mm(AVERAGE.weights())[
         : mesh_point_count()
-    ]  # with the published lids: strips of lashes fit them
+    ]  # with the published lids, which the strips of lashes fit
     points = stencils.points(np.concatenate([places, head.positions_mm[mesh_point_count() :]]))
     mesh = replace(head.mesh, positions=points[head.mesh.point].astype(np.float32))
     skin = skin_vertices(mesh)
@@ -53,7 +53,7 @@ def main(folder: Path) -> None:
     found = {
         "lips": signed(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
         "mouth": -signed(mesh, skin, inside),
-        "lids": away(mesh, lash_roots(folder, mesh, skin)),
+        "lids": distance_to(mesh, lash_roots(folder, mesh, skin)),
     }
     assert tuple(found) == BORDER_FIELDS
     values = np.stack([np.clip(one, -FARTHEST_MM, FARTHEST_MM) for one in found.values()], axis=1)
@@ -98,12 +98,12 @@ def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] |
     a, b = a[crosses], b[crosses]
     part = ((0.5 - share[a]) / (share[b] - share[a]))[:, None]
     border = mesh.positions[a] + part * (mesh.positions[b] - mesh.positions[a])
-    return np.asarray(np.where(share > 0.5, 1.0, -1.0) * away(mesh, border))
+    return np.asarray(np.where(share > 0.5, 1.0, -1.0) * distance_to(mesh, border))
 
 
-def away(mesh: Mesh, places: Doubles) -> Doubles:
+def distance_to(mesh: Mesh, points: Doubles) -> Doubles:
     """Return the (v,) distance of each vertex from the nearest position [mm]."""
-    return np.asarray(cKDTree(places).query(mesh.positions)[0])
+    return np.asarray(cKDTree(points).query(mesh.positions)[0])
 
 
 def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from human_landmark_places import Doubles, Surface, arcs
+from human_landmark_candidates import Doubles, Surface, arcs
 
 from dermis.mesh.eyeball import CORNEA_MM, IRIS_BEHIND_MM, SCLERA_MM, apex_mm
 
 Place = tuple[int, float]
 Named = dict[str, Place]
 
-_REFRACTION = 1.336  # of the cornea's front and what is behind, as the frame draws it
+_REFRACTION = 1.336  # index of refraction of cornea and aqueous humour, as in the frame
 _SEEN_MM = 1.0 / (_REFRACTION / IRIS_BEHIND_MM - (_REFRACTION - 1.0) / CORNEA_MM)
 PUPIL = _SEEN_MM / (apex_mm() + SCLERA_MM)
-"""Where the pupil is seen through the cornea, on the way from its apex to the back of the eyeball."""
-_NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # of the average human [mm]
+"""Apparent position of the pupil, as a fraction of the way from the apex to the back of the eyeball."""
+_NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # on the average human [mm]
 # x, y on the front plane [mm]
 _WING, _NOSTRIL, _ALA = (14.6, -42.6), (8.0, -46.2), (17.6, -37.5)
-_OVAL_MM = (69.0, -15.0, 54.0)  # half of its breadth, where it is broadest, where it ends above
+_OVAL_MM = (69.0, -15.0, 54.0)  # half its width, height of the largest width, and height of the top
 
 
 def ibug(surface: Surface) -> Named:
@@ -93,7 +93,7 @@ def mediapipe(surface: Surface) -> Named:
     return dict(sorted(found.items(), key=lambda one: int(one[0])))
 
 
-Pairs = dict[str, tuple[int, str]]  # number on the left, its candidate, number on the right or nothing
+Pairs = dict[str, tuple[int, str]]  # by name: number on the left, candidate, and number on the right or ""
 
 
 def _pairs(left: str, right: str, candidates: list[int]) -> Pairs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from human_landmark_places import Surface
+from human_landmark_candidates import Surface
 from human_landmark_sets import face_synthetics, ibug, mediapipe
 
 from dermis.base.command_line import run_script
@@ -37,19 +37,19 @@ def main() -> None:
     """Compute the landmarks and write the tables."""
     surface = Surface()
     for name, (made, what) in SETS.items():
-        rows = [row(surface, landmark, place) for landmark, place in made(surface).items()]
+        rows = [row(surface, landmark, anchor) for landmark, anchor in made(surface).items()]
         path = OUT / f"{name}.csv"
         path.write_text(HEADER.format(what=what, source=SOURCE) + "".join(rows), encoding="utf-8")
         sys.stdout.write(f"{path}  {len(rows)} points\n")
 
 
-def row(surface: Surface, landmark: str, place: tuple[int, float]) -> str:
+def row(surface: Surface, landmark: str, anchor: tuple[int, float]) -> str:
     """Return a row of the table.
 
-    place : index of a candidate and its depth below the surface
+    anchor : index of a candidate and its depth below the surface
     """
-    candidate, sunk = place
-    along, across = surface.place[candidate]
+    candidate, sunk = anchor
+    along, across = surface.position[candidate]
     return f"{landmark},{surface.quad[candidate]},{along:g},{across:g},{sunk:.3g}\n"
 
 

@@ -17,25 +17,25 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CHART_PADDING = 1 / 256
-_CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # of the seam over the crown, on the mean person [mm]
-_LOOSE = 0.05  # weight of what fills holes while a sheet is laid flat
+_CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # seam over the crown of the mean person [mm]
+_LOOSE = 0.05  # weight of the triangles that fill holes during flattening
 FACE, SCALP, EARS, TRUNK, HIDDEN, PLAIN = 1.0, 0.35, 0.7, 0.26, 0.14, 0.06
-"""Texels per mm relative to the face: of the back of the head, ears, neck and chest, mouth and sockets, and
-what is no skin."""
+"""Texels per mm relative to the face: face, back of the head, ears, neck and chest, mouth and eye sockets,
+and parts that are not skin."""
 
 
 def human_layout(
-    places: Doubles, quads: Index, published: Index, uv: Doubles, group: Index
+    points_mm: Doubles, quads: Index, published: Index, uv: Doubles, group: Index
 ) -> tuple[Doubles, Index]:
     """Return the (m, 2) uv, v down, and the (q, 4) uv corners of the quads.
 
-    places : (n, 3) points of the mean person [mm]
+    points_mm : (n, 3) points of the mean person [mm]
     quads : (q, 4) points, caps last
     published : (k, 4) corners of all quads but the caps in the published layout
     uv : (v, 2) published layout, v up
     group : (q,) group of each quad, 0 for skin
     """
-    published, uv = _with_seams(places, quads[: len(published)], published, uv)
+    published, uv = _with_seams(points_mm, quads[: len(published)], published, uv)
     corner = np.concatenate([published, len(uv) + _strip(quads[len(published) :])])
     flat = np.zeros((int(corner.max()) + 1, 2))
     island = _islands(corner)
@@ -44,7 +44,7 @@ def human_layout(
         own = np.flatnonzero(island[corner[:, 0]] == k)
         pieces.append(own)
         points = np.unique(corner[own])
-        flat[points] = _flattened(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
+        flat[points] = _flattened(points_mm, quads[own], corner[own], uv, int(group[own[0]]))[points]
     outlines = [flat[border_edges(split_quads(corner[own]))[0]] for own in pieces]
     scale, offset = pack_charts(outlines, CHART_PADDING)
     for own, move in zip(pieces, offset, strict=True):
@@ -54,15 +54,15 @@ def human_layout(
     return flat[used] * [1, -1] + [0, 1], again.reshape(-1, 4)
 
 
-def _flattened(places: Doubles, quads: Index, corner: Index, uv: Doubles, group: int) -> Doubles:
+def _flattened(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles, group: int) -> Doubles:
     """Return the (v, 2) flattened corners of one island, y up [mm times density]."""
     made = np.zeros((int(corner.max()) + 1, 2))
     used, local = np.unique(corner, return_inverse=True)
     triangles = split_quads(local.reshape(-1, 4))
     points = np.zeros((len(used), 3))
-    points[local.ravel()] = places[quads.ravel()]
+    points[local.ravel()] = points_mm[quads.ravel()]
     middle = points[triangles].mean(axis=1)
-    if group or middle[:, 2].min() > 40.0:  # plain things; mouth and sockets
+    if group or middle[:, 2].min() > 40.0:  # parts that are not skin; mouth and sockets
         is_cap = used.max() >= len(uv)
         flat = _unrolled(points) if is_cap else uv[used]
         stretch = np.median(singular_values(points[triangles], flat[triangles] * [1, -1]).prod(axis=1))
@@ -77,9 +77,9 @@ def _flattened(places: Doubles, quads: Index, corner: Index, uv: Doubles, group:
     return made
 
 
-def _with_seams(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
+def _with_seams(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
     """Return the published corners with an additional seam over crown and behind the ears, and their uv."""
-    island, middle = _islands(corner)[corner[:, 0]], places[quads].mean(axis=1)
+    island, middle = _islands(corner)[corner[:, 0]], points_mm[quads].mean(axis=1)
     head = np.flatnonzero(island == island[middle[:, 1].argmax()])
     behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
     behind = smooth_charts(np.repeat(behind, 2).astype(np.int64), split_quads(quads[head]))[::2] > 0
@@ -105,7 +105,7 @@ def _head_density(middle: Doubles) -> Doubles:
 
 
 def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
-    """Return the sheet with each hole filled by a fan of triangles, and its points with their centres."""
+    """Return the triangles with each hole filled by a fan, and the points with the centres of the fans."""
     sides, _ = border_edges(triangles)
     _, loop = connected_components(
         coo_array((np.ones(len(sides)), sides.T), shape=(len(points),) * 2), directed=False

@@ -54,7 +54,7 @@ MOTION: dict[str, Keys] = {
 }
 """Keys (seconds, value) by column; angles in radians."""
 PAIRED = ("MouthSmile", "CheekSquint", "MouthStretch", "MouthPress", "BrowOuterUp", "EyeWide", "EyeBlink")
-"""Columns that come once for each side."""
+"""Columns that exist for the left and the right side."""
 
 
 def main(output: Path, side: int = SIDE, fps: str = FPS) -> None:

@@ -17,7 +17,7 @@ WIDEST = 1600
 
 
 def main(*names: str) -> None:
-    """Render all pictures, or those that are named."""
+    """Render all pictures, or those with the given names."""
     studio = Studio("lee_perry_smith")
     for script in find_scripts(names):
         picture = Image.fromarray(panel_sheet(script.draw(studio), script.columns))

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent.parent / "docs" / "images"
 SIZE = 1100, 760
 SCENE = ("--atlas", "1024", "--samples", "4")
 PATIENCE_S = 300.0
-REFINED_S = 45.0  # without a change: a software adapter takes long for a still picture
+REFINED_S = 45.0  # time without a change; software adapters render still pictures slowly
 ANSWERED_S = 2.0
 VIEW_LIST, IRRADIANCE = (30, 168), (30, 251)
 COMPARE, FREEZE = (100, 243), (30, 268)
@@ -62,15 +62,15 @@ def page(head: str) -> Image.Image:
         tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         tab.goto(url)
 
-        def shown() -> Image.Image:
+        def screenshot() -> Image.Image:
             return Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
 
-        wait_until_still(shown)
-        for place in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
-            tab.mouse.click(*place)
-            wait_until_still(shown, ANSWERED_S)
+        wait_until_still(screenshot)
+        for position in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
+            tab.mouse.click(*position)
+            wait_until_still(screenshot, ANSWERED_S)
         tab.mouse.move(SIZE[0] - 5, 5)
-        taken = wait_until_still(shown)
+        taken = wait_until_still(screenshot)
         browser.close()
     return taken
 
@@ -89,7 +89,7 @@ def screen() -> Iterator[str]:
 
 @contextmanager
 def running(process: subprocess.Popen[Any]) -> Iterator[subprocess.Popen[Any]]:
-    """Yield a process that is ended with the block."""
+    """Yield a process, which is terminated at the end of the block."""
     try:
         yield process
     finally:

@@ -148,7 +148,7 @@ def test_every_failure_can_be_planted() -> None:
     assert set(FAILURES) <= set(_PLANTED.values())
 
 
-def test_failures_are_kept_once_for_each_place_and_tried_again(tmp_path: Path) -> None:
+def test_each_failure_is_stored_once_by_location_and_repeated(tmp_path: Path) -> None:
     kinds = {"planted": _kind(_fails)}
     tally = run(kinds, lambda: [("planted", k) for k in range(8)], 1, tmp_path, workers=2)
     ((kind, outcome, place), kept), *others = tally.places.items()
@@ -161,7 +161,7 @@ def test_failures_are_kept_once_for_each_place_and_tried_again(tmp_path: Path) -
     assert "8 failures at 1 places" in as_text(tally, 1, 2.0) and kept[0] in as_text(tally, 1, 2.0)
 
 
-def test_an_input_that_was_only_held_up_is_no_failure() -> None:
+def test_slow_inputs_are_not_failures() -> None:
     marker = Path(os.environ["DERMIS_CACHE"]) / "tried-once"
 
     def slow_once(plan: Plan) -> None:
@@ -172,7 +172,7 @@ def test_an_input_that_was_only_held_up_is_no_failure() -> None:
     assert tried(_kind(slow_once), 1, 1, Limits(cpu_s=60.0, stalled_s=2.0)).outcome == ACCEPTED
 
 
-def test_the_same_numbers_make_the_same_inputs(tmp_path: Path, prepared: None) -> None:
+def test_equal_seeds_give_equal_inputs(tmp_path: Path, prepared: None) -> None:
     for name, kind in KINDS.items():
         plans = [kind.make(tmp_path / f"{name}-{k}", _SEED, 3) for k in range(2)]
         files = [_contents(tmp_path / f"{name}-{k}") for k in range(2)]
@@ -185,7 +185,7 @@ def _contents(folder: Path) -> dict[str, bytes]:
     return {str(one.relative_to(folder)): one.read_bytes() for one in found}
 
 
-def test_trees_are_written_as_they_are() -> None:
+def test_file_trees_are_written_unchanged() -> None:
     tree = {"a": [1, 2.5, {"b c": "é\n"}], "lights": [{"kind": "spot", "at": [0.0, 1.0]}], "on": True}
     assert json.loads(json_text(tree)) == tree
     assert tomllib.loads(toml_text(tree)) == tree
@@ -222,19 +222,19 @@ def _program(module: str, *words: str) -> subprocess.CompletedProcess[str]:
     return ended
 
 
-def test_it_is_a_program(tmp_path: Path) -> None:
+def test_campaign_runs_as_a_program(tmp_path: Path) -> None:
     words = ["--minutes", "0.02", "--only", "frames", "--json", "--keep", str(tmp_path), "--workers", "1"]
     ended = _program("adversity", *words)
     told = json.loads(ended.stdout)
     assert told["failures"] == 0 and told["inputs"] == sum(told["kinds"]["frames"].values()) > 0
 
 
-def test_a_tally_counts_failures_alone() -> None:
+def test_a_tally_counts_only_failures() -> None:
     tally = Tally()
     for take in (_fails, _refuses):
         tally.add(tried(_kind(take), 1, 1))
     assert tally.failures == 1 and tally.counts["planted"] == {TRACEBACK: 1, REFUSED: 1}
 
 
-def test_what_is_found_has_an_outcome() -> None:
+def test_each_result_has_an_outcome() -> None:
     assert FoundError(NAN, "points").outcome in FAILURES

@@ -64,7 +64,7 @@ MESHES = {
 
 @pytest.mark.parametrize("size", [64, 100])
 @pytest.mark.parametrize("name", MESHES)
-def test_texels_stand_for_their_own_uv(name: str, size: int) -> None:
+def test_texel_points_have_the_uv_of_their_texel(name: str, size: int) -> None:
     mesh = MESHES[name]()
     atlas = build_atlas(mesh, size)
     own = own_texels(atlas, mesh)
@@ -84,7 +84,7 @@ def test_every_centre_on_the_surface_is_covered() -> None:
     assert np.array_equal(atlas.coverage, grown[:, None] & grown[None])
 
 
-def test_a_full_square_is_all_covered() -> None:
+def test_a_full_square_covers_all_texels() -> None:
     atlas = build_atlas(plane(100.0), 64)
     assert atlas.coverage.all() and atlas.mapped.all()
 
@@ -159,12 +159,12 @@ def test_reach_by_brute_force() -> None:
             assert atlas.edge_distance[y, x, k] == n - 1
 
 
-def test_reach_goes_all_the_way() -> None:
+def test_reach_extends_to_the_edge_of_the_chart() -> None:
     reach = build_atlas(plane(100.0), 300).edge_distance
     assert reach[10, 299].tolist() == [299, 0, 10, 289]
 
 
-def test_of_mirrored_halves_one_is_mapped() -> None:
+def test_only_one_of_two_mirrored_halves_is_mapped() -> None:
     """Check two mirrored halves on the same uv, joined at their centre line, as one chart.
 
     The mirrored half is lit directly.
@@ -188,7 +188,7 @@ def test_a_collapsed_chart_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("larger", [0, 1])
-def test_of_two_charts_on_one_place_the_larger_stays(larger: int) -> None:
+def test_the_larger_of_two_overlapping_charts_is_mapped(larger: int) -> None:
     squares = [(0.2, 0.2, 0.3), (0.2, 0.2, 0.3)]
     squares[larger] = (0.1, 0.1, 0.5)
     atlas = build_atlas(patches(*squares), 64)
@@ -204,7 +204,7 @@ def test_small_atlases_are_refused(size: int) -> None:
 
 
 @pytest.mark.samples
-def test_the_scan() -> None:
+def test_atlas_of_the_scan() -> None:
     """Check that the eye shells are collapsed and the eight other islands fill most of the map."""
     from loaded_mesh import load_mesh
 

@@ -28,12 +28,14 @@ def test_cells_are_as_large_as_the_widest_gaussian_allows(divided: Divided) -> N
     _, atlas, cells = divided
     assert 0.9 * 0.36 * WIDEST_MM < cells.cell_mm <= 0.36 * WIDEST_MM
     assert cells.radius_mm == pytest.approx(3.2 * WIDEST_MM)
-    assert divide_into_cells(atlas, WIDEST_MM, coarser=2.0).side == pytest.approx(cells.side / 2, abs=1)
+    assert divide_into_cells(atlas, WIDEST_MM, relative_cell_size=2.0).side == pytest.approx(
+        cells.side / 2, abs=1
+    )
     assert divide_into_cells(atlas, 0.01).side == atlas.size
     assert divide_into_cells(atlas, 100.0).radius_mm == divide_into_cells(atlas, 10.0).radius_mm == 32.0
 
 
-def test_all_texels_of_their_own_lie_in_cells_that_give_and_take(divided: Divided) -> None:
+def test_all_lit_texels_are_in_source_and_receiver_cells(divided: Divided) -> None:
     _, atlas, cells = divided
     y, x = (axis * cells.side // atlas.size for axis in np.nonzero(atlas.lit))
     expected = np.zeros_like(cells.receiver_mask)
@@ -66,7 +68,7 @@ def test_tiles_list_all_triangles_that_they_show(divided: Divided) -> None:
     assert set(shown) <= set(zip(tile.tolist(), cells.triangles.tolist(), strict=True))
 
 
-def test_receivers_belong_to_the_tile_of_their_place(divided: Divided) -> None:
+def test_receivers_are_in_the_tile_of_their_surface_point(divided: Divided) -> None:
     """Check the tiles of receivers, also in gutters, which show other points."""
     _, atlas, cells = divided
     b = np.stack([cells.receiver_points[:, 1] & 0xFFFF, cells.receiver_points[:, 1] >> 16], axis=-1) / 65535.0
@@ -80,7 +82,7 @@ def test_receivers_belong_to_the_tile_of_their_place(divided: Divided) -> None:
     assert (np.abs(place - TILE_CELLS * (at + 0.5)) < TILE_CELLS / 2 + 1e-2).all()
 
 
-def test_gutters_are_listed_by_the_cells_that_they_show(divided: Divided) -> None:
+def test_gutter_copies_are_listed_by_cell(divided: Divided) -> None:
     _, atlas, cells = divided
     texel, shown = (
         np.stack([words & 0xFFFF, words >> 16], axis=-1).astype(int) for words in cells.gutter_copies.T

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, compute_form_factors
-from dermis.mesh.mesh import Mesh, build_mesh
+from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 
 pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
@@ -38,7 +38,7 @@ def room() -> Mesh:
         pair = np.array([[0, 1, 2], [0, 2, 3]])
         triangles.append(4 * face + (pair[:, ::-1] if turned else pair))
     made = np.concatenate(points), np.concatenate(uv), np.concatenate(triangles)
-    return build_mesh(*made, np.zeros(12, int), (SKIN,))
+    return build_mesh(*made, np.zeros(12, int), SKIN)
 
 
 def found(mesh: Mesh) -> FormFactors:
@@ -50,7 +50,7 @@ def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
     return 4 * x // side + 4 * (2 * y // side)
 
 
-def test_the_faces_of_a_room() -> None:
+def test_form_factors_between_faces_of_a_room() -> None:
     form_factors = found(room())
     given = np.zeros((6, 6))
     y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
@@ -70,7 +70,26 @@ def test_the_faces_of_a_room() -> None:
     assert np.abs(given.sum(axis=1) - 1.0).max() < CLOSE
 
 
-def test_places_lie_on_their_patch() -> None:
+def test_parts_that_are_cut_out_do_not_block_light() -> None:
+    mesh = room()
+    card = Material("hair", "opaque", has_maps=True, opacity_cutoff=0.5)
+    x, y, z = np.eye(3)
+    corners = mesh.positions[mesh.triangles]
+    across = np.stack([0.9 * (one - x) for one in (y + z, y - z, -y - z)])
+    extended = build_mesh(
+        np.concatenate([mesh.positions, across + x]),
+        np.concatenate([mesh.uv, np.zeros((3, 2))]),
+        np.concatenate([mesh.triangles, [[24, 25, 26]]]),
+        np.append(np.zeros(len(corners), int), 1),
+        (*SKIN, card),
+    )
+    without, with_card = found(mesh), found(extended)
+    solid = replace(extended, materials=(*SKIN, replace(card, opacity_cutoff=0.0)))
+    np.testing.assert_array_equal(without.cell_factor, with_card.cell_factor)
+    assert len(found(solid).cell_factor) != len(without.cell_factor)
+
+
+def test_sample_points_are_on_their_patch() -> None:
     mesh = room()
     form_factors = found(mesh)
     w = np.stack([form_factors.sample_weights & 0xFFFF, form_factors.sample_weights >> 16], axis=1) / 65535.0
@@ -85,7 +104,7 @@ def test_places_lie_on_their_patch() -> None:
 
 
 @pytest.mark.parametrize("outside", [True, False])
-def test_a_ball_sees_all_of_itself_from_within_and_nothing_from_without(outside: bool) -> None:
+def test_only_the_inside_of_a_ball_faces_itself(outside: bool) -> None:
     ball = uv_sphere(10.0, 24, 12)
     form_factors = found(ball if outside else inside_out(ball))
     if outside:

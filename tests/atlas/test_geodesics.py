@@ -56,7 +56,7 @@ def prism(flipped: bool) -> Mesh:
 
 @pytest.mark.parametrize("flipped", [False, True])
 @pytest.mark.parametrize("length", [1.0, 20.0, 150.0])
-def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, flipped: bool) -> None:
+def test_geodesics_on_a_prism_are_straight_lines_when_unrolled(length: float, flipped: bool) -> None:
     surface = flat_surface(prism(flipped))
     triangle, start, target = random_walks(surface, length)
     ends, complete = go(surface, triangle, start, target)
@@ -95,7 +95,7 @@ def _step(surface: FlatSurface, triangle: NDArray[np.int32], step: Floats) -> Fl
     return np.column_stack(((space * tangent).sum(axis=1), space[:, 1]))
 
 
-def test_a_round_walk_on_a_sphere_comes_home() -> None:
+def test_a_closed_geodesic_on_a_sphere_returns_to_its_start() -> None:
     """Check that great circles close, up to an error by facets."""
     surface = flat_surface(cut_sphere(20.0, 32))
     triangle, start, target = random_walks(surface, 2 * np.pi * 20.0)
@@ -105,7 +105,7 @@ def test_a_round_walk_on_a_sphere_comes_home() -> None:
     assert np.percentile(np.linalg.norm(ends - begins, axis=1), 90) < 0.05 * 2 * np.pi * 20.0
 
 
-def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
+def test_overlapping_charts_are_cut_until_gutters_fit() -> None:
     """Check the unrolled cone, whose sides meet at the apex and would need the same texels."""
     surface = flat_surface(cut_cone(40.0, 50.0))
     piece, _ = find_pieces(surface)
@@ -123,7 +123,7 @@ def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
 
 
 @pytest.mark.parametrize("mesh", [cut_cylinder(RADIUS, HEIGHT, 6), cut_sphere(30.0, 12)])
-def test_nothing_is_cut_without_need(mesh: Mesh) -> None:
+def test_charts_without_overlap_are_not_cut(mesh: Mesh) -> None:
     surface = flat_surface(mesh)
     piece, _ = find_pieces(surface)
     cut = cut_overlaps(surface, piece, 8.0)

@@ -33,7 +33,7 @@ def shapes(count: int) -> list[Flags]:
     return made
 
 
-def test_each_shape_has_the_first_place_where_nothing_is() -> None:
+def test_each_shape_is_at_the_first_free_position() -> None:
     masks = shapes(14)
     corners = place_shapes([spans_of(mask) for mask in masks], N)
     assert corners is not None
@@ -51,7 +51,7 @@ def test_each_shape_has_the_first_place_where_nothing_is() -> None:
         taken[tuple((used + corner[::-1]).T)] = True
 
 
-def test_what_has_no_room_is_not_laid() -> None:
+def test_shapes_that_do_not_fit_are_not_placed() -> None:
     square = spans_of(np.ones((N // 2, N // 2), np.bool_))
     assert place_shapes([square] * 4, N) == [(0, 0), (N // 2, 0), (0, N // 2), (N // 2, N // 2)]
     assert place_shapes([*[square] * 4, [(0, 0, 0)]], N) is None

@@ -53,7 +53,7 @@ def texel_mm(atlas: Atlas) -> Floats:
     return np.asarray(1.0 / np.maximum(atlas.stretch.astype(np.float64).min(axis=-1), 1e-3))
 
 
-def test_many_charts_are_many() -> None:
+def test_mesh_with_many_charts_has_many_charts() -> None:
     assert find_charts(case("many charts")[0]).max() >= 300
 
 
@@ -65,7 +65,7 @@ def test_all_triangles_have_texels(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_light_is_found_at_every_place(name: str) -> None:
+def test_light_is_available_at_every_surface_point(name: str) -> None:
     """Check that positions stored in texels are read back at random points: no pieces overlap."""
     mesh, atlas = case(name)
     points = random_points(mesh, 4000)
@@ -77,7 +77,7 @@ def test_light_is_found_at_every_place(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_texels_in_pieces_stand_for_their_own_place(name: str) -> None:
+def test_texels_in_pieces_have_their_own_surface_point(name: str) -> None:
     atlas = case(name)[1]
     n = atlas.size
     corner = atlas.corner_uv[np.maximum(atlas.triangle, 0)].astype(np.float64) * n - 0.5
@@ -96,7 +96,7 @@ def _cross(a: Floats, b: Floats, c: NDArray[np.integer]) -> Floats:
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_sources_hold_the_light_of_the_point_shown(name: str) -> None:
+def test_gutter_sources_are_at_the_surface_point_of_the_gutter_texel(name: str) -> None:
     """Check that gutters copy texels whose light is computed, not other gutters."""
     mesh, atlas = case(name)
     x, y = atlas.gutter.T
@@ -126,7 +126,7 @@ def test_steps_into_the_gutter_are_as_long_as_the_metric_says(name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "cone"])
-def test_runs_cross_no_gap(name: str) -> None:
+def test_runs_end_at_gaps(name: str) -> None:
     """Check that the surface points of texels in a run are no farther apart than the run is long."""
     mesh, atlas = case(name)
     points, reach = shown(atlas, mesh), atlas.edge_distance.astype(int)
@@ -141,7 +141,7 @@ def test_runs_cross_no_gap(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_runs_are_told_alike_from_both_ends(name: str) -> None:
+def test_runs_are_equal_from_both_ends(name: str) -> None:
     reach = case(name)[1].edge_distance.astype(int)
     right, left = reach[:, :-1, 1], reach[:, 1:, 0]
     assert np.array_equal(right > 0, left > 0)
@@ -152,7 +152,7 @@ def test_runs_are_told_alike_from_both_ends(name: str) -> None:
     assert not reach[~case(name)[1].coverage].any()
 
 
-def test_gutters_are_as_wide_as_asked() -> None:
+def test_gutters_have_the_requested_width() -> None:
     mesh = cut_cylinder(30.0, 80.0, 9)
     for gutter_mm in (3.0, 8.0):
         atlas = build_atlas(mesh, 256, "stitched", gutter_mm)
@@ -169,7 +169,7 @@ def test_no_gutter_where_the_surface_ends() -> None:
     assert atlas.edge_distance.astype(int).sum(axis=-1)[64, 64] == 2 * (np.count_nonzero(atlas.lit[64]) - 1)
 
 
-def test_light_does_not_cross_to_what_is_no_skin() -> None:
+def test_gutters_do_not_continue_to_other_materials_than_skin() -> None:
     mesh = cut_cylinder(30.0, 80.0, 9)
     cloth = find_charts(mesh) == 1
     kinds = (Material("skin"), Material("cloth", "opaque"))
@@ -180,7 +180,7 @@ def test_light_does_not_cross_to_what_is_no_skin() -> None:
     assert len(atlas.gutter) > 300  # the two that are skin still meet
 
 
-def test_triangles_may_face_either_way_round() -> None:
+def test_triangles_may_have_either_orientation() -> None:
     """Check that reversed triangles of a chart change nothing, as adjacency is by position."""
     mesh, atlas = case("cylinder")
     triangles = mesh.triangles.copy()
@@ -204,7 +204,7 @@ def test_folded_halves_both_get_texels() -> None:
     assert (both > 0).sum() == (both < 0).sum()
 
 
-def test_densities_that_differ_little_are_left_and_others_come_closer() -> None:
+def test_only_large_differences_of_texel_density_are_reduced() -> None:
     lays = [*SPHERE_LAYS[:4], SPHERE_LAYS[4]._replace(scale=0.02), SPHERE_LAYS[5]._replace(scale=0.30)]
     mesh = cut_sphere(30.0, 8, lays)
     placed = np.abs(uv_cross(build_atlas(mesh, 256, "stitched").corner_uv))
@@ -228,7 +228,7 @@ def test_a_collapsed_chart_is_left_out() -> None:
     assert atlas.mapped[atlas.triangle[~atlas.lit & atlas.coverage]].all()
 
 
-def test_too_many_charts_for_so_few_texels_stay_where_they_are() -> None:
+def test_too_many_charts_for_the_atlas_keep_their_layout() -> None:
     middles = [((column + 0.5) / 20, (row + 0.5) / 20) for row in range(20) for column in range(20)]
     mesh = cut_cylinder(300.0, 10.0, 1, [ChartPlacement(middle, 0.002) for middle in middles])
     stitched, plain = build_atlas(mesh, 64, "stitched"), build_atlas(mesh, 64)

@@ -72,7 +72,7 @@ def test_folded_halves_are_one_surface() -> None:
     assert jump.max() < SEAM
 
 
-def test_blurs_near_seams_are_those_of_the_sphere() -> None:
+def test_blurs_near_seams_match_the_sphere() -> None:
     """Check that a zonal harmonic on a sphere keeps its shape and fades by exp(-l (l + 1) v / 2 r2)."""
     radius, degree = 30.0, 8
     mesh = cut_sphere(radius, 20)

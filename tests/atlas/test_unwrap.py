@@ -90,7 +90,7 @@ def check_valid(layout: UvLayout, positions: Doubles) -> None:
     owners_of_texels(as_mesh(layout, positions), layout)
 
 
-def test_plane_stays_as_it_is() -> None:
+def test_flattening_a_plane_preserves_it() -> None:
     positions, triangles = square()
     layout = unwrap(positions, triangles, one_chart(triangles), upright=(0, 1, 0))
     check_valid(layout, positions)
@@ -100,7 +100,7 @@ def test_plane_stays_as_it_is() -> None:
     assert values.mean() * 10 > 0.97, "it fills the map"
 
 
-def test_half_a_tube_is_rolled_off() -> None:
+def test_half_a_tube_is_unrolled() -> None:
     positions, triangles = tube()
     half = triangles[positions[triangles].mean(axis=1)[:, 2] > 0]
     layout = unwrap(positions, half, one_chart(half))
@@ -113,7 +113,7 @@ def test_half_a_tube_is_rolled_off() -> None:
 
 
 @pytest.mark.parametrize("shape", [tube(), sphere()], ids=["tube", "sphere"])
-def test_what_cannot_be_flat_is_halved(shape: Shape) -> None:
+def test_charts_that_cannot_be_flattened_are_halved(shape: Shape) -> None:
     positions, triangles = shape
     layout = unwrap(positions, triangles, one_chart(triangles))
     check_valid(layout, positions)
@@ -146,7 +146,7 @@ def test_density_sets_the_size_of_charts() -> None:
     assert values[apart == 0] / 4 == pytest.approx(values[apart == 1].mean(), rel=ISOMETRIC)
 
 
-def test_weight_keeps_stretch_away() -> None:
+def test_triangles_with_a_large_weight_are_stretched_less() -> None:
     positions, triangles = sphere()
     cap = triangles[positions[triangles].mean(axis=1)[:, 2] > 0]
     corner, point = split_at_seams(cap, one_chart(cap))
@@ -158,7 +158,7 @@ def test_weight_keeps_stretch_away() -> None:
     assert anisotropy[1] - 1 < 0.75 * (anisotropy[0] - 1)
 
 
-def test_charts_lie_upright() -> None:
+def test_charts_are_upright() -> None:
     positions, triangles = square()
     layout = unwrap(positions, triangles, one_chart(triangles), upright=(0.8, 0, 0.6))
     height = positions[layout.point] @ (0.8, 0, 0.6)
@@ -198,7 +198,7 @@ def test_triangle_without_area_is_refused() -> None:
         unwrap(positions, np.vstack((triangles, [[0, 1, 1]])), np.zeros(len(triangles) + 1, dtype=np.int64))
 
 
-def test_points_between_charts_become_two() -> None:
+def test_points_between_charts_are_split() -> None:
     positions, triangles = square(8, 0.0)
     chart = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
     corner, point = split_at_seams(triangles, chart)
@@ -207,7 +207,7 @@ def test_points_between_charts_become_two() -> None:
     assert sorted(np.flatnonzero(np.bincount(point) == 2)) == sorted(middle)
 
 
-def test_charts_are_grown_in_one_piece_each() -> None:
+def test_each_chart_is_connected() -> None:
     positions, triangles = sphere()
     chart = grow_charts(positions, triangles, 20)
     assert chart.max() == 19
@@ -218,7 +218,7 @@ def test_charts_are_grown_in_one_piece_each() -> None:
     )
 
 
-def test_tidy_charts_have_short_borders() -> None:
+def test_smoothed_charts_have_short_borders() -> None:
     positions, triangles = square(20)
     side = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
     noisy = np.where(np.random.default_rng(2).random(len(side)) < 0.15, 1 - side, side)
@@ -227,7 +227,7 @@ def test_tidy_charts_have_short_borders() -> None:
     assert connected_pieces(mended, neighbours(triangles)).max() == 1
 
 
-def test_strays_join_what_surrounds_them() -> None:
+def test_stray_triangles_join_the_surrounding_chart() -> None:
     positions, triangles = square(20)
     height = positions[triangles].mean(axis=1)[:, 1]
     half = (height > 2).astype(np.int64)
@@ -252,7 +252,7 @@ def test_faults_are_found() -> None:
     assert len(sides) == 32 and not crossing_edges(places[sides]).any()
 
 
-def test_crossings() -> None:
+def test_crossing_edges_are_detected() -> None:
     sides = np.array(
         [[[0, 0], [2, 2]], [[0, 2], [2, 0]], [[2, 2], [3, 0]], [[5, 0], [5, 1]]], dtype=np.float64
     )
@@ -273,7 +273,7 @@ def test_rectangles_are_packed_well() -> None:
     assert (scale**2 * size.prod(axis=1)).sum() > 0.65
 
 
-def test_too_many_sheets_are_refused() -> None:
+def test_too_many_charts_are_refused() -> None:
     box = np.array([[[0, 0], [1, 0]], [[1, 0], [0, 1]], [[0, 1], [0, 0]]], dtype=np.float64)
     with pytest.raises(DermisError, match="fewer charts"):
         pack_charts([box] * 40, 0.2)

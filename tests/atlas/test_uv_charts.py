@@ -29,7 +29,7 @@ def test_connected_surface_is_one_chart() -> None:
     assert set(find_charts(uv_sphere(10, 12, 6)).tolist()) == {0}
 
 
-def test_a_seam_parts_charts_where_uv_differs_and_not_where_only_vertices_do() -> None:
+def test_charts_are_separated_by_different_uv_and_not_by_different_normals() -> None:
     assert find_charts(_two_planes(1)).max() == 0
     parted = _two_planes(0.5)
     chart = find_charts(parted)
@@ -45,7 +45,7 @@ def test_charts_that_touch_at_one_corner_only_are_two() -> None:
     assert find_charts(mesh).max() == 1
 
 
-def test_collapsed_charts_are_of_no_use_until_the_atlas_is_large_enough() -> None:
+def test_small_charts_are_usable_only_in_a_large_atlas() -> None:
     mesh = _two_planes(0.004)  # 8e-6 of the map: 2 texels at 512, 8.4 at 1024
     right = mesh.positions[mesh.triangles].mean(axis=1)[:, 0] > 0
     np.testing.assert_array_equal(usable_triangles(mesh, 512), ~right)
@@ -53,7 +53,7 @@ def test_collapsed_charts_are_of_no_use_until_the_atlas_is_large_enough() -> Non
     np.testing.assert_array_equal(usable_triangles(mesh, 1024, min_texels=9), ~right)
 
 
-def test_triangles_without_uv_area_are_of_no_use() -> None:
+def test_triangles_without_uv_area_are_not_usable() -> None:
     flat = plane(10, 1)
     uv = flat.uv.copy()
     lone = np.setdiff1d(flat.triangles[0], flat.triangles[1])

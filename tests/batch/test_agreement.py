@@ -65,7 +65,9 @@ def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
         ("age = {truncated = [50, 22, 25, 90]}", "person.age"),
     ],
 )
-def test_another_statement_is_found_out(folder: Path, changed_line: str, parameter: str) -> None:
+def test_samples_of_another_distribution_fail_the_test(
+    folder: Path, changed_line: str, parameter: str
+) -> None:
     """The index does not fit a spec that states another distribution of one parameter."""
     table, _, key = parameter.rpartition(".")
     lines, inside = [], ""
@@ -79,7 +81,7 @@ def test_another_statement_is_found_out(folder: Path, changed_line: str, paramet
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
+def test_distances_match_the_kolmogorov_smirnov_test(name: str) -> None:
     definition, law = LAWS[name]
     values = np.random.default_rng(1).permutation(law.ppf((np.arange(500) + 0.3) ** 1.02 / 600))
     found, truth = (
@@ -94,14 +96,14 @@ def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
     )
 
 
-def test_usual_is_the_mean_distance() -> None:
+def test_expected_distance_is_the_mean_distance() -> None:
     law: Distribution = parse_distribution({"uniform": [0, 1]})
     rng = np.random.default_rng(2)
     found = [fit_test("x", law, list(rng.uniform(size=400))) for _ in range(100)]
     assert np.mean([one.distance for one in found]) == pytest.approx(found[0].expected_distance, rel=0.1)
 
 
-def test_values_that_nothing_states_are_no_chance() -> None:
+def test_values_outside_the_distribution_have_a_p_value_of_0() -> None:
     law = parse_distribution({"choice": ["a", "b"], "weights": [1, 0]})
     assert fit_test("x", law, ["a"] * 9).p_value == 1.0
     assert not fit_test("x", law, ["a"] * 9 + ["b"]).passes

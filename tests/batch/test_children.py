@@ -36,7 +36,7 @@ def send_thread_count(pipe: Any) -> None:
 
 
 @pytest.mark.parametrize(("variable", "expected"), [(None, "1"), ("3", "3")])
-def test_linear_algebra_has_one_thread_unless_the_user_says(
+def test_linear_algebra_uses_one_thread_by_default(
     variable: str | None, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
@@ -50,7 +50,7 @@ def test_linear_algebra_has_one_thread_unless_the_user_says(
         child.kill()
 
 
-def test_whose_driver_is_gone_ends_in_silence() -> None:
+def test_child_processes_exit_silently_with_their_parent() -> None:
     command = [sys.executable, "-c", DRIVER, str(FOLDER)]
     ran = subprocess.run(command, capture_output=True, timeout=300, check=False)
     assert (ran.returncode, ran.stderr) == (0, b"")  # stderr is open until the child ends

@@ -46,13 +46,15 @@ def drawn(
     )
 
 
-def test_they_write_the_same(cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+def test_dask_workers_write_the_same_bytes_as_local_workers(
+    cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
     report = drawn(cluster, small_spec, tmp_path)
     assert (report.images, report.shards, report.is_complete) == (COUNT, SHARDS, True)
     assert contents(tmp_path) == undisturbed
 
 
-def test_one_that_is_killed_loses_nothing(
+def test_a_killed_worker_loses_no_shard(
     cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     killed: list[int] = []
@@ -79,7 +81,7 @@ def test_files_that_differ_on_a_worker_are_refused(cluster: Any, tmp_path: Path)
         drawn(cluster, spec, tmp_path / "out")
 
 
-def test_a_disk_of_its_own_is_refused(tmp_path: Path) -> None:
+def test_a_worker_without_the_shared_disk_is_refused(tmp_path: Path) -> None:
     client = SimpleNamespace(
         run=lambda path_exists, marker: {"tcp://a": path_exists(marker), "tcp://b": False}
     )
@@ -91,7 +93,7 @@ def test_a_disk_of_its_own_is_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_scheduler_that_is_not_there_is_told(
+def test_a_missing_scheduler_is_reported(
     small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_TIMEOUT_S", 0.5)

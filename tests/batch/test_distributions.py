@@ -70,14 +70,14 @@ def drawn(told: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize(("told", "law"), LIKE, ids=lambda one: str(one)[:40])
-def test_values_follow_the_law_that_is_stated(told: Any, law: Any) -> None:
+def test_samples_follow_the_stated_distribution(told: Any, law: Any) -> None:
     values = drawn(told)
     assert stats.kstest(values, law.cdf).pvalue > 0.01
     low, high = parse_distribution(told).support
     assert isinstance(low, float) and low <= min(values) and max(values) <= high
 
 
-def test_choices_come_as_often_as_their_weights_say() -> None:
+def test_choices_have_the_frequencies_of_their_weights() -> None:
     values = drawn({"choice": ["a", "b", "c"], "weights": [1, 0, 3]})
     assert "b" not in values
     assert values.count("a") / COUNT == pytest.approx(0.25, abs=0.02)
@@ -89,7 +89,7 @@ def test_choices_of_distributions_are_mixtures() -> None:
     assert stats.kstest(values[values > 0], stats.uniform(1, 2).cdf).pvalue > 0.01
 
 
-def test_uniform_numbers_are_even_and_streams_apart() -> None:
+def test_uniform_numbers_are_even_and_streams_independent() -> None:
     assert stats.kstest(SHARES, "uniform").pvalue > 0.01
     others = [hashed_uniform(3, k, "another") for k in range(COUNT)]
     assert abs(np.corrcoef(SHARES, others)[0, 1]) < 0.04
@@ -100,13 +100,13 @@ def test_uniform_numbers_are_even_and_streams_apart() -> None:
 
 
 @pytest.mark.parametrize(("told", "said"), REFUSED, ids=lambda one: str(one)[:40])
-def test_what_states_none_is_refused(told: Any, said: str) -> None:
+def test_values_that_state_no_distribution_are_refused(told: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         parse_distribution(told)
 
 
 @given(ANY, st.floats(0, 1, exclude_min=True, exclude_max=True))
-def test_any_value_lies_between_the_ends_and_any_text_says_the_same(told: Any, share: float) -> None:
+def test_samples_are_within_the_support_and_serialisation_round_trips(told: Any, share: float) -> None:
     found = parse_distribution(told)
     assert isinstance(found, Distribution)
     assert parse_distribution(found.spec_value()) == found
@@ -115,7 +115,7 @@ def test_any_value_lies_between_the_ends_and_any_text_says_the_same(told: Any, s
 
 
 @given(st.floats(-1e9, 1e9))
-def test_six_digits_are_kept(value: float) -> None:
+def test_six_significant_digits_are_preserved(value: float) -> None:
     assert round_significant(value) == pytest.approx(value, rel=5.1e-6)
     assert round_significant(round_significant(value)) == round_significant(value)
     assert str(round_significant(-0.0)) == "0.0"

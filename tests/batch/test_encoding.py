@@ -29,7 +29,7 @@ def jobs(*numbers: int) -> Iterator[tuple[int, np.ndarray]]:
         yield number, np.full((size, 3), number, np.float32)[:, ::2]
 
 
-def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
+def test_order_and_bytes_do_not_depend_on_the_number_of_processes() -> None:
     numbers = range(9)
     with closing(EncoderPool(0, encode)) as here, closing(EncoderPool(2, encode)) as there:
         expected, found = list(here.encode_all(jobs(*numbers))), list(there.encode_all(jobs(*numbers)))
@@ -40,7 +40,7 @@ def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
     assert str(os.getpid()).encode() not in pids and len(pids) >= 2
 
 
-def test_jobs_are_asked_for_only_a_few_ahead() -> None:
+def test_only_a_few_jobs_are_read_ahead() -> None:
     started: list[int] = []
 
     def counted_jobs() -> Iterator[tuple[int, np.ndarray]]:
@@ -57,7 +57,7 @@ def test_jobs_are_asked_for_only_a_few_ahead() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
-def test_one_that_dies_is_told_and_others_come_in_its_place() -> None:
+def test_a_dead_encoder_is_reported_and_replaced() -> None:
     with closing(EncoderPool(1, encode)) as encoders:
         with pytest.raises(LostProcessError, match="SIGKILL"):
             list(encoders.encode_all(jobs(1, 90, 2)))

@@ -36,7 +36,7 @@ def targets() -> set[str]:
     return {*Human().head(subdivide=0).targets}
 
 
-def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
+def test_the_human_has_all_morph_targets_of_the_expressions(targets: set[str]) -> None:
     names = [name for weights in EXPRESSIONS.values() for name in weights]
     names += [name for part in load_movements().values() for one in part for name in one.target_weights]
     assert set(expand_targets(names)) <= targets
@@ -48,13 +48,13 @@ def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
     )
 
 
-def test_chances_of_a_part_leave_it_room_to_rest() -> None:
+def test_probabilities_of_a_part_sum_to_less_than_one() -> None:
     for part in load_movements().values():
         assert 0 < sum(one.probability for one in part) < 1
         assert all(0 < one.max_weight <= 1 and 0 <= one.jaw_closing <= 1 for one in part)
 
 
-def test_in_mixtures_nothing_works_against_itself() -> None:
+def test_mixtures_contain_no_opposing_movements() -> None:
     found = [drawn(seed) for seed in range(COUNT)]
     assert not [one for one in found for pair in OPPOSITES if pair <= one.keys()]
     for name, probability in (("mouthSmile", 0.35), ("jawLeft", 0.04), ("browInnerUp", 0.35)):
@@ -68,7 +68,7 @@ def test_in_mixtures_nothing_works_against_itself() -> None:
     assert shut and max(shut) < 0.15 < max(free)
 
 
-def test_left_and_right_differ_by_the_asymmetry_alone() -> None:
+def test_left_and_right_differ_only_by_the_asymmetry() -> None:
     smile = EXPRESSIONS["smile"]
     even = expression_weights(smile, 1.0, 0.0, 0.0, none)
     assert even["mouthSmileLeft"] == even["mouthSmileRight"] == smile["mouthSmile"]
@@ -82,6 +82,6 @@ def test_left_and_right_differ_by_the_asymmetry_alone() -> None:
     }
 
 
-def test_weights_stay_within_what_faces_do() -> None:
+def test_weights_are_within_0_and_1() -> None:
     found = expression_weights({"jawOpen": 0.9, "browDown": 0.0}, 1.5, -1.0, 1.0, lambda name: 6.0)
     assert found == {"jawOpen": 1.0, "browDownLeft": 0.0, "browDownRight": 0.0}

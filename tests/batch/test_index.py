@@ -85,7 +85,7 @@ def test_statistics_are_those_of_the_spec(described: Path) -> None:
     assert abs(studio - 0.75) < 3 * np.sqrt(0.75 * 0.25 / 400)
 
 
-def test_the_same_shards_give_the_same_bytes_whoever_asks(
+def test_equal_shards_give_equal_bytes(
     described: Path, drawn_spec: Spec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = "index.parquet", "README.md", "dataset.json"
@@ -98,7 +98,7 @@ def test_the_same_shards_give_the_same_bytes_whoever_asks(
     assert [(described / name).read_bytes() for name in names] == before
 
 
-def test_the_data_sheet_says_what_is_in_it(described: Path, drawn_spec: Spec) -> None:
+def test_the_data_sheet_describes_the_data_set(described: Path, drawn_spec: Spec) -> None:
     text = (described / "README.md").read_text("utf-8")
     for line in (
         "| images | 399 of 400, 24 x 16 pixels |",

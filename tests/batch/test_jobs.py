@@ -45,7 +45,7 @@ def commands() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("kind", ["slurm", "kubernetes", "skypilot"])
-def test_commands_are_taken_with_what_schedulers_set(kind: str) -> None:
+def test_commands_work_with_the_variables_of_schedulers(kind: str) -> None:
     """Every placeholder has a value, and the parser accepts every argument."""
     app = App(name="dermis", result_action="return_value")
     app.command(command.batch, name="batch")
@@ -58,7 +58,7 @@ def test_commands_are_taken_with_what_schedulers_set(kind: str) -> None:
     assert (index, count) == ((1, 2) if kind == "skypilot" else (15, 16))
 
 
-def test_jobs_are_as_many_as_parts() -> None:
+def test_there_is_one_job_per_part() -> None:
     job = yaml_of("kind: Job")
     assert job["apiVersion"] == "batch/v1" and job["spec"]["completionMode"] == "Indexed"
     assert job["spec"]["completions"] == 16 and "/16" in commands()["kubernetes"]
@@ -71,7 +71,7 @@ def test_jobs_are_as_many_as_parts() -> None:
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
-def test_the_script_is_bash() -> None:
+def test_the_script_is_valid_bash() -> None:
     assert slurm().startswith("#!/bin/bash\n")
     for text in (slurm(), commands()["kubernetes"], commands()["skypilot"]):
         subprocess.run(["bash", "-n", "-c", text], check=True, timeout=30)

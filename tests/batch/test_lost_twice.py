@@ -34,7 +34,7 @@ def incomplete_set(
     return out, lost
 
 
-def test_another_worker_draws_the_shard(
+def test_another_worker_renders_the_shard_of_a_lost_device(
     small_spec: Spec,
     undisturbed: dict[str, bytes],
     incomplete_set: tuple[Path, Path],
@@ -51,7 +51,7 @@ def test_another_worker_draws_the_shard(
     assert len(list(lost.iterdir())) == 1 and contents(out) == undisturbed
 
 
-def test_the_command_ends_with_2_where_all_do(
+def test_the_exit_status_is_2_if_all_workers_fail(
     small_folder: Path,
     incomplete_set: tuple[Path, Path],
     monkeypatch: pytest.MonkeyPatch,

@@ -36,7 +36,7 @@ def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return folder
 
 
-def test_what_is_read_is_what_was_written(written: Path) -> None:
+def test_images_read_back_as_written(written: Path) -> None:
     alpha, count = written.name.startswith("folder"), 0
     for count, found in enumerate(dermis.read_dataset(written), start=1):  # noqa: B007
         truth = observation(found["number"], alpha)
@@ -48,7 +48,7 @@ def test_what_is_read_is_what_was_written(written: Path) -> None:
     assert count == 7
 
 
-def test_images_come_in_order_or_by_a_seed_or_shard_by_shard(written: Path) -> None:
+def test_images_are_in_order_or_shuffled_by_a_seed_or_of_selected_shards(written: Path) -> None:
     def numbers(**options: Any) -> list[int]:
         return [one["number"] for one in dermis.read_dataset(written, **options)]
 
@@ -69,7 +69,7 @@ def test_neither_pyarrow_nor_webdataset_is_needed_to_read(written: Path) -> None
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_what_the_documentation_shows_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = small_spec(head={"yaw_deg": {"uniform": [-20, 20]}}, camera={"yaw_deg": {"uniform": [-40, 40]}})
     write_all(tmp_path / "faces", spec)
     write_index(tmp_path / "faces", spec)
@@ -100,7 +100,7 @@ def test_webdataset_decodes_pictures_and_records_itself(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one[0], observation(one[1]["number"]).picture)
 
 
-def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: Path, written: Path) -> None:
+def test_folders_without_shards_and_invalid_shards_are_refused(tmp_path: Path, written: Path) -> None:
     with pytest.raises(DermisError, match="it contains no shard"):
         dermis.read_dataset(tmp_path)
     with pytest.raises(DermisError, match="the folder of a data set, but it cannot be read"):
@@ -188,7 +188,7 @@ def test_links_and_folders_in_a_tar_are_refused(tmp_path: Path) -> None:
         list(dermis.read_dataset(tmp_path))
 
 
-def test_no_landmarks_of_a_set_are_read_too() -> None:
+def test_empty_landmark_sets_are_read() -> None:
     seen = observation(0)
     none = Landmarks((), np.empty((0, 3), np.float32), np.empty((0, 2)), np.empty(0, bool))
     spec, seen = small_spec(), replace(seen, landmarks={"ibug-68": none})

@@ -65,7 +65,7 @@ def project(scene: Scene, positions: Any, size: tuple[int, int]) -> Any:
     return np.stack([x / z, y / z], axis=1)
 
 
-def test_the_whole_face_is_in_the_picture_whatever_is_drawn(wild: Any) -> None:
+def test_the_whole_face_is_in_the_picture_for_all_samples(wild: Any) -> None:
     drawn, scenes = wild
     for _, scene in scenes:
         rig = scene.head.control
@@ -75,7 +75,7 @@ def test_the_whole_face_is_in_the_picture_whatever_is_drawn(wild: Any) -> None:
         assert pixels.min() > -0.5 and (pixels < np.array(drawn.size) - 0.5).all()
 
 
-def test_cameras_are_as_drawn_where_the_face_fits() -> None:
+def test_cameras_have_the_sampled_parameters_if_the_face_fits() -> None:
     drawn = spec("[camera]\nyaw_deg = 90\npitch_deg = 30\ndistance_mm = 1000\nframe_mm = 500\noffset_x = 0.2")
     scene, settings = SceneBuilder(drawn).build(drawn.parameters(0))
     camera, head = scene.camera, scene.head
@@ -99,7 +99,7 @@ def test_roll_turns_the_camera_clockwise() -> None:
     assert rolled.camera.up[0] > 0.3  # the head's left, which is right in the picture
 
 
-def test_neck_and_head_turn_as_far_as_is_drawn(wild: Any) -> None:
+def test_neck_and_head_rotate_by_the_sampled_angles(wild: Any) -> None:
     for parameters, scene in wild[1][:8]:
         head, names = scene.head, scene.head.control.skeleton.names
         nod, turn, tilt = (parameters[f"head.{name}_deg"] for name in ("pitch", "yaw", "roll"))
@@ -108,7 +108,7 @@ def test_neck_and_head_turn_as_far_as_is_drawn(wild: Any) -> None:
         assert set(scene.pose.bones) == {"head", "neck01", "neck02", "neck03"} and head.rig is not None
 
 
-def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
+def test_eyes_look_at_the_camera_or_in_the_sampled_direction() -> None:
     text = "[head]\nyaw_deg = 20\n[camera]\nyaw_deg = 10\n"
     at_camera, at_angles = spec(text), spec(text + "[gaze]\nat = 'angles'\nyaw_deg = -15\npitch_deg = 10")
     for drawn in (at_camera, at_angles):
@@ -126,7 +126,7 @@ def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
             assert np.degrees(np.arccos(way[2] / np.linalg.norm(way))) < 1.5
 
 
-def test_a_scene_depends_on_its_parameters_alone(wild: Any) -> None:
+def test_scenes_depend_only_on_their_parameters(wild: Any) -> None:
     drawn, scenes = wild
     builder = SceneBuilder(drawn)
     for k in (30, 2):
@@ -138,7 +138,7 @@ def test_a_scene_depends_on_its_parameters_alone(wild: Any) -> None:
     assert all(head is heads[0] for head in heads)  # forty images of one person
 
 
-def test_people_are_those_of_their_seed_but_for_what_is_given() -> None:
+def test_people_follow_their_seed_except_for_sampled_fields() -> None:
     drawn = spec(
         "[person]\nage = 70\ncaucasian = 1\n[person.skin]\nmelanin = 0.01\n[person.hair]\nstyle = 'none'"
     )
@@ -151,12 +151,12 @@ def test_people_are_those_of_their_seed_but_for_what_is_given() -> None:
 
 
 @pytest.mark.parametrize("given", [{"age": 200}, {"african": 0}, {"skin": {"melanin": 3}}, {"sex": "male"}])
-def test_people_that_cannot_be_are_refused(given: dict[str, Any]) -> None:
+def test_impossible_people_are_refused(given: dict[str, Any]) -> None:
     with pytest.raises(DermisError):
         Human.drawn(3, **given)
 
 
-def test_heads_are_taken_from_files_of_people_and_of_scenes(tmp_path: Path) -> None:
+def test_heads_are_loaded_from_files_of_people_and_scenes(tmp_path: Path) -> None:
     (tmp_path / "people").mkdir()
     write_person_json(tmp_path / "people" / "one.json", Human(age=60))
     (tmp_path / "people" / "two.toml").write_text('[head]\nname = "human:4"\n[skin]\noiliness = 0.9\n')
@@ -172,7 +172,7 @@ def test_heads_are_taken_from_files_of_people_and_of_scenes(tmp_path: Path) -> N
     assert two.head.name == "human:4" and (two.skin.oiliness, two.skin.roughness) == (0.9, 0.4)
 
 
-def test_pose_is_what_expression_and_weights_say() -> None:
+def test_the_pose_combines_expression_and_weights() -> None:
     own = "[expressions.wink]\neyeBlinkLeft = 1\nmouthSmile = 0.5\n[pose]\njawOpen = 0.2"
     drawn = spec(f"[expression]\nname = 'wink'\n{own}")
     parameters = drawn.parameters(0)
@@ -185,7 +185,7 @@ def test_pose_is_what_expression_and_weights_say() -> None:
         SceneBuilder(unknown).build(unknown.parameters(0))
 
 
-def test_lights_are_of_the_rig_that_is_drawn() -> None:
+def test_lights_are_those_of_the_sampled_rig() -> None:
     told = "yaw_deg = 90\npitch_deg = 0\ndistance_mm = 1000\nstrength = 2\nkelvin = 3000"
     key, fill, rim = sampled_lights(spec(f"[light]\nkind = 'rig'\n[light.key]\n{told}").parameters(0))
     assert key.position == pytest.approx((1000, 0, 0), abs=1e-6)
@@ -207,7 +207,7 @@ def test_lights_are_of_the_rig_that_is_drawn() -> None:
                 assert light.position == pytest.approx((z, y, -x), abs=1e-6)  # the front to the head's left
 
 
-def test_background_and_environment_come_together() -> None:
+def test_the_background_environment_is_that_of_the_image() -> None:
     around = "[environment]\nname = {choice = ['none', 'uniform']}\nstrength = 0.5\n"
     drawn = spec(f"images_per_person = 9\n{around}[background]\nkind = 'environment'\nblur = 0.3")
     builder = SceneBuilder(drawn)
@@ -231,7 +231,7 @@ def test_every_image_of_the_example_is_a_scene() -> None:
         assert scene.lights and settings.size == (512, 512) and settings.exposure == "auto"
 
 
-def test_drawn_people_are_let_go_of_when_the_next_one_comes() -> None:
+def test_a_sampled_person_is_released_after_its_images() -> None:
     """People are never reused; caching sixteen of them took half a gigabyte."""
     spec = parse_spec({"count": 2, "size": [32, 32], "person": {"hair": {"style": "none"}}})
     builder = SceneBuilder(spec)

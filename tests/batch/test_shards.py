@@ -48,7 +48,7 @@ def test_shards_hold_each_image_once() -> None:
     assert list_shards(small_spec(count=3)) == [Shard(0, 0, 3)]
 
 
-def test_shards_are_equal_to_the_byte_at_any_time_and_in_any_order(
+def test_shards_have_equal_bytes_in_any_order(
     tmp_path: Path, spec: Spec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_all(tmp_path / "a", spec)
@@ -75,7 +75,7 @@ def test_entries_of_tar_files_have_fixed_time_owner_and_order(tmp_path: Path) ->
     }
 
 
-def test_whole_shards_are_known(tmp_path: Path, spec: Spec) -> None:
+def test_complete_shards_are_detected(tmp_path: Path, spec: Spec) -> None:
     first, *_, last = list_shards(spec)
     assert not shard_exists(tmp_path, first, spec) and not is_intact(tmp_path, first, spec)
     write_all(tmp_path, spec)
@@ -137,7 +137,9 @@ def test_shards_of_another_data_set_are_refused(tmp_path: Path, spec: Spec) -> N
             known(tmp_path, list_shards(other)[0], other)
 
 
-def test_what_killed_runs_left_is_removed_but_that_of_others_stays(tmp_path: Path, spec: Spec) -> None:
+def test_temporary_files_of_killed_runs_are_removed_and_those_of_others_kept(
+    tmp_path: Path, spec: Spec
+) -> None:
     first, second, _ = list_shards(spec)
     for shard in (first, second):
         writer = ShardWriter(tmp_path, shard, spec)
@@ -157,7 +159,7 @@ def test_what_killed_runs_left_is_removed_but_that_of_others_stays(tmp_path: Pat
     assert {path.name for path in tmp_path.iterdir()} == {".mine", whole}
 
 
-def test_nothing_is_left_of_a_shard_that_fails(tmp_path: Path, spec: Spec) -> None:
+def test_a_failed_shard_leaves_no_files(tmp_path: Path, spec: Spec) -> None:
     shard = list_shards(spec)[0]
     with pytest.raises(KeyboardInterrupt), ShardWriter(tmp_path, shard, spec) as writer:
         writer.add(0, {"json": b"{}"})
@@ -169,7 +171,7 @@ def test_nothing_is_left_of_a_shard_that_fails(tmp_path: Path, spec: Spec) -> No
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_ends_cleanly_with_what_is_whole_kept(
+def test_a_full_disk_ends_cleanly_and_keeps_complete_shards(
     tmp_path: Path, spec: Spec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second, _ = list_shards(spec)
@@ -190,7 +192,7 @@ def test_a_full_disk_ends_cleanly_with_what_is_whole_kept(
     assert is_intact(tmp_path, first, spec)
 
 
-def test_a_folder_that_is_gone_is_said(tmp_path: Path, spec: Spec) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path, spec: Spec) -> None:
     with pytest.raises(DermisError, match=r"shard-00000.*No such file"):
         write_shard(tmp_path / "none", list_shards(spec)[0], spec)
 

@@ -97,7 +97,7 @@ def found(example: Spec) -> list[Parameters]:
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_cannot_be_drawn_is_refused_by_table_and_key(text: str, tmp_path: Path) -> None:
+def test_impossible_values_are_refused_with_table_and_key(text: str, tmp_path: Path) -> None:
     file = tmp_path / "spec.toml"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(DermisError, match=REFUSED[text]) as refused:
@@ -105,7 +105,7 @@ def test_what_cannot_be_drawn_is_refused_by_table_and_key(text: str, tmp_path: P
     assert str(refused.value).startswith(str(file))
 
 
-def test_the_example_is_a_spec_and_says_what_it_does(tmp_path: Path) -> None:
+def test_the_example_is_a_valid_commented_spec(tmp_path: Path) -> None:
     file = tmp_path / "spec.toml"
     file.write_text(example_toml(), encoding="utf-8")
     drawn = load_spec(file)
@@ -116,7 +116,7 @@ def test_the_example_is_a_spec_and_says_what_it_does(tmp_path: Path) -> None:
         drawn.parameters(1000)
 
 
-def test_files_that_the_example_mentions_could_be_taken(tmp_path: Path) -> None:
+def test_files_that_the_example_names_are_accepted(tmp_path: Path) -> None:
     text = example_toml()
     for line in [line[2:] for line in text.splitlines() if line.startswith("# name = ")]:
         (tmp_path / "panoramas").mkdir(exist_ok=True)
@@ -127,7 +127,7 @@ def test_files_that_the_example_mentions_could_be_taken(tmp_path: Path) -> None:
         )  # fmt: skip
 
 
-def test_statistics_are_those_that_are_stated(found: list[Parameters]) -> None:
+def test_statistics_match_the_stated_distributions(found: list[Parameters]) -> None:
     ages = [one["person.age"] for one in found]
     assert stats.kstest(ages, stats.truncnorm(-17 / 22, 48 / 22, 42, 22).cdf).pvalue > 0.01
     distances = [one["camera.distance_mm"] for one in found]
@@ -152,7 +152,7 @@ def test_correlated_parameters_keep_their_own_distributions(found: list[Paramete
     assert stats.spearmanr(yaws).statistic == pytest.approx(6 / np.pi * np.arcsin(0.15), abs=0.04)
 
 
-def test_one_parameter_more_or_another_distribution_moves_no_other() -> None:
+def test_a_new_parameter_or_distribution_changes_no_other_parameter() -> None:
     base = spec("[person]\nage = {uniform = [30, 60]}\n[expression]\nname = 'mixture'")
     other = spec(
         "[person]\nage = {normal = [50, 2]}\nsex = {uniform = [0, 1]}\n"
@@ -166,7 +166,7 @@ def test_one_parameter_more_or_another_distribution_moves_no_other() -> None:
     assert [base.parameters(k) for k in range(5)] != [base.replace(seed=1).parameters(k) for k in range(5)]
 
 
-def test_images_share_people_as_many_as_are_stated() -> None:
+def test_the_stated_number_of_images_share_a_person() -> None:
     drawn = spec(
         "images_per_person = 3\n[person]\nage = {uniform = [25, 90]}\n[head]\nyaw_deg = {uniform = [-9, 9]}"
     )
@@ -181,7 +181,7 @@ def test_images_share_people_as_many_as_are_stated() -> None:
     assert alone.parameters(2)["person.age"] == found[8]["person.age"]
 
 
-def test_other_processes_draw_the_same(example: Spec) -> None:
+def test_other_processes_sample_the_same(example: Spec) -> None:
     code = (
         "import json, tomllib; from dermis.apps.batch.spec import example_toml, parse_spec; "
         "spec = parse_spec(tomllib.loads(example_toml()) | {'count': 5000}); "
@@ -198,7 +198,7 @@ def test_other_processes_draw_the_same(example: Spec) -> None:
     assert pickle.loads(pickle.dumps(example)).parameters(3) == example.parameters(3)
 
 
-def test_the_first_image_of_the_example_stays_what_it_was(example: Spec) -> None:
+def test_the_first_image_of_the_example_is_unchanged(example: Spec) -> None:
     """The parameters are the same on every machine and in every version with the same generator number."""
     found = example.parameters(0)
     told = {name: found[name] for name in ("person.seed", "person.age", "camera.distance_mm", "head.yaw_deg")}
@@ -248,14 +248,14 @@ TABLES = st.fixed_dictionaries(
 
 @settings(deadline=None, max_examples=60)
 @given(TABLES)
-def test_any_spec_is_the_same_after_its_text(tables: dict[str, Any]) -> None:
+def test_specs_round_trip_through_toml(tables: dict[str, Any]) -> None:
     made = parse_spec(tables)
     again = parse_spec(tomllib.loads(made.to_toml()))
     assert again == made and again.to_toml() == made.to_toml()
     assert again.parameters(0) == made.parameters(0)
 
 
-def test_files_are_sorted_known_by_their_contents_and_checked(tmp_path: Path) -> None:
+def test_files_are_sorted_and_checked_by_their_hashes(tmp_path: Path) -> None:
     for name, data in (("b.hdr", b"2"), ("a.hdr", b"1"), ("c.txt", b"3")):
         (tmp_path / name).write_bytes(data)
     (tmp_path / "d.hdr").mkdir()
@@ -273,7 +273,7 @@ def test_files_are_sorted_known_by_their_contents_and_checked(tmp_path: Path) ->
         parse_spec(tomllib.loads(first.to_toml()), tmp_path)
 
 
-def test_tables_of_landmarks_are_known_by_their_contents(tmp_path: Path) -> None:
+def test_landmark_tables_are_identified_by_their_hashes(tmp_path: Path) -> None:
     table, tables = tmp_path / "points.csv", {"landmarks": ["ibug-68", "points.csv"]}
     table.write_text("# a ball\nname,vertex\ntop,3\n")
     first = parse_spec(tables, tmp_path)

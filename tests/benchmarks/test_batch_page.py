@@ -30,7 +30,7 @@ def told(**more: Any) -> dict[str, Any]:
     }
 
 
-def test_paper_goes_on_with_the_fastest_run() -> None:
+def test_extrapolation_uses_the_fastest_run() -> None:
     from batch_page import paper
 
     steps = {"parameters": 1.0, "scene": 5.0, "draw_and_read": 4.0, "encode": 50.0}
@@ -51,7 +51,7 @@ def test_the_page_has_each_run_with_its_ratio() -> None:
     assert "0.980 times" in text and "lowest limit" not in text
 
 
-def test_memory_is_told_by_images() -> None:
+def test_memory_is_listed_by_number_of_images() -> None:
     from batch import Clock
     from batch_page import page
 
@@ -66,7 +66,7 @@ def test_memory_is_told_by_images() -> None:
     assert "| new people | 2 | 10 | 500 |" in text and "| new people | 2 | 20 | 600 |" in text
 
 
-def test_the_rate_is_that_of_the_middle() -> None:
+def test_the_rate_is_measured_in_the_middle_of_the_run() -> None:
     from batch import Clock
 
     clock = Clock([(10.0 if n == 1 else 20.0 + 0.5 * n, n) for n in range(1, 101)])

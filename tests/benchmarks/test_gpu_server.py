@@ -47,7 +47,7 @@ def opened(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.frame.renderer.open_device", lambda _: device)
 
 
-def test_all_that_is_measured_here(run: Any, device: Device) -> None:
+def test_all_parts_are_measured(run: Any, device: Device) -> None:
     told = run("bench,sequences,lights,options")
     assert told["adapter"] == device.adapter.name and told["versions"]["wgpu"]
     assert set(told["seconds"]) == {"bench", "sequences", "lights", "options"}
@@ -60,7 +60,7 @@ def test_all_that_is_measured_here(run: Any, device: Device) -> None:
     assert "diffuse" in told["options"]["usual"] and "diffuse" not in told["options"]["none"]
 
 
-def test_what_fails_and_what_would_be_late_is_told(
+def test_failed_and_skipped_parts_are_reported(
     run: Any, server: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: Any) -> Any:
@@ -74,7 +74,7 @@ def test_what_fails_and_what_would_be_late_is_told(
     assert min(told["lobes"].values()) >= 0.0 and "kelemen, schlick" in told["lobes"]
 
 
-def test_a_program_that_fails_is_told_with_its_last_words(
+def test_the_last_output_of_a_failed_program_is_reported(
     server: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from gpu_server import run_time_s
@@ -85,7 +85,7 @@ def test_a_program_that_fails_is_told_with_its_last_words(
     assert run_time_s([sys.executable, "-c", "pass"]) > 0.0
 
 
-def test_a_program_that_hangs_ends_with_all_that_it_started(
+def test_a_hanging_program_ends_with_its_child_processes(
     server: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import gpu_server
@@ -119,7 +119,7 @@ def _runs(process: int) -> bool:
         return False
 
 
-def test_a_viewer_that_is_stopped_leaves_what_it_has(
+def test_a_stopped_viewer_leaves_partial_results(
     run: Any, server: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stopped(words: list[str], longest_s: float) -> float:
@@ -133,7 +133,7 @@ def test_a_viewer_that_is_stopped_leaves_what_it_has(
     assert told["speed"]["camera"]["frames_per_s"] == 50.0 and "Last words: page" in told["ended"]
 
 
-def test_other_names_are_refused(server: Any, tmp_path: Path) -> None:
+def test_unknown_part_names_are_refused(server: Any, tmp_path: Path) -> None:
     with pytest.raises(DermisError, match="--parts: expected names of bench, lobes"):
         server.main(output=tmp_path / "figures.json", parts="bench,sun")
     with pytest.raises(DermisError, match=r"figures\.txt"):
@@ -141,7 +141,7 @@ def test_other_names_are_refused(server: Any, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_the_whole_plan_has_the_tables_of_the_documentation(server: Any) -> None:
+def test_the_full_plan_covers_all_tables_of_the_documentation(server: Any) -> None:
     plan = server.plan_of("auto", "human")
     assert (
         plan.base_case.image == (1920, 1080) and plan.base_case.atlas == 2048 and plan.base_case.lights == 3

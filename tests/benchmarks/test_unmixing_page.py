@@ -11,7 +11,7 @@ from figures_in_text import differences
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 
-def test_the_page_is_that_of_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_matches_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER)])
     from unmixing_page import PAGE, figures, page
 

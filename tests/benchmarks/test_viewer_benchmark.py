@@ -62,7 +62,7 @@ def test_each_motion_moves_the_picture_and_nothing_else_is_computed(driver: Any,
     assert all(one["frame_ms"] <= one["late_frame_ms"] <= one["longest_frame_ms"] for one in found.values())
 
 
-def test_delays_are_those_of_pictures_that_follow(driver: Any, plan: Any) -> None:
+def test_delays_are_measured_to_the_following_picture(driver: Any, plan: Any) -> None:
     from viewer_input import Clock
     from viewer_memory import delays
 
@@ -71,7 +71,7 @@ def test_delays_are_those_of_pictures_that_follow(driver: Any, plan: Any) -> Non
     assert all(0.0 < one["median_ms"] <= one["late_ms"] for one in found.values())
 
 
-def test_no_time_leaves_a_few_frames_of_everything(driver: Any, plan: Any) -> None:
+def test_without_time_a_few_frames_of_each_section_are_measured(driver: Any, plan: Any) -> None:
     from viewer_input import Clock, speeds
     from viewer_memory import delays
 
@@ -80,7 +80,7 @@ def test_no_time_leaves_a_few_frames_of_everything(driver: Any, plan: Any) -> No
     assert [one["count"] for _, one in delays(driver, many, Clock(0.0))] == [3, 3]
 
 
-def test_a_viewer_that_fails_is_no_quick_one(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_viewer_has_no_frame_rate(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(driver.viewer, "failure", DermisError("no device"))
     with pytest.raises(DermisError, match="no device"):
         driver.frame()
@@ -95,14 +95,14 @@ def test_a_viewer_that_fails_is_no_quick_one(driver: Any, monkeypatch: pytest.Mo
         driver.frame()
 
 
-def test_a_picture_that_never_rests_ends_the_wait(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waiting_ends_for_pictures_that_never_settle(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("viewer_input._REST_S", 0.0)
     monkeypatch.setattr(type(driver.viewer), "is_still", False)
     with pytest.raises(RuntimeError, match="does not come to rest"):
         driver.rest()
 
 
-def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: Path) -> None:
+def test_a_failing_section_keeps_earlier_figures_and_the_reason(tmp_path: Path) -> None:
     from viewer import Results, tables
     from viewer_input import Clock
 
@@ -127,7 +127,7 @@ def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: P
     )
 
 
-def test_a_server_that_has_nothing_to_show_is_told_with_its_reason(plan: Any) -> None:
+def test_a_failing_server_is_reported_with_the_reason(plan: Any) -> None:
     from viewer_input import Clock
     from viewer_page import page_figures
 
@@ -159,7 +159,7 @@ def test_each_kind_of_change_makes_another_state(driver: Any) -> None:
         assert any(not states_equal(state, driver.first) for state in changed)
 
 
-def test_growth_is_that_of_the_second_half() -> None:
+def test_growth_is_measured_in_the_second_half() -> None:
     from viewer_memory import growth
 
     changes = np.arange(21) * 50.0

@@ -64,7 +64,7 @@ def test_each_frame_is_the_picture_of_its_pose(animate: Run, run: Run) -> None:
         np.testing.assert_allclose(read_image(f"new/frames/{number:03}.exr"), read_image("a.exr"), atol=1e-5)
 
 
-def test_from_and_to_count_on_the_motions_own_clock(animate: Run) -> None:
+def test_from_and_to_are_times_within_the_motion(animate: Run) -> None:
     words = ("--fps", "10", "-o", "f/%02d.png")
     assert _report(animate("face.glb", *words, "--from", "0.1", "--to", "0.3", "--json"))["frames"] == 2
     assert sorted(path.name for path in Path("f").glob("*.png")) == ["01.png", "02.png"]
@@ -72,7 +72,7 @@ def test_from_and_to_count_on_the_motions_own_clock(animate: Run) -> None:
     assert sorted(path.name for path in Path("f").glob("*.png")) == ["01.png", "02.png", "03.png"]
 
 
-def test_whole_frames_are_not_drawn_again(animate: Run) -> None:
+def test_complete_frames_are_not_rendered_again(animate: Run) -> None:
     words = ("face.glb", "-o", "f/%d.png", "--fps", "10", "--json")
     assert _report(animate(*words))["drawn"] == 4
     whole = {path.name: path.read_bytes() for path in Path("f").glob("*.png")}
@@ -119,7 +119,7 @@ def test_a_capture_moves_the_head_and_says_what_it_lacks(animate: Run) -> None:
     assert (report["fps"], report["frames"]) == (4.0, 3)
 
 
-def test_a_scene_keeps_its_pose_where_the_clip_is_silent(animate: Run, run: Run) -> None:
+def test_a_scene_keeps_its_pose_where_the_clip_has_no_tracks(animate: Run, run: Run) -> None:
     Path("s.toml").write_text(
         '[head]\nname = "two.glb"\n[pose.weights]\nmouthSmileLeft = 1.0\njawOpen = 0.5\n'
     )
@@ -188,7 +188,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("bad", REFUSED.values(), ids=REFUSED)
-def test_refused_before_anything_is_drawn(
+def test_invalid_options_are_refused_before_rendering(
     animate: Run, bad: tuple[str, str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from small_head import obj_text
@@ -208,7 +208,7 @@ def test_refused_before_anything_is_drawn(
     assert sorted(path.name for path in Path().iterdir()) == before
 
 
-def test_a_missing_encoder_is_told_before_the_head_is_loaded(
+def test_a_missing_encoder_is_reported_before_the_head_is_loaded(
     animate: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dermis.images.movie._ENCODER", "no such encoder")

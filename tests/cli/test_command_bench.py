@@ -39,7 +39,7 @@ def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest
     return lambda *words: run("bench", "--head", "head.obj", "--adapter", device.adapter.name, *words)
 
 
-def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
+def test_json_and_report_are_written(bench: Run, tmp_path: Path, device: Any) -> None:
     ended = bench("--preset", "cpu", "--json", "-o", "report.html")
     assert (ended.code, ended.stderr) == (0, "")
     told = json.loads(ended.stdout)
@@ -55,7 +55,7 @@ def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
     assert "<svg" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-def test_in_words(bench: Run) -> None:
+def test_results_are_printed_as_text(bench: Run) -> None:
     ended = bench()
     assert (ended.code, ended.stderr) == (0, "")
     for word in ("GB/s", "floor [ms]", "32x32", "irradiance", "times as long as fragments"):
@@ -67,7 +67,7 @@ def test_an_unwritable_report_is_refused_first(bench: Run) -> None:
     assert ended.code == 2 and "report.png: expected" in ended.stderr and ended.stdout == ""
 
 
-def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyPatch, device: Any) -> None:
+def test_skipped_measurements_are_reported(bench: Run, monkeypatch: pytest.MonkeyPatch, device: Any) -> None:
     base_case = cases.BENCHMARK_PRESETS["cpu"].base_case
     too_large = BenchmarkPreset(base_case, ((32, 32),), (device.max_texture_size + 1,), (2,), (1,), (0,), ())
     monkeypatch.setitem(cases.BENCHMARK_PRESETS, "cpu", too_large)
@@ -77,7 +77,7 @@ def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyP
     assert str(device.max_texture_size) in ended.stdout
 
 
-def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_interruption_leaves_no_files(bench: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     before = set(tmp_path.rglob("*"))
 
     def interrupted(renderer: Any, case: BenchmarkCase, *rest: Any) -> Any:
@@ -91,9 +91,7 @@ def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPat
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_a_report_that_fails_at_the_end_takes_no_figures_along(
-    bench: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figures_are_printed_if_the_report_fails(bench: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(path: Path, made: Any) -> None:
         raise DermisError(f"{path}: the disk is full")
 
@@ -103,6 +101,6 @@ def test_a_report_that_fails_at_the_end_takes_no_figures_along(
     assert len(json.loads(ended.stdout)["rows"]) == 3
 
 
-def test_a_head_that_is_not_there(run: Run, opened: None, device: Any) -> None:
+def test_a_missing_head_is_refused(run: Run, opened: None, device: Any) -> None:
     ended = run("bench", "--head", "nobody.obj", "--adapter", device.adapter.name)
     assert ended.code == 2 and "nobody.obj" in ended.stderr

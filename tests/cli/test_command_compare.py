@@ -72,7 +72,7 @@ def test_pictures_are_written_into_a_new_folder(compare: Run) -> None:
 
 
 @pytest.mark.parametrize("m", [0.1, 1.0])
-def test_no_curve_leaves_its_panel(m: float) -> None:
+def test_curves_stay_inside_their_panel(m: float) -> None:
     for axes in _lobe_figure(m).axes:
         assert all(curve.get_ydata().max() <= axes.get_rmax() for curve in axes.lines)
 
@@ -100,7 +100,7 @@ def test_lobes_of_other_packages_have_panels_of_their_own() -> None:
         (("specular", "--against", "heat"), "--against: expected no such option here"),
     ],
 )
-def test_misuse_is_told(compare: Run, words: tuple[str, ...], says: str) -> None:
+def test_invalid_options_are_refused(compare: Run, words: tuple[str, ...], says: str) -> None:
     Path("taken").write_text("a file")
     ended = compare(*words)
     assert (ended.code, ended.stdout) == (2, "")
@@ -141,7 +141,7 @@ def test_wrong_colour_needs_a_map_to_be_seen(render: Run, folder: Path) -> None:
     assert (wrong <= white + 1e-6).all() and wrong[..., 2].sum() < white[..., 2].sum()
 
 
-def test_techniques_against_a_truth(run: Run, folder: Path, opened: None) -> None:
+def test_techniques_are_compared_with_a_reference(run: Run, folder: Path, opened: None) -> None:
     """Rows in JSON, and a self-contained page."""
     words = ("--size", "24x24", "--atlas", "128", "--techniques", "none,texture-space")
     ended = run("compare", "head.obj", *words, "-o", "report.html", "--json")

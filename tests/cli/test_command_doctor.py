@@ -75,7 +75,7 @@ def test_healthy_machine_in_words(run: Run, opened: None, device: Any) -> None:
         assert word in ended.stdout
 
 
-def test_frame_that_is_lit_wrongly_is_no_health(
+def test_a_wrongly_lit_test_frame_is_reported(
     run: Run, opened: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = RenderedFrame.linear

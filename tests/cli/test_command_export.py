@@ -10,7 +10,7 @@ from typing import Any
 Run = Callable[..., Any]
 
 
-def test_it_says_in_json_what_was_written_and_how_wrong_it_is(run: Run, tmp_path: Path) -> None:
+def test_json_lists_written_files_and_errors(run: Run, tmp_path: Path) -> None:
     ended = run("export", "dj3", "--to", "unity", "-o", tmp_path / "made", "--json")
     assert (ended.code, ended.stderr) == (0, "")
     told = json.loads(ended.stdout)
@@ -22,7 +22,7 @@ def test_it_says_in_json_what_was_written_and_how_wrong_it_is(run: Run, tmp_path
     assert all(Path(file).is_file() for file in told["files"])
 
 
-def test_unknown_versions_are_refused_with_those_known(run: Run, tmp_path: Path) -> None:
+def test_unknown_versions_are_refused_with_the_known_ones(run: Run, tmp_path: Path) -> None:
     ended = run("export", "skin1", "--to", "unreal", "--version", "4.27", "-o", tmp_path / "made")
     assert ended.code == 2 and "5.7, 5.8, but got '4.27'" in ended.stderr
     assert not list(tmp_path.iterdir())

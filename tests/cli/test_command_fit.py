@@ -24,7 +24,7 @@ Run = Callable[..., Any]
         (["grey.png", "--head", "nobody"], "nobody: expected"),
     ],
 )
-def test_refusals(run: Run, folder: Path, words: list[str], told: str) -> None:
+def test_invalid_options_are_refused(run: Run, folder: Path, words: list[str], told: str) -> None:
     write_image(folder / "grey.png", np.full((32, 32, 3), 0.5))
     ended = run("fit", *words, "--adapter", "cpu")
     assert ended.code == 2 and told in ended.stderr and ended.stderr.count("\n") == 1

@@ -47,7 +47,7 @@ def test_writes_a_person_that_renders(run: Run, render: Run, folder: Path) -> No
     assert render("own.glb", "--pose", "jawOpen=0.6", "--bone", "head=0,20,0", "-o", "own.png").code == 0
 
 
-def test_without_options_it_is_the_person_between_all(run: Run, folder: Path) -> None:
+def test_the_default_is_the_average_person(run: Run, folder: Path) -> None:
     ended = run("head")
     assert ended.code == 0 and "head.glb  53,504 triangles" in ended.stdout and "CC0" in ended.stdout
     head = load_head(folder / "head.glb")
@@ -76,7 +76,7 @@ def test_fields_targets_and_expressions_add_up(run: Run, folder: Path) -> None:
     assert sum(map(bool, rest.values())) == 2
 
 
-def test_maps_of_files_take_the_place_of_the_own(run: Run, folder: Path) -> None:
+def test_maps_of_files_replace_painted_maps(run: Run, folder: Path) -> None:
     side = 32
     flat = np.tile(np.array([128, 128, 255], np.uint8), (side, side, 1))
     (folder / "flat.png").write_bytes(encode_png(flat))
@@ -119,7 +119,7 @@ def test_targets_are_listed(run: Run, folder: Path) -> None:
         (("-o", "nowhere/own.glb"), "nowhere"),
     ],
 )
-def test_refusals(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+def test_invalid_options_are_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
     before = sorted(folder.iterdir())
     ended = run("head", *words)
     assert (ended.code, ended.stdout) == (2, "")

@@ -29,7 +29,7 @@ def _process(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
 
 
-def test_a_process_ends_with_2_and_leaves_nothing(tmp_path: Path) -> None:
+def test_an_error_exits_with_status_2_and_leaves_no_files(tmp_path: Path) -> None:
     ended = _process("render", "nobody.obj", "-o", "a.png", folder=tmp_path)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert ended.stderr.startswith("dermis: nobody.obj: expected ") and ended.stderr.count("\n") == 1
@@ -78,7 +78,7 @@ def test_help_loads_nothing_heavy(words: list[str]) -> None:
     assert ended.stdout
 
 
-def test_help_of_the_whole_names_each_command(run: Run) -> None:
+def test_general_help_names_each_command(run: Run) -> None:
     ended = run("--help")
     assert (ended.code, ended.stderr) == (0, "")
     for command in ("render", "doctor", "cite"):
@@ -143,7 +143,7 @@ def test_cite_prints_the_works_behind_the_technique(run: Run) -> None:
         (("--scene", "scene.toml", "--technique", "none"), {"Baum1989"}, {"Jimenez2015"}),
     ],
 )
-def test_cite_names_what_is_in_use(
+def test_cite_names_the_techniques_in_use(
     run: Run, folder: Path, words: tuple[str, ...], has: set[str], lacks: set[str]
 ) -> None:
     (folder / "scene.toml").write_text(

@@ -71,7 +71,7 @@ def test_a_skin_of_pigments_has_its_spectra(told: Callable[..., dict[str, Any]])
     assert "reflectance" not in told("dj3")
 
 
-def test_the_models_own_error_stands_beside_that_of_the_fit(
+def test_the_error_of_the_model_is_reported_with_that_of_the_fit(
     told: Callable[..., dict[str, Any]], run: Run, tmp_path: Path
 ) -> None:
     page = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text("utf-8")
@@ -91,7 +91,7 @@ def test_the_models_own_error_stands_beside_that_of_the_fit(
 
 
 @pytest.mark.parametrize("model", ["dipole", "better-dipole", "multipole", "layered", "layered-point"])
-def test_every_model_answers(told: Callable[..., dict[str, Any]], model: str) -> None:
+def test_every_model_gives_a_profile(told: Callable[..., dict[str, Any]], model: str) -> None:
     report = told("marble", "--model", model, "--fit", "4")
     assert report["model"] == model
     assert 0.7 < min(report["total"]) < max(report["total"]) < 0.9
@@ -100,7 +100,7 @@ def test_every_model_answers(told: Callable[..., dict[str, Any]], model: str) ->
     assert report["gaussians"]["error_kind"] == kind
 
 
-def test_index_of_refraction_changes_the_answer(told: Callable[..., dict[str, Any]]) -> None:
+def test_the_index_of_refraction_changes_the_profile(told: Callable[..., dict[str, Any]]) -> None:
     skin = told("skin1", "--model", "dipole")
     matched = told("skin1", "--model", "dipole", "--eta", "1")
     assert (skin["eta"], matched["eta"]) == (1.4, 1.0)
@@ -123,7 +123,7 @@ def test_photons_that_nothing_traces_are_noted(run: Run) -> None:
     assert "traced" not in run("profile", "skin1").stderr
 
 
-def test_structure_of_a_file_gives_way_to_the_option(
+def test_the_option_overrides_the_structure_of_a_file(
     folder: Path, told: Callable[..., dict[str, Any]]
 ) -> None:
     (folder / "own.toml").write_text("[skin]\nstructure = 'biospec'\n")
@@ -179,7 +179,7 @@ def test_written_profile_is_read_back(run: Run, folder: Path, told: Callable[...
     assert "melanin = 0.02" in (folder / "own.toml").read_text()
 
 
-def test_render_takes_it(run: Run, render: Run, folder: Path) -> None:
+def test_render_accepts_the_written_profile(run: Run, render: Run, folder: Path) -> None:
     """Another profile gives another picture of the same head in the same light."""
     assert run("profile", "skin2", "-o", "own.toml").code == 0
     pictures = []
@@ -191,7 +191,7 @@ def test_render_takes_it(run: Run, render: Run, folder: Path) -> None:
     assert not np.array_equal(pictures[0], pictures[1])
 
 
-def test_table_is_its_own_fit(told: Callable[..., dict[str, Any]]) -> None:
+def test_a_table_of_gaussians_is_its_own_fit(told: Callable[..., dict[str, Any]]) -> None:
     table = told("gpu-gems-3")
     assert table["gaussians"]["weights"][0] == [0.233, 0.455, 0.649]
     assert table["gaussians"]["error"] == [0, 0, 0]
@@ -209,7 +209,7 @@ def test_plot_is_written_and_repeatable(run: Run, folder: Path, suffix: str) -> 
     assert one == two
 
 
-def test_lines_are_for_people(run: Run) -> None:
+def test_the_report_is_readable_text(run: Run) -> None:
     ended = run("profile", "dj3", "--fit-kind", "burley", "--through", "1")
     assert ended.code == 0
     assert "epidermis" in ended.stdout and "variance mm2" in ended.stdout and "1 mm" in ended.stdout
@@ -251,7 +251,7 @@ def test_lines_are_for_people(run: Run) -> None:
         (["a" * 5000], "no such file"),
     ],
 )
-def test_refusals(run: Run, folder: Path, words: list[str], complaint: str) -> None:
+def test_invalid_options_are_refused(run: Run, folder: Path, words: list[str], complaint: str) -> None:
     (folder / "endless.csv").write_bytes(b"0" * ((1 << 20) + 1))
     before = sorted(folder.iterdir())
     ended = run("profile", *words)

@@ -71,7 +71,7 @@ def test_help_prints_the_default_skin(run: Run) -> None:
     assert "[default: 0.85]" in shown["unmix"] and "[default: 0.7]" in shown["unmix"]
 
 
-def test_tells_medians_in_words(run: Run, picture: Path) -> None:
+def test_medians_are_printed_as_text(run: Run, picture: Path) -> None:
     ended = run("unmix", "skin.png", "--adapter", "cpu", "--shading", "--find", "oxygen")
     assert ended.code == 0 and "melanin  median 0.0" in ended.stdout
     assert {"maps/oxygen.exr", "maps/shading.exr"} <= set(ended.stdout.split())
@@ -89,7 +89,9 @@ def test_tells_medians_in_words(run: Run, picture: Path) -> None:
         (["skin.png", "-o", "no/maps"], "no/maps: expected a folder inside one that exists"),
     ],
 )
-def test_refusals(run: Run, picture: Path, folder: Path, words: list[str], told: str) -> None:
+def test_invalid_options_are_refused(
+    run: Run, picture: Path, folder: Path, words: list[str], told: str
+) -> None:
     ended = run("unmix", *words, "--adapter", "cpu")
     assert ended.code == 2 and told in ended.stderr and ended.stderr.count("\n") == 1
     assert not list(folder.rglob("*.exr"))

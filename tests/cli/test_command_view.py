@@ -39,7 +39,7 @@ Run = Callable[..., Any]
         (("--motion-fps", "25"), "--motion-fps"),
     ],
 )
-def test_what_cannot_be_is_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+def test_impossible_options_are_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
     ended = run("view", "head.obj", *words, "--adapter", "cpu")
     assert (ended.code, ended.stdout) == (2, "")
     assert ended.stderr.startswith(f"dermis: {culprit}")
@@ -48,7 +48,7 @@ def test_what_cannot_be_is_refused(run: Run, folder: Path, words: tuple[str, ...
 @pytest.mark.parametrize(
     ("words", "package"), [((), "glfw"), (("--browser",), "uvicorn"), ((), "imgui_bundle")]
 )
-def test_without_the_extra_it_says_what_to_install(
+def test_without_the_extra_the_message_names_it(
     run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], package: str
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
@@ -57,7 +57,7 @@ def test_without_the_extra_it_says_what_to_install(
     assert package.replace("_", "-") in ended.stderr and 'pip install "dermis[viewer]"' in ended.stderr
 
 
-def test_who_exposes_the_page_is_warned(capfd: pytest.CaptureFixture[str]) -> None:
+def test_exposing_the_page_gives_a_warning(capfd: pytest.CaptureFixture[str]) -> None:
     from dermis.cli.view import _print_url
 
     _print_url("http://gpu.example:8765/secret/", True)
@@ -73,7 +73,7 @@ def test_the_package_imports_without_the_extra() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
+def test_without_a_display_the_message_suggests_the_browser(folder: Path) -> None:
     """In a separate process, because glfw ends the process that requests a window after its warning."""
     pytest.importorskip("glfw", reason="the extra `viewer` is not installed")
     environment = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
@@ -87,7 +87,7 @@ def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is sent as a signal")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
-def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
+def test_a_single_signal_ends_the_server(folder: Path, number: int, code: int) -> None:
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
     words = ["view", "head.obj", "--browser", "--port", "0", "--adapter", "cpu"]
     command = [sys.executable, "-m", "dermis", *words]
@@ -106,7 +106,7 @@ def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
             served.kill()
 
 
-def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_determine_the_viewer_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Any] = []
     monkeypatch.setattr("dermis.apps.viewer.windows.show_window", lambda *given, **_: seen.append(given))
     words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
@@ -118,7 +118,7 @@ def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.
     assert state.scene.camera.frame_mm == 120.0
 
 
-def test_a_scene_keeps_its_pose_and_a_motion_comes_with_it(
+def test_a_scene_keeps_its_pose_when_a_motion_is_given(
     run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, seen = write_rigged_head(folder / "rigged.glb"), list[Any]()

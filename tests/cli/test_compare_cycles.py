@@ -49,7 +49,7 @@ def compare(run: Run, folder: Path, opened: None, monkeypatch: pytest.MonkeyPatc
     return call
 
 
-def test_rows_are_against_what_it_rendered(compare: Run, folder: Path) -> None:
+def test_rows_compare_with_the_picture_of_cycles(compare: Run, folder: Path) -> None:
     (folder / "blender.py").write_text(PROGRAM)
     ended = compare(f'exec "{sys.executable}" "{folder}/blender.py" "$3"', "--json", "-o", "report.html")
     assert (ended.code, ended.stderr) == (0, "")
@@ -70,7 +70,7 @@ def test_rows_are_against_what_it_rendered(compare: Run, folder: Path) -> None:
         ('echo "no JSON" > "$3"/done.json', "its files are unusable"),
     ],
 )
-def test_failures_are_told_and_leave_nothing(
+def test_failures_are_reported_and_leave_no_files(
     compare: Run, folder: Path, script: str | None, says: str
 ) -> None:
     ended = compare(script, "--json", "-o", "report.html")
@@ -79,7 +79,7 @@ def test_failures_are_told_and_leave_nothing(
     assert not (folder / "report.html").exists()
 
 
-def test_endless_run_is_ended(compare: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_endless_run_is_stopped(compare: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cycles, "_MAX_START_S", 0.1)
     monkeypatch.setattr(cycles, "_MAX_PATH_S", 0.0)
     ended = compare("exec sleep 60", "--json")

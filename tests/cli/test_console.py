@@ -59,23 +59,23 @@ def shown_on_a_terminal(seconds: float) -> list[str]:
     return shown
 
 
-def test_a_terminal_shows_what_takes_long() -> None:
+def test_a_terminal_shows_slow_steps() -> None:
     first, second = shown_on_a_terminal(3.0)
     assert "loading: fitting the eyes (3 s)" in first
     assert "reading the mesh" not in second
 
 
-def test_a_terminal_does_not_show_what_is_soon_done() -> None:
+def test_a_terminal_hides_fast_steps() -> None:
     assert not any("fitting" in text or "reading" in text for text in shown_on_a_terminal(1.0))
 
 
-def test_nothing_is_told_elsewhere() -> None:
+def test_no_progress_is_shown_without_a_terminal() -> None:
     command = [sys.executable, "-c", PREPARES, "3"]
     made = subprocess.run(command, input="\n\n", capture_output=True, check=True, text=True)
     assert (made.stdout, made.stderr) == ("", "")
 
 
-def test_loading_a_head_tells_its_steps(caplog: pytest.LogCaptureFixture, folder: Path) -> None:
+def test_loading_a_head_logs_its_steps(caplog: pytest.LogCaptureFixture, folder: Path) -> None:
     with caplog.at_level("INFO", logger="dermis"):
         dermis.load_head("head.obj", subdivide=1)
     assert caplog.messages == [

@@ -38,7 +38,7 @@ def test_a_files_eye_has_a_pupil_unless_it_is_plain(run, tmp_path: Path, camera:
 
 
 @pytest.mark.usefixtures("opened")
-def test_eyes_that_cannot_be_fitted_are_told_of(run, tmp_path: Path, folder: Path) -> None:
+def test_eyes_that_cannot_be_fitted_are_noted(run, tmp_path: Path, folder: Path) -> None:
     odd = write_head(tmp_path / "odd.gltf", ball(25.0), ball(25.0))
     outcome = run("render", odd, *SMALL, "-o", tmp_path / "a.png")
     assert (
@@ -65,7 +65,7 @@ def test_impossible_looks_are_refused(run, tmp_path: Path) -> None:
     assert outcome.code == 2 and "eyes: expected a mesh file to which it applies" in outcome.stderr
 
 
-def test_scene_files_say_what_eyes_look_like(tmp_path: Path) -> None:
+def test_scene_files_set_the_look_of_the_eyes(tmp_path: Path) -> None:
     write_head(tmp_path / "a.gltf")
     table = '[head]\nname = "a.gltf"\nunit_mm = 1.0\neye_groups = ["eye_L"]\n'
     (tmp_path / "a.toml").write_text(f"{table}[head.eye]\neumelanin = 0.25\nseed = 7\n")
@@ -78,6 +78,6 @@ def test_scene_files_say_what_eyes_look_like(tmp_path: Path) -> None:
     assert again.head.eyes is not None and again.head.eyes.look == scene.head.eyes.look
 
 
-def test_comparisons_take_eyes_as_they_are_told(run) -> None:
+def test_comparisons_accept_eye_options(run) -> None:
     outcome = run("compare", "specular", "--eyes", "plain")
     assert outcome.code == 2 and "--eyes: expected no such option here" in outcome.stderr

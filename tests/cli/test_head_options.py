@@ -29,7 +29,7 @@ def in_cm(folder: Path) -> str:
     return "cm.obj"
 
 
-def test_compare_takes_the_unit(run: Run, in_cm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compare_accepts_the_unit(run: Run, in_cm: str, monkeypatch: pytest.MonkeyPatch) -> None:
     heads: list[Any] = []
 
     def compared(head: Any, **chosen: Any) -> Any:
@@ -45,11 +45,11 @@ def test_compare_takes_the_unit(run: Run, in_cm: str, monkeypatch: pytest.Monkey
     assert head.levels == 0
 
 
-def test_compare_without_a_head_refuses_them(run: Run) -> None:
+def test_compare_without_a_head_refuses_head_options(run: Run) -> None:
     assert "--up: expected no such option here" in run("compare", "specular", "--up", "z").stderr
 
 
-def test_bench_takes_unit_and_maps(run: Run, in_cm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_accepts_unit_and_maps(run: Run, in_cm: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from dermis.apps.validation.benchmarks import run as measured
 
     heads: list[Any] = []
@@ -67,6 +67,6 @@ def test_bench_takes_unit_and_maps(run: Run, in_cm: str, monkeypatch: pytest.Mon
     assert heads[0].levels == 0
 
 
-def test_bench_refuses_them_without_a_head(run: Run) -> None:
+def test_bench_without_a_head_refuses_head_options(run: Run) -> None:
     assert "--unit-mm: expected no such option without a file" in run("bench", "--unit-mm", "10").stderr
     assert "--unit-mm" in run("bench", "--head", "a.obj", "--unit-mm", "-1").stderr

@@ -72,26 +72,26 @@ def _left(folder: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_the_exit_status_tells_the_signal(tmp_path: Path, number: signal.Signals) -> None:
+def test_the_exit_status_encodes_the_signal(tmp_path: Path, number: signal.Signals) -> None:
     assert _interrupted(tmp_path, AT_THE_END, number, "head -o person.json") == (128 + number, "")
     assert not _left(tmp_path)
 
 
-def test_a_picture_is_whole_or_as_it_was(folder: Path) -> None:
+def test_a_picture_is_complete_or_unchanged(folder: Path) -> None:
     (folder / "a.png").write_bytes(b"of yesterday")
     words = f"render head.obj -o a.png {SMALL}"
     assert _interrupted(folder, AT_THE_END, signal.SIGTERM, words) == (143, "")
     assert _left(folder) == {"a.png", "head.obj"} and (folder / "a.png").read_bytes() == b"of yesterday"
 
 
-def test_a_cache_file_is_whole_or_not_there(folder: Path) -> None:
+def test_a_cache_file_is_complete_or_absent(folder: Path) -> None:
     words = f"render head.obj -o a.png {SMALL}"
     assert _interrupted(folder, IN_THE_CACHE, signal.SIGTERM, words) == (143, "")
     assert _left(folder) == {"head.obj"} and not list((folder / "cache").rglob("*.arrays"))
 
 
 @pytest.mark.parametrize("output", ["a.mp4", "frames/%d.png"])
-def test_a_movie_is_whole_or_not_there(folder: Path, output: str) -> None:
+def test_a_movie_is_complete_or_absent(folder: Path, output: str) -> None:
     write_rigged_head(folder / "face.glb")
     write_take(folder / "take.csv", 0.0, 0.5, 1.0, 0.5, 0.0)
     words = f"animate face.glb --motion take.csv -o {output} {SMALL}"
@@ -101,13 +101,13 @@ def test_a_movie_is_whole_or_not_there(folder: Path, output: str) -> None:
     assert not [name for name in left if name.startswith(".dermis") or name.endswith(".mp4")]
 
 
-def test_a_person_is_whole_or_not_there(tmp_path: Path) -> None:
+def test_a_person_file_is_complete_or_absent(tmp_path: Path) -> None:
     words = "head --size 256 --subdivide 0 --adapter cpu -o a.glb"
     assert _interrupted(tmp_path, AT_THE_END, signal.SIGTERM, words) == (143, "")
     assert not _left(tmp_path)
 
 
-def test_a_gallery_holds_whole_pictures(folder: Path) -> None:
+def test_a_gallery_contains_complete_pictures(folder: Path) -> None:
     words = "gallery --only gaussians --head head.obj --size 32 --adapter cpu -o out"
     assert _interrupted(folder, AT_THE_END, signal.SIGTERM, words) == (143, "")
     assert _left(folder) == {"head.obj"}
@@ -136,7 +136,7 @@ def _start(
     return start([sys.executable, "-c", code], stdout=pipe, stderr=pipe, text=True)
 
 
-def test_asked_again_it_ends_at_once() -> None:
+def test_a_second_signal_ends_the_process_immediately() -> None:
     """Also during cleanup, and in a library that blocks the main thread."""
     slow = "import hashlib; hashlib.pbkdf2_hmac('sha256', b'', b'', 10**9)"  # minutes
     with _start("sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(60)", slow) as ran:
@@ -161,7 +161,7 @@ def _ends_when_asked_again(ran: subprocess.Popen[str]) -> int:
     raise AssertionError("the process does not end")
 
 
-def test_the_same_signal_from_a_program_in_between_is_one() -> None:
+def test_a_repeated_signal_of_an_intermediate_program_counts_once() -> None:
     with _start("sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(60)", "time.sleep(0.3)") as ran:
         assert ran.stdout is not None
         assert ran.stdout.readline() == "ready\n"
@@ -204,13 +204,13 @@ time.sleep(60)""",
 
 
 @pytest.mark.parametrize("place", LOST)
-def test_where_an_exception_would_be_lost_it_comes_later(place: str) -> None:
+def test_an_interruption_that_would_be_swallowed_is_repeated(place: str) -> None:
     with _start(LOST[place]) as ran:
         assert (*ran.communicate(timeout=120), ran.returncode) == ("raised\n", "", 143)
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_what_the_caller_ignores_stays_ignored(number: signal.Signals) -> None:
+def test_ignored_signals_stay_ignored(number: signal.Signals) -> None:
     """As by nohup for SIGHUP, and by a shell for SIGINT in the background."""
     with child_process.ignored_signals():
         ran = _start(f"os.kill(os.getpid(), {int(number)}); time.sleep(0.1)", start=subprocess.Popen)
@@ -218,7 +218,7 @@ def test_what_the_caller_ignores_stays_ignored(number: signal.Signals) -> None:
         assert (*ran.communicate(timeout=120), ran.returncode) == ("", "", 0)
 
 
-def test_afterwards_signals_are_as_before() -> None:
+def test_signal_handlers_are_restored() -> None:
     from dermis.cli.process import Interruption
 
     with child_process.default_signals():

@@ -26,7 +26,7 @@ def folded(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("seams", ["stitch", "alpha"])
-def test_mirrored_uv(
+def test_mirrored_uv_gives_the_same_picture(
     folded: Path, seams: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["dermis", "render", str(folded), "-o", str(folded.with_suffix(".png")), "--size", "32x32"]

@@ -75,7 +75,9 @@ def test_all_options_of_numbers_are_tried() -> None:
 
 
 @pytest.mark.parametrize(("command", "option", "form"), OPTIONS, ids=[" ".join(one[:2]) for one in OPTIONS])
-def test_what_is_no_number_is_refused(run: Run, folder: Path, command: str, option: str, form: str) -> None:
+def test_text_instead_of_a_number_is_refused(
+    run: Run, folder: Path, command: str, option: str, form: str
+) -> None:
     number = NOT_NUMBERS[len(option) % len(NOT_NUMBERS)]  # each takes its turn
     ended = run(command, *SUBJECTS.get(command, []), f"{option}={form.format(number)}")
     assert (ended.code, ended.stdout) == (2, "")
@@ -83,7 +85,7 @@ def test_what_is_no_number_is_refused(run: Run, folder: Path, command: str, opti
     assert [file.name for file in folder.iterdir()] == ["head.obj"]
 
 
-def test_json_has_no_numbers_that_are_none(capfd: pytest.CaptureFixture[str]) -> None:
+def test_json_contains_no_nan_or_infinity(capfd: pytest.CaptureFixture[str]) -> None:
     numbers = {"a": float("nan"), "b": [np.float64("inf"), 1.5], "c": ({"d": -float("inf")},)}
     print_json(numbers)
     assert json.loads(capfd.readouterr().out) == {"a": None, "b": [None, 1.5], "c": [{"d": None}]}

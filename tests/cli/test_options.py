@@ -86,7 +86,7 @@ def test_a_new_field_is_a_key_of_scene_files(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_new_field_is_a_row_of_the_docs() -> None:
-    found = importlib.util.spec_from_file_location("made_from_code", ROOT / "docs" / "made_from_code.py")
+    found = importlib.util.spec_from_file_location("generated_pages", ROOT / "docs" / "generated_pages.py")
     assert found and found.loader
     pages = importlib.util.module_from_spec(found)
     found.loader.exec_module(pages)
@@ -97,7 +97,7 @@ def test_a_new_field_is_a_row_of_the_docs() -> None:
         assert model in {model for model, _ in pages.TABLES.values()}
 
 
-def test_fields_tell_their_help_choices_and_range() -> None:
+def test_fields_provide_help_choices_and_range() -> None:
     assert field_help(WaxedSkin, "wax") == "Share of the skin that is waxed, seen from above."
     assert field_choices(WaxedSkin, "polish") == ("cloth", "wheel") and field_choices(WaxedSkin, "wax") == ()
     assert field_slider_range(WaxedSkin, "wax") == (0, 1, False) and field_slider_range(
@@ -114,7 +114,7 @@ def test_every_field_is_explained(model: type[FrozenModel]) -> None:
         assert text[0].isupper() and text.endswith("."), (field, text)
 
 
-def test_no_two_options_have_one_name() -> None:
+def test_option_names_are_unique() -> None:
     names = [
         *Settings.model_fields,
         *Skin.model_fields,
@@ -124,7 +124,7 @@ def test_no_two_options_have_one_name() -> None:
     assert len(names) == len(set(names))
 
 
-def test_no_command_retypes_the_words_of_a_model() -> None:
+def test_commands_do_not_repeat_choices_of_a_model() -> None:
     known = [set(field_choices(model, field)) for model in MODELS for field in model.model_fields]
     for path in sorted(Path(dermis.cli.__file__).parent.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -22,7 +22,7 @@ def report(render: Run, *words: str) -> dict:
     return dict(json.loads(ended.stdout))
 
 
-def test_render_meters_unless_told(render: Run) -> None:
+def test_render_meters_the_exposure_by_default(render: Run) -> None:
     metered = report(render)["exposure"]
     assert report(render, "--exposure", "auto")["exposure"] == metered
     assert report(render, "--exposure", "2.5")["exposure"] == 2.5
@@ -31,7 +31,7 @@ def test_render_meters_unless_told(render: Run) -> None:
     )
 
 
-def test_a_scenes_file_keeps_what_it_names(run: Run, render: Run, folder: Path) -> None:
+def test_settings_of_a_scene_file_are_kept(run: Run, render: Run, folder: Path) -> None:
     named = '[head]\nname = "head.obj"\n[render]\nsize = [64, 64]\natlas = 64\n'
     (folder / "plain.toml").write_text(named)
     (folder / "named.toml").write_text(f'{named}exposure = 0.5\nbackground = "#ffffff"\n')
@@ -42,7 +42,7 @@ def test_a_scenes_file_keeps_what_it_names(run: Run, render: Run, folder: Path) 
     assert (read_image("a.png")[0, 0] == 255).all()
 
 
-def test_files_have_alpha_over_no_background(render: Run) -> None:
+def test_pictures_without_background_have_alpha(render: Run) -> None:
     for words, channels in ((("--background", "none"), 4), (("--background", "0,0,0"), 3), ((), 3)):
         for name in ("a.png", "a.exr"):
             assert render("head.obj", "-o", name, *words).code == 0
@@ -55,12 +55,12 @@ def test_files_have_alpha_over_no_background(render: Run) -> None:
     assert (floats[floats[..., 3] == 0] == 0).all()
 
 
-def test_hex_colours_are_encoded_ones(render: Run) -> None:
+def test_hex_colours_are_srgb(render: Run) -> None:
     assert render("head.obj", "-o", "a.png", "--background", "#336699").code == 0
     assert read_image("a.png")[0, 0].tolist() == [0x33, 0x66, 0x99]
 
 
-def test_a_clipped_head_is_told(render: Run) -> None:
+def test_a_clipped_head_is_noted(render: Run) -> None:
     ended = render("head.obj", "-o", "a.png", "--exposure", "50")
     assert ended.code == 0 and ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("note: ") and "of the head is overexposed" in ended.stderr

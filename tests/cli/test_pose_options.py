@@ -25,7 +25,7 @@ def face(folder: Path) -> str:
     return "face.glb"
 
 
-def test_words_become_a_pose() -> None:
+def test_option_values_become_a_pose() -> None:
     assert parse_weights(["jawOpen=0.6,mouthSmileLeft=1", "a=b=-2"]) == {
         "jawOpen": 0.6,
         "mouthSmileLeft": 1.0,
@@ -50,7 +50,7 @@ def test_pose_and_bone_move_the_picture(render: Run, face: str) -> None:
     np.testing.assert_allclose(c, expected, atol=1e-6)
 
 
-def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
+def test_options_override_the_pose_of_a_scene(face: str) -> None:
     told = "[pose.weights]\njawOpen = 0.25\nmouthSmileLeft = 0.5\n[pose.bones]\nhead = [1, 2, 3]\n"
     Path("s.toml").write_text(f'[head]\nname = "{face}"\n{told}')
     plain = Pose.coerce(assemble_scene("s.toml", SceneOptions())[0].pose)
@@ -74,13 +74,13 @@ def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
         ("--bone head=1,2,inf", "three angles in degrees"),
     ],
 )
-def test_what_is_no_pose(render: Run, face: str, words: str, says: str) -> None:
+def test_invalid_poses_are_refused(render: Run, face: str, words: str, says: str) -> None:
     ended = render(face, *words.split())
     assert ended.code == 2 and says in ended.stderr and "expected" in ended.stderr
     assert ended.stderr.count("\n") == 1
 
 
-def test_a_head_that_nothing_moves(render: Run, face: str) -> None:
+def test_a_head_without_rig_refuses_a_pose(render: Run, face: str) -> None:
     ended = render("head.obj", "--pose", "jawOpen=1")
     assert (
         ended.code == 2 and "it has none. Load a glTF file" in ended.stderr and "--names" not in ended.stderr

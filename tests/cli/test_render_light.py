@@ -32,7 +32,7 @@ def picture(render: Run, *words: str) -> Any:
     return read_image("a.exr")
 
 
-def test_an_environment_lights_alone_unless_lights_are_named(render: Run) -> None:
+def test_an_environment_replaces_the_default_lights(render: Run) -> None:
     one, studio = picture(render, "--env", "uniform"), picture(render, "--lights", "studio")
     both = picture(render, "--env", "uniform", "--lights", "studio")
     assert one.max() > 0.1 and studio.max() > 0.1
@@ -41,7 +41,7 @@ def test_an_environment_lights_alone_unless_lights_are_named(render: Run) -> Non
     assert np.allclose(picture(render, "--env", "uniform", "--env-exposure", "2"), 2 * one, rtol=1e-4)
 
 
-def test_the_environment_is_shown_when_asked(render: Run, sky: str) -> None:
+def test_the_environment_is_drawn_on_request(render: Run, sky: str) -> None:
     words = ("--env", sky, "--occlusion", "none", "--samples", "1")
     plain, shown = picture(render, *words), picture(render, *words, "--background", "environment")
     behind = plain.max(axis=-1) == 0
@@ -49,7 +49,7 @@ def test_the_environment_is_shown_when_asked(render: Run, sky: str) -> None:
     assert np.array_equal(shown[~behind], plain[~behind])
 
 
-def test_peaks_are_told(render: Run, sky: str) -> None:
+def test_sun_like_peaks_are_noted(render: Run, sky: str) -> None:
     ended = render("head.obj", "--env", sky, "-o", "a.exr", "--exposure", "0.1")
     assert (ended.code, ended.stderr) == (
         0,
@@ -76,7 +76,7 @@ def test_a_scenes_environment_can_be_changed(render: Run, folder: Path, sky: str
     assert np.allclose(read_image("b.exr"), whole)
 
 
-def test_wrong_gamma_is_marked(render: Run) -> None:
+def test_wrong_gamma_is_noted(render: Run) -> None:
     dim = ("head.obj", "--exposure", "0.5")
     right = render(*dim, "-o", "a.png", "--gamma", "right")
     wrong = render(*dim, "-o", "b.png", "--gamma", "wrong")

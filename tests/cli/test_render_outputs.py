@@ -26,7 +26,7 @@ def parts(path: Path) -> dict[str, dict[str, np.ndarray]]:
     return {one.name(): {name: found.pixels for name, found in one.channels.items()} for one in file.parts}
 
 
-def test_one_file_of_parts_and_files_beside_hold_the_same(render: Run, folder: Path) -> None:
+def test_one_exr_and_separate_files_have_equal_outputs(render: Run, folder: Path) -> None:
     names = ["depth", "normal", "triangle", "uv", "alpha"]
     asked = ("--samples", "1", "--outputs", ",".join(names))
     ended = render("head.obj", *asked, "-o", "all.exr", "--json")
@@ -52,7 +52,7 @@ def test_one_file_of_parts_and_files_beside_hold_the_same(render: Run, folder: P
     assert ((triangle < 0) == (depth == 0)).all() and np.load(folder / "f.normal.npy").shape == (64, 64, 3)
 
 
-def test_pngs_hold_steps(render: Run, folder: Path) -> None:
+def test_png_outputs_are_quantised(render: Run, folder: Path) -> None:
     ended = render(
         "head.obj", "--outputs", "depth,normal_camera,uv", "-o", "a.png", "--outputs-format", "png"
     )
@@ -68,13 +68,13 @@ def test_pngs_hold_steps(render: Run, folder: Path) -> None:
     assert not read_image(folder / "a.uv.png")[..., 2].any()
 
 
-def test_an_exr_with_files_beside_is_a_plain_one(render: Run, folder: Path) -> None:
+def test_an_exr_with_separate_outputs_has_one_part(render: Run, folder: Path) -> None:
     ended = render("head.obj", "--outputs", "depth", "-o", "f.exr", "--outputs-format", "png")
     assert ended.code == 0 and list(parts(folder / "f.exr")) != ["rgba", "depth"]
     assert {path.name for path in folder.iterdir()} == {"head.obj", "f.exr", "f.depth.png"}
 
 
-def test_a_single_picture_has_no_motion_and_says_so(render: Run, folder: Path) -> None:
+def test_motion_of_a_single_picture_is_noted(render: Run, folder: Path) -> None:
     ended = render("head.obj", "--outputs", "motion", "-o", "f.png", "--outputs-format", "npy")
     assert "note: motion is 0 in a single picture" in ended.stderr
     assert not np.load(folder / "f.motion.npy").any()
@@ -104,13 +104,13 @@ def test_numbers_of_any_channels_are_encoded() -> None:
         (["--outputs-format", "png"], "--outputs-format: expected the option --outputs"),
     ],
 )
-def test_what_cannot_be_is_refused_before_any_work(
+def test_impossible_outputs_are_refused_before_rendering(
     refused: Callable[..., Any], words: list[str], said: str
 ) -> None:
     assert re.search(said, refused("head.obj", *words)[0])
 
 
-def test_a_place_that_is_taken_is_refused_before_any_work(render: Run, folder: Path) -> None:
+def test_unwritable_outputs_are_refused_before_rendering(render: Run, folder: Path) -> None:
     (folder / "f.depth.exr").mkdir()
     ended = render("head.obj", "--outputs", "normal,depth", "-o", "f.png")
     assert ended.code == 2 and "f.depth.exr: expected a file or a free name" in ended.stderr

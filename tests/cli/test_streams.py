@@ -42,20 +42,20 @@ def _shell(line: str, folder: Path, **more: str) -> Ended:
 
 @pytest.mark.parametrize("words", [HELP, CITE])
 @pytest.mark.parametrize("sink", SINKS)
-def test_what_cannot_be_written_is_told_once(words: str, sink: str, tmp_path: Path) -> None:
+def test_a_failed_write_is_reported_once(words: str, sink: str, tmp_path: Path) -> None:
     where, code, said = SINKS[sink]
     assert _shell(f"dermis {words} {where}", tmp_path) == (code, "", said)
 
 
 @pytest.mark.parametrize("words", ["--help", HELP, CITE, "cite nobody"])
-def test_a_reader_that_leaves_early_is_no_fault(words: str, tmp_path: Path) -> None:
+def test_a_closed_pipe_is_not_an_error(words: str, tmp_path: Path) -> None:
     wrong = 2 * (words == "cite nobody")
     ended = _shell(f"{{ dermis {words}; echo $? >code; }} | true", tmp_path)
     assert (ended.code, ended.stdout) == (0, "") and (tmp_path / "code").read_text() == f"{wrong}\n"
     assert ended.stderr.count("\n") == bool(wrong)
 
 
-def test_letters_that_the_stream_lacks_are_written_as_numbers(tmp_path: Path) -> None:
+def test_unencodable_characters_are_escaped(tmp_path: Path) -> None:
     lines = _shell("dermis cite Kienle1998", tmp_path, PYTHONIOENCODING="utf-8").stdout
     plain = _shell("dermis cite Kienle1998", tmp_path, PYTHONIOENCODING="ascii", LANG="C")
     assert (plain.code, plain.stderr) == (0, "") and plain.stdout.isascii()
@@ -66,20 +66,20 @@ def test_letters_that_the_stream_lacks_are_written_as_numbers(tmp_path: Path) ->
 SMALL = "head.obj --size 32x32 --atlas 64 --adapter cpu"
 
 
-def test_no_file_gets_the_number_of_a_closed_stream(folder: Path) -> None:
+def test_descriptors_of_closed_streams_are_reserved(folder: Path) -> None:
     """Otherwise libraries would print into it."""
     assert _shell(f"dermis render {SMALL} -o a.png >&- 2>&- <&-", folder).code == 2
     data = (folder / "a.png").read_bytes()
     assert data.startswith(b"\x89PNG") and data.endswith(b"IEND\xaeB`\x82")
 
 
-def test_a_name_that_is_no_text_is_told(tmp_path: Path) -> None:
+def test_an_undecodable_file_name_is_printed(tmp_path: Path) -> None:
     ended = _shell("dermis head -o $(printf 'a\\377.json')", tmp_path)
     assert ended.code == 0 and ended.stdout.startswith("a\\udcff.json  ") and ended.stderr == ""
     assert (tmp_path / os.fsdecode(b"a\xff.json")).exists()
 
 
-def test_a_bar_outlives_its_terminal() -> None:
+def test_a_progress_bar_survives_its_terminal() -> None:
     master, slave = os.openpty()
     code = """
 import sys
@@ -101,7 +101,7 @@ sys.stdout.write("done")
     assert ran.returncode == 0
 
 
-def test_a_stream_that_is_full_for_a_while_gets_all() -> None:
+def test_a_full_non_blocking_stream_receives_all_data() -> None:
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     code = """
@@ -119,7 +119,7 @@ with StandardStreams() as streams:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
-def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
+def test_a_blocked_reader_does_not_delay_the_exit() -> None:
     code = """
 import dermis.cli, sys
 from dermis.base.console import print_lines

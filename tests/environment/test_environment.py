@@ -82,7 +82,7 @@ def test_resampling_keeps_the_light(height: int) -> None:
 
 
 @pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
-def test_any_size_is_taken(tmp_path: Path, height: int, kept: int) -> None:
+def test_any_size_is_accepted(tmp_path: Path, height: int, kept: int) -> None:
     """Check a prime number of rows, and two texels."""
     pixels = np.random.default_rng(height).uniform(0, 2, (height, 2 * height, 3)).astype(np.float32)
     write_exr(tmp_path / "sky.exr", pixels)
@@ -105,7 +105,7 @@ def test_a_lamp_becomes_a_sun_and_no_light_is_lost() -> None:
     assert luminance(rest).max() < luminance(radiance).max() / 10
 
 
-def test_stars_brighter_than_the_sun_do_not_keep_it_from_shining() -> None:
+def test_bright_stars_do_not_prevent_a_sun() -> None:
     """Check that suns are selected by irradiance, not by radiance."""
     towards = np.array([0.3, 0.8, 0.2]) / np.linalg.norm([0.3, 0.8, 0.2])
     radiance = with_lamp(room(), (0.3, 0.8, 0.2), 900.0)
@@ -129,7 +129,7 @@ def test_a_soft_room_has_no_sun() -> None:
     assert suns == [] and np.array_equal(rest, room())
 
 
-def test_harmonics_give_back_what_they_hold() -> None:
+def test_harmonics_round_trip() -> None:
     """Check analysis and synthesis of a picture of low degree."""
     x, y, z = np.moveaxis(directions(256, 512), -1, 0)
     picture = np.stack([1 + x * y, z**3 - 0.2 * z, x**2 - z**2 + 0.1 * y], axis=-1)
@@ -137,7 +137,7 @@ def test_harmonics_give_back_what_they_hold() -> None:
     assert np.abs(again - picture).max() < PREFILTERED
 
 
-def test_cosine_kernel_is_the_known_one() -> None:
+def test_cosine_kernel_matches_the_published_factors() -> None:
     """Check the factors pi, 2 pi / 3, pi / 4, 0, -pi / 24 [RamamoorthiHanrahan2001]."""
     expected = [np.pi, 2 * np.pi / 3, np.pi / 4, 0, -np.pi / 24]
     assert np.allclose(zonal_factors(np.cos, 4), expected, atol=1e-6)
@@ -152,7 +152,7 @@ def lamps(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
     return str(path), radiance.astype(np.float64)
 
 
-def test_irradiance_is_the_plain_sum(lamps: tuple[str, Floats]) -> None:
+def test_irradiance_matches_direct_summation(lamps: tuple[str, Floats]) -> None:
     name, radiance = lamps
     made = prefilter(name)
     assert made.suns == ()
@@ -163,7 +163,7 @@ def test_irradiance_is_the_plain_sum(lamps: tuple[str, Floats]) -> None:
 
 
 @pytest.mark.parametrize("layer", [1, 4, 7, 10])
-def test_reflections_are_the_plain_mean(lamps: tuple[str, Floats], layer: int) -> None:
+def test_reflections_match_direct_averaging(lamps: tuple[str, Floats], layer: int) -> None:
     name, radiance = lamps
     made, m = prefilter(name), float(ROUGHNESSES[layer - 1])
     towards, mirror = directions(256, 512), directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
@@ -193,7 +193,7 @@ def test_kernels_are_too_smooth_to_ring() -> None:
         )
 
 
-def test_samples_are_found(sample_folder: Path) -> None:
+def test_sample_environments_are_available(sample_folder: Path) -> None:
     made = prefilter("royal_esplanade")
     assert len(made.suns) == 3 and made.layers.max() < 40  # its brightest texel is 49,664
     assert all(sun.direction[1] > 0.8 for sun in made.suns)  # lamps in the ceiling
@@ -230,7 +230,7 @@ def test_a_grey_panorama_is_white_light(tmp_path: Path) -> None:
         assert np.allclose(load_panorama(str(tmp_path / "grey.exr")), 0.5)
 
 
-def test_what_is_no_panorama_is_refused(tmp_path: Path) -> None:
+def test_files_that_are_not_panoramas_are_refused(tmp_path: Path) -> None:
     square, bytes_ = tmp_path / "square.exr", tmp_path / "grey.png"
     write_exr(square, np.ones((8, 8, 3), np.float32))
     write_png(bytes_, np.full((8, 16, 3), 100, np.uint8))

@@ -18,7 +18,7 @@ from dermis.specular.models import MODELS
 Floats = NDArray[np.float64]
 
 
-def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
+def test_lobes_at_normal_view_equal_the_specular_lobe() -> None:
     """Check that their sum points along the normal and that their weights sum to 1."""
     table = isotropic_lobe_table()
     assert np.allclose(table[..., 3].sum(axis=-1), 1) and table[..., 3].min() >= 0
@@ -26,7 +26,7 @@ def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> None:
+def test_lobes_are_symmetric_about_the_plane_of_incidence(model: str) -> None:
     """Check that lobes outside of the plane of incidence are symmetric pairs."""
     table = isotropic_lobe_table(model)
     assert np.allclose(table[..., :3, 1], 0) and np.allclose(table[..., 3, 1], -table[..., 4, 1], atol=1e-4)
@@ -36,13 +36,13 @@ def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> Non
     )
 
 
-def test_mirrors_that_are_looked_up_are_five_at_most_and_three_at_steep_views() -> None:
+def test_at_most_five_lobes_and_three_at_steep_views_have_weight() -> None:
     weights = isotropic_lobe_table()[..., 3] > 0
     assert (weights.sum(axis=-1) == np.array([5] * 10 + [4] * 3 + [3] * 3)).all()
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
+def test_lobes_preserve_the_mean_direction(model: str) -> None:
     """Compare mean direction and width with samples of the hemisphere, at a node of the table."""
     light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
     cosine, m = (7 / 15) ** 2, LOBE_TABLE_ROUGHNESSES[6]
@@ -66,7 +66,7 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
     assert model in ("two-lobe", "phong", "phong-plain") or across > 0.97 * (weight * z**2).sum()
 
 
-def test_mirrors_of_another_packages_model_are_fitted_when_asked_for(
+def test_lobes_of_a_registered_model_are_fitted_on_demand(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Compare the two roughest rows of a fit on demand with the table."""
@@ -104,7 +104,9 @@ def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
         (0.5, 66, 0.035),
     ],
 )
-def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle: float, most: float) -> None:
+def test_reflections_match_the_specular_lobe(
+    lit_room: tuple[str, Floats], m: float, angle: float, most: float
+) -> None:
     """Compare with a direct sum of the whole lobe, over 24 views.
 
     Four lobes in the plane of incidence, with directions interpolated between columns of the table, have
@@ -115,7 +117,7 @@ def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle
 
 
 @pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.03), (0.4, 0.025), (0.2, 0.025)])
-def test_grazing_reflections_all_around_are_the_lobes(
+def test_grazing_reflections_match_the_specular_lobe(
     lit_room: tuple[str, Floats], cosine: float, most: float
 ) -> None:
     """Check roughness 0.3 over all azimuths; one isotropic lobe has errors of 7, 20 and 25 %."""

@@ -9,6 +9,12 @@ _TOKEN = re.compile(r'#[^\n]*|"((?:[^"\\\n])*)"|([\[\]])|([^\s"\[\]#]+)')
 _NUMBERS = {"Scale": 3, "Translate": 3, "LookAt": 9}
 _BARE = {"WorldBegin", "AttributeBegin", "AttributeEnd"}
 _NAMES = {"Texture": 3}  # words in quotes before parameters; one of all others
+_SURFACE = {
+    "reflectance": "rgb|texture",
+    "roughness": "float|texture",
+    "remaproughness": "bool",
+    "normalmap": "string",
+}
 _KNOWN: dict[str, dict[str, str]] = {
     "Camera perspective": {"fov": "float", "screenwindow": "float*"},
     "Sampler zsobol": {"pixelsamples": "integer"},
@@ -27,9 +33,10 @@ _KNOWN: dict[str, dict[str, str]] = {
     "AreaLightSource diffuse": {"L": "rgb"},
     "Shape bilinearmesh": {"P": "point3*"},
     "Shape sphere": {"radius": "float"},
-    "Shape plymesh": {"filename": "string"},
+    "Shape plymesh": {"filename": "string", "alpha": "texture"},
     "Texture imagemap": {"filename": "string", "encoding": "string", "wrap": "string"},
-    "Material coateddiffuse": {"reflectance": "rgb", "roughness": "float", "remaproughness": "bool"},
+    "Material coateddiffuse": _SURFACE,
+    "Material mix": {"materials": "string*", "amount": "texture"},
     "Material subsurface": {
         "reflectance": "rgb|texture",
         "mfp": "rgb",
@@ -78,7 +85,9 @@ def _directive(word: str, tokens: list[tuple[str, ...]], position: int) -> tuple
         return Directive(word, [], [float(one[2]) for one in tokens[position:end]], {}), end
     count = _NAMES.get(word, 1)
     names = [one[0] for one in tokens[position : position + count]]
-    known, position, parameters = _KNOWN[f"{word} {names[-1]}"], position + count, {}
+    # The type of a named material is its first parameter.
+    known = {"type": "string", **_SURFACE} if word == "MakeNamedMaterial" else _KNOWN[f"{word} {names[-1]}"]
+    position, parameters = position + count, dict[str, list[str]]()
     while position < len(tokens) and tokens[position][0] is not None:
         kind, name = tokens[position][0].split(" ")
         assert name in known and kind in known[name].rstrip("*").split("|"), tokens[position]

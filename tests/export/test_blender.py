@@ -44,7 +44,7 @@ def skin1() -> Subject:
     return load_subject("skin1")
 
 
-def test_walks_return_what_half_spaces_do() -> None:
+def test_random_walk_albedo_matches_the_half_space() -> None:
     for alpha in (0.2, 0.41, 0.7, 0.9, 0.98):
         total = float(walk_cdf(np.array([1e6]), alpha, "straight")[0])
         assert total == pytest.approx(float(directional_albedo(1.0, alpha)), abs=2e-3)
@@ -53,12 +53,12 @@ def test_walks_return_what_half_spaces_do() -> None:
 
 
 @pytest.mark.parametrize(("formula", "tolerance"), [(hulst_albedo, 0.003), (legacy_albedo, 0.03)])
-def test_albedos_of_walks_return_the_colour(formula: Any, tolerance: float) -> None:
+def test_random_walk_albedo_reproduces_the_colour(formula: Any, tolerance: float) -> None:
     for colour in (0.1, 0.3, 0.5, 0.8):
         assert diffuse_albedo(float(formula(colour))) == pytest.approx(colour, abs=tolerance)
 
 
-def test_published_diffuse_paths_are_the_radius_of_the_skin_walk() -> None:
+def test_published_diffuse_mean_free_paths_equal_the_skin_walk_radius() -> None:
     """[Jensen2001] tabulates the diffuse path of skin1; its coefficients give the mean free path."""
     (layer,) = media()["skin1"].layers
     path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
@@ -73,7 +73,7 @@ def test_burley_is_cut_at_16_lengths_and_stretched_in_eevee() -> None:
     assert burley_shape_factor([0.8, 0.8, 0.24]) == pytest.approx([1.04, 1.04, 2.475])
 
 
-def test_radii_are_those_of_the_method(skin1: Subject) -> None:
+def test_radii_depend_on_the_subsurface_method(skin1: Subject) -> None:
     d = fit_burley_width(skin1.curve)
 
     def radius(variant: str, version: str) -> np.ndarray[Any, Any]:
@@ -89,7 +89,7 @@ def test_radii_are_those_of_the_method(skin1: Subject) -> None:
 
 
 @pytest.mark.parametrize("variant", TARGET.variants)
-def test_parameters_are_better_than_what_is_typed_in(skin1: Subject, variant: str) -> None:
+def test_fitted_parameters_beat_typed_values(skin1: Subject, variant: str) -> None:
     target = TARGET.with_variant(variant)
     errors = [
         curve_error(skin1.curve, target.predicted_curve(rows(skin1, "5.2"), skin1, "5.2"))
@@ -114,7 +114,7 @@ def export_in(text: str) -> dict[str, Any]:
     return found
 
 
-def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
+def test_ball_script_contains_no_local_paths(tmp_path: Path) -> None:
     report = export_skin("skin1", "blender", tmp_path / "skin", version="5.2", variant="random-walk")
     assert {file.name for file in (tmp_path / "skin").iterdir()} == {"skin.py", "README.md", "export.json"}
     text = (tmp_path / "skin" / "skin.py").read_text("utf-8")
@@ -125,7 +125,7 @@ def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
     assert (export["method"], export["versions"], export["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
 
 
-def test_head_lies_beside_its_script(tmp_path: Path) -> None:
+def test_head_file_is_written_next_to_the_script(tmp_path: Path) -> None:
     head = write_head(tmp_path / "a'\"; head.obj")
     export_skin(head, "blender", tmp_path / "made.py", variant="burley", profile="skin1")
     text = (tmp_path / "made.py").read_text("utf-8")
@@ -135,7 +135,7 @@ def test_head_lies_beside_its_script(tmp_path: Path) -> None:
     assert export["versions"] == [[4, 5], None] and str(tmp_path) not in text
 
 
-def test_names_are_words_and_never_code() -> None:
+def test_names_are_quoted_as_strings_in_the_script() -> None:
     usual, hostile = (script_text({"name": name, "lights": [1.5, None]}) for name in ("head", HOSTILE))
     assert export_in(hostile) == {"name": HOSTILE, "lights": [1.5, None]}
     trees = [ast.parse(text) for text in (usual, hostile)]
@@ -144,7 +144,7 @@ def test_names_are_words_and_never_code() -> None:
     assert ast.dump(trees[0]) == ast.dump(trees[1])
 
 
-def test_script_refuses_a_blender_in_which_radii_mean_something_else(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_script_refuses_blender_versions_with_other_radius_meaning(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, parts in {
         "bpy": {"app": SimpleNamespace(version=(5, 2, 3))},
         "mathutils": {"Matrix": None},

@@ -70,7 +70,7 @@ def test_head_is_saved_upright_with_its_skin(tmp_path: Path, version: str) -> No
     assert "head.obj" in answer["name"]
 
 
-def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -> None:
+def test_parameters_of_another_blender_version_are_refused(tmp_path: Path, version: str) -> None:
     other = "4.5" if version == "5.2" else "5.2"
     with pytest.raises(
         DermisError, match=r"to create the scene, but it failed \(this file: expected Blender from"
@@ -80,7 +80,7 @@ def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -
 
 
 @pytest.mark.parametrize("variant", ["random-walk-skin", "random-walk", "burley"])
-def test_cycles_shows_the_edge_that_was_predicted(tmp_path: Path, version: str, variant: str) -> None:
+def test_cycles_renders_the_predicted_edge_response(tmp_path: Path, version: str, variant: str) -> None:
     """Red channel within 4 mm of an edge of light; the benchmark has all channels with less noise."""
     subject, target = load_subject("skin1"), TARGET.with_variant(variant)
     rows = target.parameters(subject, version)

@@ -14,7 +14,7 @@ from dermis.optics.half_space import half_space, tabulated_albedo
 WHITE = np.ones(3)
 
 
-def test_edge_of_a_gaussian_is_its_error_function() -> None:
+def test_edge_response_of_a_gaussian_is_the_error_function() -> None:
     from scipy.special import erf
 
     sigma = np.array([0.2, 0.5, 1.3])
@@ -29,14 +29,14 @@ def test_fit_of_a_lobe_finds_its_width() -> None:
     np.testing.assert_allclose(fit_burley_width(burley_curve(d, WHITE)), d, rtol=1e-5)
 
 
-def test_a_fit_is_the_best_there_is(dj3: Subject) -> None:
+def test_lobe_fit_is_a_minimum(dj3: Subject) -> None:
     d = fit_burley_width(dj3.curve)
     best = curve_error(dj3.curve, burley_curve(d, WHITE)).cdf
     for factor in (0.97, 1.03):
         assert (curve_error(dj3.curve, burley_curve(factor * d, WHITE)).cdf > best).all()
 
 
-def test_deviation_from_itself_is_none_and_grows_with_the_width() -> None:
+def test_deviation_is_zero_for_equal_profiles_and_grows_with_width() -> None:
     one = burley_curve([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
     none = curve_error(one, one)
     assert not none.cdf.any() and not none.edge.any() and not none.energy.any()
@@ -50,21 +50,19 @@ def test_deviation_from_itself_is_none_and_grows_with_the_width() -> None:
     ("albedo", "total"),
     [(0.5, 0.05381), (0.9, 0.25739), (0.98, 0.51859), (0.995, 0.70942)],
 )
-def test_half_spaces_have_the_totals_of_independent_monte_carlo(albedo: float, total: float) -> None:
+def test_half_space_albedo_matches_independent_monte_carlo(albedo: float, total: float) -> None:
     curve = half_space("skin", np.full(3, albedo), WHITE)
     np.testing.assert_allclose(curve.energy, total, rtol=0.006)
     np.testing.assert_allclose(tabulated_albedo("skin", curve.energy), albedo, atol=1e-3)
 
 
-def test_matched_half_space_has_the_total_of_chandrasekhar() -> None:
+def test_matched_half_space_has_the_chandrasekhar_albedo() -> None:
     """1 - H(1) sqrt(1 - a) of isotropic scattering, a = 0.9, H(1) = 1.8501."""
     total = half_space("matched", np.full(3, 0.9), WHITE).energy
     np.testing.assert_allclose(total, 0.4149, atol=0.003)
 
 
-def test_tissue_of_one_layer_is_by_monte_carlo_and_of_several_by_its_model(
-    skin1: Subject, dj3: Subject
-) -> None:
+def test_one_layer_uses_monte_carlo_and_several_use_the_layer_model(skin1: Subject, dj3: Subject) -> None:
     assert (skin1.model, dj3.model, load_subject("gpu-gems-3").model) == ("montecarlo", "layered", "table")
     layered = load_subject("skin1", model="layered")
     assert layered.model == "layered"
@@ -72,7 +70,7 @@ def test_tissue_of_one_layer_is_by_monte_carlo_and_of_several_by_its_model(
     np.testing.assert_allclose(layered.curve.energy, skin1.curve.energy, rtol=0.3)
 
 
-def test_homogeneous_medium_of_a_homogeneous_skin_is_itself(skin1: Subject) -> None:
+def test_equivalent_medium_of_homogeneous_skin_is_unchanged(skin1: Subject) -> None:
     found = fit_homogeneous_medium(skin1.curve)
     assert skin1.tissue is not None
     layer = skin1.tissue.medium.layers[0]
@@ -80,20 +78,20 @@ def test_homogeneous_medium_of_a_homogeneous_skin_is_itself(skin1: Subject) -> N
     np.testing.assert_allclose(found.mfp_mm, layer.mean_free_path_mm, rtol=1e-3)
 
 
-def test_homogeneous_medium_of_layers_has_their_energy_and_tells_its_error(dj3: Subject) -> None:
+def test_equivalent_medium_of_layers_keeps_energy_and_reports_its_error(dj3: Subject) -> None:
     error = curve_error(dj3.curve, fit_homogeneous_medium(dj3.curve).curve)
     assert np.abs(error.energy).max() < 1e-3
     assert 0.05 < error.cdf[0] < 0.2
 
 
-def test_spectral_skin_is_per_light_that_enters() -> None:
+def test_spectral_skin_is_normalised_to_entering_light() -> None:
     skin = load_subject("medium")
     assert skin.tissue is not None
     expected = skin.tissue.profile().total
     np.testing.assert_allclose(skin.curve.energy * (1.0 - (0.4 / 2.4) ** 2), expected, rtol=1e-9)
 
 
-def test_words_that_stand_for_nothing_are_refused() -> None:
+def test_unknown_names_are_refused() -> None:
     with pytest.raises(DermisError, match="profile nosuch"):
         load_subject("nosuch")
     with pytest.raises(DermisError, match="model: expected one of montecarlo"):

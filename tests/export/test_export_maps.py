@@ -61,7 +61,7 @@ def relative_rmse(found: NDArray[Any], expected: NDArray[Any]) -> float:
     return float(np.sqrt(((found - expected) ** 2).mean() / (expected**2).mean()))
 
 
-def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, baked: BakedMaps) -> None:
+def test_maps_equal_the_rendered_frame(renderer: Renderer, scene: Scene, baked: BakedMaps) -> None:
     drawn = renderer.draw(scene, SETTINGS, outputs=OUTPUTS)
     seen = {name: drawn.output(name) for name in OUTPUTS}
     skin = seen["thickness"] > 0
@@ -91,7 +91,7 @@ def test_a_head_drawn_with_the_maps_looks_the_same(
     assert relative_rmse(after, before) < DRAWN
 
 
-def test_nothing_beside_the_skin_is_black(baked: BakedMaps) -> None:
+def test_texels_outside_the_skin_are_not_black(baked: BakedMaps) -> None:
     assert 0.4 < baked.covered.mean() < 0.95
     albedo = baked.maps["albedo"]
     assert albedo.min() > 0.0
@@ -99,7 +99,7 @@ def test_nothing_beside_the_skin_is_black(baked: BakedMaps) -> None:
     np.testing.assert_allclose(np.linalg.norm(baked.maps["normal"], axis=-1), 1.0, atol=1e-5)
 
 
-def test_skin_without_pigments_or_thin_parts_says_so(renderer: Renderer, scene: Scene) -> None:
+def test_missing_pigments_and_thin_parts_are_noted(renderer: Renderer, scene: Scene) -> None:
     plain = replace(scene.head, maps=Maps())
     small = SETTINGS.model_copy(update={"transmission": "none"})
     found = bake(renderer, scene.replace(head=plain, skin={"profile": "gpu-gems-3"}), small, 256)
@@ -107,7 +107,7 @@ def test_skin_without_pigments_or_thin_parts_says_so(renderer: Renderer, scene: 
     assert not set(found.absent) & set(found.maps)
 
 
-def test_files_read_back_as_the_json_says(tmp_path: Path) -> None:
+def test_files_read_back_with_the_range_stated_in_json(tmp_path: Path) -> None:
     folder = tmp_path / "maps"
     report = export_skin("human:7", "maps", folder, side=256, adapter="cpu", variant="directx")
     content = json.loads((folder / "maps.json").read_text("utf-8"))
@@ -136,7 +136,7 @@ def _decode_png(levels: NDArray[Any], info: dict[str, Any]) -> NDArray[Any]:
     return np.asarray(rules.get(info["png"], fraction))
 
 
-def test_green_turns_for_directx() -> None:
+def test_green_channel_is_inverted_for_directx() -> None:
     normal = np.array([[[0.1, 0.2, 0.97]]], np.float32)
     np.testing.assert_array_equal(orient_green(normal, "up"), normal)
     np.testing.assert_allclose(orient_green(normal, "down"), [[[0.1, -0.2, 0.97]]])

@@ -30,7 +30,7 @@ EVIL = '"; import os; os._exit(3) # \n'
 
 
 @pytest.mark.parametrize("name", LOBES)
-def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
+def test_parameters_reproduce_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
     target = TARGETS[name].with_variant(None)
     for version in target.versions:
         predicted = target.predicted_curve(target.parameters(skin1, version), skin1, version)
@@ -38,7 +38,7 @@ def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subje
 
 
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])
-def test_what_is_written_is_better_than_what_is_typed(name: str, dj3: Subject) -> None:
+def test_exported_values_beat_typed_values(name: str, dj3: Subject) -> None:
     target = TARGETS[name].with_variant(None)
     report = evaluate_export(dj3, target, target.versions[-1])
     assert (report.error.cdf < report.naive_error.cdf).all()
@@ -56,7 +56,7 @@ def test_unity_reads_its_asset_back(skin1: Subject, tmp_path: Path) -> None:
     assert (content["m_Version"], content["m_Name"], own["worldScale"], own["hash"]) == (2, "skin", 1, 0)
 
 
-def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> None:
+def test_unity_before_14_stores_the_width_in_the_colour_only(skin1: Subject) -> None:
     rows = TARGETS["unity"].parameters(skin1, "12")
     text = asset_text("skin", rows, "12")
     assert "scatteringDistanceMultiplier" not in text and "m_Version: 1\n" in text
@@ -116,7 +116,7 @@ def test_unreal_runs_its_script(
 
 
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])
-def test_names_do_no_harm(name: str, skin1: Subject, tmp_path: Path) -> None:
+def test_hostile_names_are_escaped(name: str, skin1: Subject, tmp_path: Path) -> None:
     evil = Subject(EVIL, skin1.curve, skin1.albedo, skin1.model, skin1.tissue)
     assert evil.identifier.isidentifier()
     report = export_skin(
@@ -133,14 +133,14 @@ def test_names_do_no_harm(name: str, skin1: Subject, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["renderman", "arnold"])
-def test_values_are_marked_as_not_run(name: str, skin1: Subject, tmp_path: Path) -> None:
+def test_values_are_marked_as_not_rendered(name: str, skin1: Subject, tmp_path: Path) -> None:
     export_skin(skin1, name, tmp_path / "values.json")
     content = json.loads((tmp_path / "values.json").read_text("utf-8"))
     assert content["status"].startswith("not run") and content["parameters"]
     assert all(row["unit"] and row["meaning"] for row in content["parameters"].values())
 
 
-def test_a_folder_is_replaced_only_where_it_is_an_export(skin1: Subject, tmp_path: Path) -> None:
+def test_only_export_folders_are_replaced(skin1: Subject, tmp_path: Path) -> None:
     folder = tmp_path / "exported"
     for _ in range(2):
         export_skin(skin1, "unity", folder)
@@ -152,7 +152,7 @@ def test_a_folder_is_replaced_only_where_it_is_an_export(skin1: Subject, tmp_pat
     assert sorted(one.name for one in tmp_path.iterdir()) == ["exported", "own"]
 
 
-def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Path) -> None:
+def test_unknown_names_are_reported_with_known_ones(skin1: Subject, tmp_path: Path) -> None:
     with pytest.raises(DermisError, match="target: expected one of arnold, "):
         export_skin(skin1, "quake", tmp_path / "x")
     with pytest.raises(DermisError, match=r"a supported version of Unity HDRP: 12, 14, 17, but got '3'"):
@@ -164,7 +164,7 @@ def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_written_names_the_file_and_not_its_folder(tmp_path: Path) -> None:
+def test_written_files_contain_the_file_name_without_folder(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("variances_mm2 = [0.1, 2.0]\nweights = [[0.3, 0.2, 0.1], [0.3, 0.1, 0.1]]\n")
     files = export_skin(load_subject(file), "unity", tmp_path / "out").files
@@ -172,7 +172,7 @@ def test_what_is_written_names_the_file_and_not_its_folder(tmp_path: Path) -> No
     assert all(str(tmp_path).encode() not in path.read_bytes() for path in files)
 
 
-def test_a_target_of_another_package(tmp_path: Path) -> None:
+def test_registered_target_is_exported(tmp_path: Path) -> None:
     class Toy(Unity):
         name = "toy"
         title = "Toy"

@@ -62,7 +62,7 @@ def skin_of(file: Path) -> dict[str, Any]:
     return dict(found)
 
 
-def test_the_inversion_is_van_de_hulsts() -> None:
+def test_albedo_inversion_matches_van_de_hulst() -> None:
     """The draft prints one direction; the other is the published inverse of the approximation."""
     albedo = np.array([0.3, 0.7, 0.9, 0.99, 0.999])
     np.testing.assert_allclose(single_scattering_albedo(multiscatter_colour(albedo)), albedo, atol=2e-5)
@@ -71,7 +71,7 @@ def test_the_inversion_is_van_de_hulsts() -> None:
     assert single_scattering_albedo(0.5, 0.8) > single_scattering_albedo(0.5)
 
 
-def test_a_volume_keeps_its_paths() -> None:
+def test_volume_keeps_the_mean_free_paths() -> None:
     """Colours stay within 0 and 1 for any ratio of the channels."""
     paths = np.array([1.3, 0.9, 0.05])
     volume = volume_from_paths(paths, (0.6, 0.4, 0.2))
@@ -80,7 +80,7 @@ def test_a_volume_keeps_its_paths() -> None:
 
 
 @pytest.mark.parametrize("name", ["skin1", "skin2", "marble"])
-def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
+def test_homogeneous_skin_is_exported_unchanged(name: str) -> None:
     """The fit finds the mean free path and albedo of the tissue."""
     tissue, subject = load_tissue(name), load_subject(name)
     volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
@@ -90,7 +90,7 @@ def test_a_homogeneous_skin_is_shown_as_it_is(name: str) -> None:
     assert found.cdf.max() < 0.003 and found.edge.max() < 0.001 and np.abs(found.energy).max() < 0.005
 
 
-def test_the_colour_itself_would_lose_light() -> None:
+def test_albedo_without_inversion_would_lose_light() -> None:
     """Below a refracting surface, half of the red light of skin1 would be lost, as the documentation says."""
     subject = load_subject("skin1")
     volume = fit_volume(subject.curve)
@@ -104,7 +104,7 @@ def test_the_colour_itself_would_lose_light() -> None:
 
 
 @pytest.mark.parametrize("name", ["skin1", "dj3"])
-def test_what_one_would_type_is_worse(name: str) -> None:
+def test_typed_values_have_larger_error(name: str) -> None:
     subject = load_subject(name)
     target = TARGET.with_variant(None)
     best, naive = (
@@ -115,7 +115,7 @@ def test_what_one_would_type_is_worse(name: str) -> None:
     assert best.cdf.max() < (0.005 if name == "skin1" else 0.2) and best.cdf.sum() < naive.cdf.sum()
 
 
-def test_nothing_spreads_without_scattering() -> None:
+def test_no_scattering_means_no_spread() -> None:
     subject, target = load_subject("skin1"), TARGET.with_variant(TRANSMISSION_VARIANT)
     rows = target.parameters(subject, "2.0")
     found = curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
@@ -126,7 +126,7 @@ def test_nothing_spreads_without_scattering() -> None:
     assert red == 1.0 > green > blue > 0.0
 
 
-def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
+def test_skin_without_head_is_exported_as_a_ball(tmp_path: Path) -> None:
     report = export_skin("skin1", "gltf", tmp_path / "ball.glb")
     document = check_rules(tmp_path / "ball.glb")
     tree, skin = document.tree, skin_of(tmp_path / "ball.glb")
@@ -144,7 +144,7 @@ def test_a_skin_alone_is_a_ball(tmp_path: Path) -> None:
         assert (tuple(written) if isinstance(written, list) else written) == row.value
 
 
-def test_a_heads_colours_are_those_of_the_map(person: dict[str, Path]) -> None:
+def test_head_colours_equal_the_map(person: dict[str, Path]) -> None:
     """Each texel of the multiscatter texture is the colour that reproduces the reflectance in the map."""
     from io import BytesIO
 
@@ -171,7 +171,7 @@ def test_diffuse_transmission_has_the_usual_colours(person: dict[str, Path]) -> 
 
 
 @pytest.mark.parametrize("variant", [SCATTER_VARIANT, TRANSMISSION_VARIANT])
-def test_this_package_reads_the_same_head_back(person: dict[str, Path], variant: str) -> None:
+def test_exported_head_reads_back_unchanged(person: dict[str, Path], variant: str) -> None:
     back = load_head(person[variant])
     assert back.maps.colour is not None and back.eyes is not None and "jawOpen" in back.targets
     linear = ((np.array([188, 137, 113]) / 255 + 0.055) / 1.055) ** 2.4
@@ -187,7 +187,7 @@ def test_the_khronos_validator_finds_no_errors(person: dict[str, Path], variant:
     assert all("KHR_materials_scatter" in one or TRANSMISSION in one for one in unknown)
 
 
-def test_names_stay_words(person: dict[str, Path]) -> None:
+def test_hostile_names_are_escaped(person: dict[str, Path]) -> None:
     """The name of a head is a JSON string, and the file contains no path of its source."""
     data = person[SCATTER_VARIANT].read_bytes()
     tree = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
@@ -195,7 +195,7 @@ def test_names_stay_words(person: dict[str, Path]) -> None:
     assert str(person[SCATTER_VARIANT].parent).encode() not in data
 
 
-def test_the_same_export_is_the_same_file(tmp_path: Path) -> None:
+def test_equal_exports_are_identical_files(tmp_path: Path) -> None:
     subject: Subject = load_subject("dj3")
     for name in ("a.glb", "b.glb"):
         export_skin(subject, "gltf", tmp_path / name)

@@ -37,7 +37,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
+def test_homogeneous_skin_keeps_its_medium() -> None:
     subject = load_subject("skin1")
     rows = TARGET.with_variant("smooth").parameters(subject, "3")
     layer = media()["skin1"].layers[0]
@@ -46,7 +46,7 @@ def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
 
 
 @pytest.mark.parametrize("boundary", TARGET.variants)
-def test_fitted_media_are_near_and_typed_ones_far(boundary: str) -> None:
+def test_fitted_media_are_closer_than_typed_ones(boundary: str) -> None:
     subject, target = load_subject("skin1"), TARGET.with_variant(boundary)
     fit, naive = target.parameters(subject, "3"), target.naive_parameters(subject, "3")
     near, far = (
@@ -57,7 +57,7 @@ def test_fitted_media_are_near_and_typed_ones_far(boundary: str) -> None:
     assert far.edge.min() > 0.1
 
 
-def test_dimmed_skin_has_a_brighter_medium() -> None:
+def test_medium_compensates_for_dimmed_skin() -> None:
     curve = load_subject("skin1").curve
     mean = np.array([0.3, 0.2, 0.1])
     plain, dimmed = SkinColours(mean, mean, 1.0), SkinColours(mean, 1.3 * mean, 1.3)
@@ -67,7 +67,7 @@ def test_dimmed_skin_has_a_brighter_medium() -> None:
         np.testing.assert_allclose(dimmed.transmittance(boundary), 1 / 1.3, rtol=1e-12)  # type: ignore[arg-type]
 
 
-def test_words_are_escaped_and_pictures_numbered() -> None:
+def test_names_are_escaped_and_pictures_numbered() -> None:
     backend = XmlBackend()
     made = object_element({"type": "ply", "filename": '"/><x a="&'}, "", backend)
     assert ET.fromstring(ET.tostring(made))[0].attrib["value"] == '"/><x a="&'
@@ -79,7 +79,7 @@ def test_words_are_escaped_and_pictures_numbered() -> None:
     assert len(backend.bitmaps) == 1
 
 
-def test_transforms_are_those_of_mitsuba(mi: Any) -> None:
+def test_transforms_match_mitsuba(mi: Any) -> None:
     given = [1.0, 2.0, 3.0], [-4.0, 0.5, 1.0], [0.0, 1.0, 0.2]
     own = Transform().look_at(*given).scale([2.0, 3.0, 1.0]).matrix
     with mitsuba_variant(mi, "scalar_rgb"):
@@ -88,7 +88,7 @@ def test_transforms_are_those_of_mitsuba(mi: Any) -> None:
     np.testing.assert_allclose(own, theirs, atol=1e-5)
 
 
-def test_divided_triangles_cover_the_whole() -> None:
+def test_subdivided_triangles_cover_the_original() -> None:
     found = subdivide_triangles(np.array([4, 7]), 3)
     assert len(found.corners) == 2 * 9
     np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
@@ -98,7 +98,7 @@ def test_divided_triangles_cover_the_whole() -> None:
     assert set(found.triangle.tolist()) == {4, 7}
 
 
-def test_the_scene_says_which_files_it_has(ball: Path) -> None:
+def test_scene_lists_its_files(ball: Path) -> None:
     for name in ("scene.xml", *(f"boundary_{each}.xml" for each in TARGET.variants)):
         for node in ET.parse(ball / name).iter("string"):
             if node.attrib["name"] == "filename":
@@ -122,7 +122,7 @@ def test_mitsuba_renders_the_scene(mi: Any, ball: Path, boundary: str) -> None:
         assert lit[:, 0].mean() > lit[:, 2].mean()
 
 
-def test_an_edge_of_light_is_as_predicted(mi: Any) -> None:
+def test_mitsuba_renders_the_predicted_edge_response(mi: Any) -> None:
     from dermis.apps.validation.engines import mitsuba as bench
 
     subject = load_subject("skin2")

@@ -22,7 +22,7 @@ import MaterialX
 EDGE = 0.015  # a matched walk against photons under a surface of index 1.4
 
 
-def test_a_walk_holds_homogeneous_skin_and_published_numbers_do_not() -> None:
+def test_random_walk_matches_homogeneous_skin_better_than_published_values() -> None:
     subject = load_subject("skin1")
     report = evaluate_export(subject, TARGET, "1.1.1")
     assert report.error.edge.max() < EDGE and report.error.cdf.max() < 0.04
@@ -31,7 +31,7 @@ def test_a_walk_holds_homogeneous_skin_and_published_numbers_do_not() -> None:
     np.testing.assert_allclose(naive, [3.67, 1.37, 0.68], rtol=0.01)  # [Jensen2001], printed
 
 
-def test_all_light_is_what_the_formula_returns() -> None:
+def test_total_albedo_equals_the_formula() -> None:
     subject = load_subject("skin1")
     parameters = TARGET.parameters(subject, "1.1.1")
     shown = TARGET.predicted_curve(parameters, subject, "1.1.1")
@@ -52,7 +52,7 @@ def test_radii_grow_with_the_skin() -> None:
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
 
 
-def test_a_profile_is_fitted_where_the_renderer_has_one() -> None:
+def test_profile_is_fitted_for_renderers_with_profiles() -> None:
     subject = load_subject("skin1")
     profile, walk = (TARGET.with_variant(one) for one in ("open-pbr-profile", "open-pbr"))
     assert evaluate_export(subject, profile, "1.1.1").error.edge.max() < EDGE
@@ -61,7 +61,7 @@ def test_a_profile_is_fitted_where_the_renderer_has_one() -> None:
 
 
 @pytest.mark.parametrize("variant", TARGET.variants)
-def test_the_document_has_what_was_told(variant: str, tmp_path: Path) -> None:
+def test_document_contains_the_given_values(variant: str, tmp_path: Path) -> None:
     report = export_skin("skin1", "openpbr", tmp_path / "skin.mtlx", variant=variant)
     document = MaterialX.createDocument()
     MaterialX.readFromXmlFile(document, str(tmp_path / "skin.mtlx"))

@@ -46,7 +46,7 @@ def read_back(document: Any) -> Any:
 
 
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD_SURFACE])
-def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
+def test_document_is_valid_after_reading_back(shader: str) -> None:
     document_read = read_back(build_document(materials(), shader, "a_"))
     nodes = {node.getName(): node for node in document_read.getNodes(shader)}
     assert set(nodes) == {"skin_surface", "left_eye_surface"}
@@ -57,7 +57,7 @@ def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
     assert radius.getUnit() == "meter" and radius.getValue() == pytest.approx(max(RADIUS_M))
 
 
-def test_pictures_have_their_colour_spaces() -> None:
+def test_pictures_state_their_colour_spaces() -> None:
     graph = read_back(build_document(materials(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
     files = {one.getName(): one.getInput("file") for one in graph.getNodes("image")}
     assert files["colour_image"].getColorSpace() == "srgb_texture"
@@ -67,13 +67,13 @@ def test_pictures_have_their_colour_spaces() -> None:
 
 @pytest.mark.parametrize("language", GENERATORS)
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD_SURFACE])
-def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
+def test_generated_code_converts_length_units(shader: str, language: str) -> None:
     code = generated(build_document(materials(), shader, "a_"), GENERATORS[language].create())
     assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one
     assert "srgb_texture_to_lin_rec709" in code
 
 
-def test_a_hostile_name_is_text() -> None:
+def test_hostile_names_are_escaped() -> None:
     document_read = read_back(build_document(materials(HOSTILE), OPEN_PBR, "a_"))
     named = [one for one in document_read.getMaterialNodes() if one.getAttribute("uiname")]
     assert HOSTILE in [one.getAttribute("uiname") for one in named]

@@ -28,7 +28,7 @@ def one_of(found: list[Directive], word: str, name: str) -> Directive:
 
 
 @pytest.mark.parametrize("name", ["skin1", "skin2"])
-def test_homogeneous_skin_is_nearly_its_own_medium(name: str) -> None:
+def test_homogeneous_skin_nearly_keeps_its_medium(name: str) -> None:
     subject = load_subject(name)
     report = evaluate_export(subject, TARGET, "4")
     assert report.error.edge.max() < DIFFUSION < report.naive_error.edge.max()
@@ -37,7 +37,7 @@ def test_homogeneous_skin_is_nearly_its_own_medium(name: str) -> None:
     np.testing.assert_allclose(paths, 1.0 / layer.sigma_t_prime, rtol=PATHS)
 
 
-def test_a_skin_comes_on_a_ball(tmp_path: Path) -> None:
+def test_skin_is_exported_on_a_ball(tmp_path: Path) -> None:
     report = export_skin("skin1", "pbrt", tmp_path / "ball.pbrt")
     found = read((tmp_path / "ball.pbrt").read_text())
     material = one_of(found, "Material", "subsurface").parameters
@@ -54,7 +54,7 @@ def test_a_skin_comes_on_a_ball(tmp_path: Path) -> None:
     assert ball.size_mm.max() == pytest.approx(100.0, rel=0.01)
 
 
-def test_a_head_comes_with_lights_and_camera(tmp_path: Path) -> None:
+def test_head_is_exported_with_lights_and_camera(tmp_path: Path) -> None:
     subject = load_subject(write_rigged_head(tmp_path / "face.glb"))
     assert subject.scene is not None
     lights = [
@@ -78,7 +78,7 @@ def test_a_head_comes_with_lights_and_camera(tmp_path: Path) -> None:
     assert normal @ (0.0 - corners.mean(axis=0)) > 0.0
 
 
-def test_no_name_of_a_user_is_in_the_scene(tmp_path: Path) -> None:
+def test_scene_contains_no_user_names(tmp_path: Path) -> None:
     name = 'a" Include "b'
     export_skin("skin1", "pbrt", tmp_path / f"{name}.pbrt")
     found = read((tmp_path / f"{name}.pbrt").read_text())

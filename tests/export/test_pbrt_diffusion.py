@@ -22,7 +22,7 @@ def test_darker_media_return_less() -> None:
 
 
 @pytest.mark.parametrize("albedo", [0.8, 0.95, 0.99])
-def test_it_is_near_counted_photons(albedo: float) -> None:
+def test_diffusion_matches_photon_counts(albedo: float) -> None:
     edges = np.array([0.0, 0.3, 1.0, 3.0, 10.0, 300.0])
     medium = Medium("test", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), ETA)
     simulated = trace_medium(medium, 40_000, edges_mm=edges)[0]

@@ -23,7 +23,7 @@ def surface(stage: Any, name: str = "skin") -> Any:
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd", ".usdz"])
-def test_a_skin_comes_on_a_ball(suffix: str, tmp_path: Path) -> None:
+def test_skin_is_exported_on_a_ball(suffix: str, tmp_path: Path) -> None:
     file = tmp_path / f"ball{suffix}"
     report = export_skin("skin1", "usd", file)
     stage = Usd.Stage.Open(str(file))
@@ -37,7 +37,7 @@ def test_a_skin_comes_on_a_ball(suffix: str, tmp_path: Path) -> None:
         assert ((value,) if len(exported) == 1 else tuple(value)) == pytest.approx(exported)
 
 
-def test_a_person_comes_in_one_package(tmp_path: Path) -> None:
+def test_person_is_exported_as_one_package(tmp_path: Path) -> None:
     file = tmp_path / "person.usdz"
     export_skin("human", "usd", file, side=256, adapter="cpu")
     with ZipFile(file) as package:

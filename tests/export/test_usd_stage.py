@@ -46,7 +46,7 @@ def write_stage(head: Head, path: Path, name: str = "head") -> Any:
     return Usd.Stage.Open(str(path))
 
 
-def test_points_come_back_in_metres(rigged: Head, tmp_path: Path) -> None:
+def test_points_read_back_in_metres(rigged: Head, tmp_path: Path) -> None:
     stage = write_stage(rigged, tmp_path / "head.usdc")
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0 and UsdGeom.GetStageUpAxis(stage) == "Y"
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh"))
@@ -66,14 +66,14 @@ def point_uv_set(points: Any, uv: Any) -> set[tuple[float, ...]]:
     return set(map(tuple, np.round(np.column_stack([points, np.array(uv)]), 5).tolist()))
 
 
-def test_quads_are_whole_again() -> None:
+def test_quads_are_restored() -> None:
     head = Human().head(subdivide=1)
     stage = build_stage(head, "head", mesh_materials(head), "a_")
     counts = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetFaceVertexCountsAttr().Get())
     assert (counts == 4).sum() == len(head.mesh.quads) and counts.sum() == 4 * len(head.mesh.quads)
 
 
-def test_targets_and_bones_move_it_as_ours_do(rigged: Head, tmp_path: Path) -> None:
+def test_targets_and_bones_deform_as_in_the_package(rigged: Head, tmp_path: Path) -> None:
     stage = write_stage(rigged, tmp_path / "head.usda")
     rest = UsdSkel.Animation(stage.GetPrimAtPath("/head/skeleton/rest"))
     names = list(rest.GetBlendShapesAttr().Get())
@@ -104,7 +104,7 @@ def test_validators_find_nothing(rigged: Head, tmp_path: Path) -> None:
     assert all("'ND_" in error.GetMessage() for error in found)
 
 
-def test_nodes_are_materialx_own(rigged: Head, tmp_path: Path) -> None:
+def test_nodes_are_defined_by_materialx(rigged: Head, tmp_path: Path) -> None:
     stage = write_stage(rigged, tmp_path / "head.usda")
     types = {"color3f": "color3", "float2": "vector2", "float3": "vector3", "asset": "filename"}
     kinds = set()
@@ -124,12 +124,12 @@ def test_nodes_are_materialx_own(rigged: Head, tmp_path: Path) -> None:
     assert {"ND_open_pbr_surface_surfaceshader", "ND_image_color3", "ND_normalmap_float"} <= kinds
 
 
-def test_a_hostile_name_is_a_name_alone(rigged: Head, tmp_path: Path) -> None:
+def test_hostile_names_become_valid_prim_names(rigged: Head, tmp_path: Path) -> None:
     stage = write_stage(rigged, tmp_path / "head.usda", HOSTILE)
     top = stage.GetDefaultPrim()
     assert top.GetDisplayName() == HOSTILE and Sdf.Path.IsValidIdentifier(top.GetName())
     assert [prim.GetName() for prim in top.GetChildren()] == ["mesh", "skeleton", "materials"]
 
 
-def test_names_stay_apart() -> None:
+def test_equal_names_are_made_unique() -> None:
     assert unique_usd_names(["a b", "a_b", "a-b"]) == ["a_b", "a_b_again1", "a_b_again2"]

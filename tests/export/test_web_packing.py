@@ -19,7 +19,7 @@ def test_differences_and_planes_can_be_undone() -> None:
     assert packer.add(words.tobytes()) == packer.add(words.tobytes()) == 0
 
 
-def test_letters_of_seven_bits_stand_in_a_page() -> None:
+def test_packed_text_is_ascii() -> None:
     data = np.random.default_rng(0).integers(0, 256, 4096, np.uint8).tobytes()
     text = encode_seven_bits(data)
     assert not {"\0", "\r", "<"} & set(text)
@@ -27,12 +27,12 @@ def test_letters_of_seven_bits_stand_in_a_page() -> None:
     assert bytes(int(bits[k : k + 8], 2) for k in range(0, 8 * len(data), 8)) == data
 
 
-def test_steps_are_no_more_than_half_a_step_away() -> None:
+def test_quantisation_error_is_at_most_half_a_step() -> None:
     values = np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32)
     assert (np.abs(quantise(values, (2.0**-8, 2.0**-14)) - values) <= [2.0**-9, 2.0**-15]).all()
 
 
-def test_maps_as_pictures_stay_near() -> None:
+def test_maps_stored_as_pictures_stay_close() -> None:
     x = np.linspace(0.0, 1.0, 64)
     texels = np.stack([np.outer(x, x), np.outer(x, 1 - x), -np.outer(x, x)], axis=-1).astype(np.float16)
     for colours in (False, True):

@@ -45,7 +45,7 @@ def page_text(subject: Subject, target: str, folder: Path) -> str:
     return (folder / "page.html").read_text("utf-8")
 
 
-def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp_path: Path) -> None:
+def test_scripts_match_the_content_security_policy(skin: Subject, target: str, tmp_path: Path) -> None:
     text = page_text(skin, target, tmp_path)
     policy = re.search(r'Security-Policy" content="([^"]*)"', text)
     assert policy is not None
@@ -60,7 +60,7 @@ def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp
     assert set(re.findall(r"https?://[^/\"' ]+", text)) == {"https://cdn.jsdelivr.net"}
 
 
-def test_words_of_users_stay_words(target: str, tmp_path: Path) -> None:
+def test_user_text_is_escaped(target: str, tmp_path: Path) -> None:
     plain = load_subject("skin1")
     named = Subject(HOSTILE, plain.curve, plain.albedo, plain.model, plain.tissue)
     text = page_text(named, target, tmp_path)
@@ -90,7 +90,7 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(
 
 
 @pytest.mark.parametrize("name", ["skin1", "skin2", "dj3"])
-def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
+def test_babylon_parameters_compensate_its_two_errors(name: str) -> None:
     subject, babylon = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(subject, babylon.versions[-1])
     colour, (metres,) = (get_numbers(rows, row.name) for row in rows[:2])
@@ -104,7 +104,7 @@ def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
     assert (report.naive_error.edge > 2.0 * report.error.edge).all()
 
 
-def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> None:
+def test_white_profile_is_a_lobe_and_grey_one_is_wider() -> None:
     x = np.linspace(-6.0, 6.0, 49)
     white = spiral_curve([1.0, 1.0, 1.0], 2.0, np.ones(3))
     assert np.abs(white.edge_response(x) - burley_curve(np.ones(3), np.ones(3)).edge_response(x)).max() < 0.01
@@ -112,12 +112,12 @@ def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> Non
     assert (grey.radius_at_fraction(0.5) > white.radius_at_fraction(0.5)).all()
 
 
-def test_three_spreads_nothing_and_says_so(skin: Subject) -> None:
+def test_three_has_no_diffusion_and_notes_it(skin: Subject) -> None:
     report = evaluate_export(skin, TARGETS["three"].with_variant(None), "0.187.0")
     assert (report.error.edge > 0.45).all() and "no subsurface scattering" in report.limitations
 
 
-def test_a_library_of_another_version_is_refused_and_nothing_is_written(target: str, tmp_path: Path) -> None:
+def test_other_library_versions_are_refused_before_writing(target: str, tmp_path: Path) -> None:
     target_ = TARGETS[target].with_variant(None)
     first = target_.library_files[target_.versions[-1]][0]  # type: ignore[attr-defined]
     file = tmp_path / first.package / first.path
@@ -167,7 +167,7 @@ def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tm
     assert picture[200:, 200:].max() < 0.02
 
 
-def test_heads_are_seen_from_where_the_scene_is() -> None:
+def test_camera_is_that_of_the_scene() -> None:
     """Cameras are placed relative to the centre of the head, which is not the origin of the file."""
     human = load_subject("human")
     assert human.scene is not None

@@ -132,7 +132,7 @@ def test_a_browser_draws_the_same_picture(rigged: OpenPage) -> None:
 
 
 @pytest.mark.parametrize("name", ["human:7", "head.obj"])
-def test_software_is_given_frames_of_its_own(browser: Any, name: str, tmp_path: Path) -> None:
+def test_software_program_draws_the_same_picture(browser: Any, name: str, tmp_path: Path) -> None:
     file = write_head(tmp_path / "head.obj")
     head = dermis.load_head(file if name == file.name else name, subdivide=0)
     one = open_page(browser, capture_page(dermis.Scene(head), "software", ()), tmp_path)
@@ -141,7 +141,7 @@ def test_software_is_given_frames_of_its_own(browser: Any, name: str, tmp_path: 
     one.page.close()
 
 
-def test_a_camera_that_turns_leaves_the_light_alone(rigged: OpenPage) -> None:
+def test_camera_rotation_keeps_the_light(rigged: OpenPage) -> None:
     ran = rigged.run("dermis.state.yaw = 0.4; dermis.state.zoom = 0.8; dermis.touch()")
     assert set(ran) == {"visibility", "shade", "post"}
     x, y, z = np.subtract(rigged.scene.camera.position, rigged.scene.camera.target)
@@ -156,7 +156,7 @@ def test_a_camera_that_turns_leaves_the_light_alone(rigged: OpenPage) -> None:
     assert rigged.error(rigged.scene) < LIMIT
 
 
-def test_a_light_is_dragged_with_its_shadows(rigged: OpenPage) -> None:
+def test_dragged_light_moves_its_shadows(rigged: OpenPage) -> None:
     ran = rigged.run("dermis.state.lightYaw = 0.9; dermis.touch()")
     assert "shadows" in ran and "visibility" not in ran
     key, *others = rigged.scene.lights
@@ -168,7 +168,7 @@ def test_a_light_is_dragged_with_its_shadows(rigged: OpenPage) -> None:
     rigged.run("dermis.state.lightYaw = 0; dermis.touch()")
 
 
-def test_a_dial_is_exact_at_its_nodes(rigged: OpenPage) -> None:
+def test_sliders_are_exact_at_their_nodes(rigged: OpenPage) -> None:
     rough = next(one for one in rigged.sliders if one.name == "roughness")
     ran = rigged.run(f"dermis.state.dials.roughness = {rough.values[-1]}; dermis.touch()")
     assert "shade" in ran and "stretch" not in ran
@@ -188,12 +188,12 @@ def test_memory_stays_flat_in_motion(rigged: OpenPage) -> None:
     rigged.run("dermis.state.yaw = 0; dermis.touch()")
 
 
-def test_a_lost_device_is_opened_again(rigged: OpenPage) -> None:
+def test_lost_gpu_device_is_recreated(rigged: OpenPage) -> None:
     rigged.page.evaluate("dermis.reopen()")
     assert rigged.error(rigged.scene) < LIMIT
 
 
-def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_capture: CapturedPage) -> None:
+def test_page_loads_nothing_and_escapes_user_text(rigged_capture: CapturedPage) -> None:
     text = page_html(rigged_capture.content, rigged_capture.sliders, HOSTILE, HOSTILE)
     policy = html.unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
     script, style = (
@@ -205,20 +205,20 @@ def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_capture: Ca
     assert text.count("<script") == text.count("</script>") == 4
 
 
-def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
+def test_skin_without_head_is_refused(tmp_path: Path) -> None:
     with pytest.raises(dermis.DermisError, match="a head"):
         export_skin("skin1", "web", tmp_path / "page.html")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_modules_are_joined_in_order() -> None:
+def test_modules_are_concatenated_in_order() -> None:
     assert {f"{name}.js" for name in PLAYER_MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
     assert not re.search(r"^(import|export) ", player_script(), re.MULTILINE)
     names = re.findall(r"^(?:async function|function|class|const|let) (\w+)", player_script(), re.MULTILINE)
     assert len(names) > 40 and len(names) == len(set(names))
 
 
-def test_the_player_is_well_typed() -> None:
+def test_player_passes_type_checking() -> None:
     folder = os.environ.get("DERMIS_TYPESCRIPT")
     if folder is None or shutil.which("node") is None:
         pytest.skip("DERMIS_TYPESCRIPT does not name the folder node_modules with TypeScript")

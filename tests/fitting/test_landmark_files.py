@@ -53,34 +53,34 @@ def _check_points(found: tuple[str, dict[str, NDArray[np.float64]]], offset: flo
 
 @pytest.mark.parametrize("form", ["{x},{y}", "{x}, {y}", "{x};{y}", "{x}\t{y}", "{x} {y}", "  {x}   {y}"])
 @pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
-def test_rows_without_a_header(tmp_path: Path, head: str, form: str) -> None:
+def test_rows_without_a_header_are_read(tmp_path: Path, head: str, form: str) -> None:
     _check_points(_read(tmp_path / "face.csv", head + _lines(POINTS, form)))
 
 
 @pytest.mark.parametrize("form", ["{k},{x},{y}", "{k};{x};{y}", "{k} {x} {y}"])
 @pytest.mark.parametrize("start", [0, 1])
-def test_rows_with_a_number_first(tmp_path: Path, form: str, start: int) -> None:
+def test_rows_with_a_leading_index_are_read(tmp_path: Path, form: str, start: int) -> None:
     notes = ["its landmarks are numbered from 1; they are taken as those from 0"] * start
     _check_points(_read(tmp_path / "face.csv", _lines(POINTS, form, start), *notes))
 
 
 @pytest.mark.parametrize("header", ["name,x,y", "Index,X,Y", "landmark, x, y", "id,x,y", ",x,y"])
 @pytest.mark.parametrize("start", [0, 1])
-def test_headers_with_a_name(tmp_path: Path, header: str, start: int) -> None:
+def test_header_with_names_is_read(tmp_path: Path, header: str, start: int) -> None:
     notes = ["its landmarks are numbered from 1; they are taken as those from 0"] * start
     text = f"{header}\n" + _lines(POINTS, "{k},{x},{y}", start)
     _check_points(_read(tmp_path / "face.csv", text, *notes))
 
 
-def test_decimal_commas_beside_semicolons(tmp_path: Path) -> None:
+def test_decimal_commas_with_semicolons_are_read(tmp_path: Path) -> None:
     _check_points(_read(tmp_path / "face.csv", _lines(POINTS, "{x};{y}").replace(".", ",")))
 
 
-def test_all_coordinates_in_one_line(tmp_path: Path) -> None:
+def test_all_coordinates_in_one_line_are_read(tmp_path: Path) -> None:
     _check_points(_read(tmp_path / "face.txt", " ".join(map(str, POINTS.ravel().tolist()))))
 
 
-def test_a_row_of_openface(tmp_path: Path) -> None:
+def test_openface_row_is_read(tmp_path: Path) -> None:
     header = ["frame", "confidence", *(f"{axis}_{k}" for axis in "xyXY" for k in range(68))]
     row = [1, 0.98, *POINTS.T.ravel().tolist(), *[7.0] * 136]
     rows = [", ".join(map(str, one)) for one in (header, row, row)]
@@ -112,7 +112,7 @@ def test_a_pts_file_must_have_as_many_points_as_it_states(tmp_path: Path) -> Non
         _read(tmp_path / "face.pts", PTS + _lines(POINTS[1:], "{x} {y}") + "}")
 
 
-def test_sets_without_the_outline_of_the_face(tmp_path: Path) -> None:
+def test_sets_without_jaw_outline_are_read(tmp_path: Path) -> None:
     name, pixels = _read(tmp_path / "face.csv", _lines(POINTS[17:]))
     assert name == "ibug-68" and list(pixels)[::50] == ["17", "67"]
 
@@ -126,7 +126,7 @@ def test_sets_without_the_outline_of_the_face(tmp_path: Path) -> None:
         (EYE_CORNERS, (2, 3, 0, 1, 4), "36 39 45 42 33", "ibug-68"),
     ],
 )
-def test_five_points_by_their_arrangement(
+def test_five_points_are_identified_by_arrangement(
     tmp_path: Path, points: NDArray[np.float64], order: tuple[int, ...], names: str, set_name: str
 ) -> None:
     for turn in (0.0, 0.5, -0.5):
@@ -138,7 +138,7 @@ def test_five_points_by_their_arrangement(
 
 
 @pytest.mark.parametrize("count", [4, 21, 98, 106])
-def test_other_counts_are_refused_with_those_that_are_known(tmp_path: Path, count: int) -> None:
+def test_unknown_counts_are_refused_with_known_ones_listed(tmp_path: Path, count: int) -> None:
     with pytest.raises(DermisError, match=rf"a known set \(5, 51, 68, 70, 468, 478\), .*, but got {count}"):
         _read(tmp_path / "face.csv", _lines(np.resize(POINTS, (count, 2))))
 
@@ -186,12 +186,12 @@ FACE = [{"x": 0.5, "y": k / 478, "z": 0.0} for k in range(478)]
         FACE,
     ],
 )
-def test_landmarks_of_mediapipe(tmp_path: Path, data: object) -> None:
+def test_mediapipe_landmarks_are_read(tmp_path: Path, data: object) -> None:
     name, pixels = _read(tmp_path / "face.json", json.dumps(data))
     assert name == "mediapipe" and pixels["239"] == pytest.approx([149.5, 199.5])
 
 
-def test_lists_of_numbers_in_json_are_pixels_or_relative(tmp_path: Path) -> None:
+def test_json_numbers_are_pixels_or_relative_coordinates(tmp_path: Path) -> None:
     _check_points(_read(tmp_path / "face.json", json.dumps(POINTS.tolist())))
     relative = ((POINTS + 0.5) / SIZE).tolist()
     note = "its coordinates are taken as relative to the size of the photograph"
@@ -199,11 +199,11 @@ def test_lists_of_numbers_in_json_are_pixels_or_relative(tmp_path: Path) -> None
     _check_points(_read(tmp_path / "face.csv", _lines(np.array(relative)), note))
 
 
-def test_of_several_faces_the_first_is_used_with_a_note(tmp_path: Path) -> None:
+def test_first_of_several_faces_is_used_with_a_note(tmp_path: Path) -> None:
     _read(tmp_path / "face.json", json.dumps([FACE, FACE]), "the first of its 2 faces is used")
 
 
-def test_five_points_place_the_camera(tmp_path: Path) -> None:
+def test_five_points_determine_the_camera(tmp_path: Path) -> None:
     person = Human()
     head, truth = person.head(subdivide=0), Camera(position=(250.0, 20.0, 1100.0), frame_mm=300.0)
     points = landmark_points(head, "face-synthetics-70")

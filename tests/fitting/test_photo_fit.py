@@ -64,7 +64,7 @@ def fitted(person: Human, scene: Scene, photo: NDArray[np.float32]) -> FitResult
     return fit(seen, person, camera=CAMERA, exposure=0.5, white=(1.2, 1.0, 0.9), adapter="cpu", **SMALL)
 
 
-def test_finds_skin_and_light(fitted: FitResult) -> None:
+def test_fit_recovers_skin_and_light(fitted: FitResult) -> None:
     assert fitted.values["melanin"] == pytest.approx(0.05, rel=0.05)
     assert fitted.values["blood"] == pytest.approx(0.012, rel=0.1)
     assert fitted.values["roughness"] == pytest.approx(0.25, abs=0.05)
@@ -78,7 +78,7 @@ def test_finds_skin_and_light(fitted: FitResult) -> None:
     assert fitted.residual < 0.02
 
 
-def test_files_are_a_scene_that_loads(fitted: FitResult, tmp_path: Path) -> None:
+def test_written_files_form_a_loadable_scene(fitted: FitResult, tmp_path: Path) -> None:
     save_fit(tmp_path, fitted)
     scene, settings = load_scene(tmp_path / "scene.toml")
     assert settings.size == SIZE and settings.exposure == 0.5
@@ -91,14 +91,14 @@ def test_files_are_a_scene_that_loads(fitted: FitResult, tmp_path: Path) -> None
     assert {one.name for one in tmp_path.iterdir()} == names
 
 
-def test_a_head_without_a_name_is_no_file(person: Human) -> None:
+def test_head_without_a_path_is_not_written_as_file(person: Human) -> None:
     assert fit_subject(person).person is person
     plain = fit_subject(person.head(subdivide=0))
     assert plain.person is None and not plain.table
     assert fit_subject(Human().head(subdivide=0)).person is not None
 
 
-def test_light_is_nowhere_negative_and_what_it_was() -> None:
+def test_light_is_nonnegative_and_recovered() -> None:
     random = np.random.default_rng(3)
     A, light = random.uniform(size=(60, 10)), np.append(light_basis.lobe_mixtures()[0][:, 5], 0.7)
     assert solve_strengths(A, A @ light) == pytest.approx(light, abs=1e-4)
@@ -106,7 +106,7 @@ def test_light_is_nowhere_negative_and_what_it_was() -> None:
     assert np.abs(dark).max() < 1e-9
 
 
-def test_lobes_make_up_all_of_the_second_order() -> None:
+def test_lobes_span_second_order_harmonics() -> None:
     positions = fibonacci_sphere(200)
     x, y, z = positions.T
     wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
@@ -115,7 +115,7 @@ def test_lobes_make_up_all_of_the_second_order() -> None:
     assert np.abs(made - wanted).max() < 1e-9
 
 
-def test_clipped_pixels_are_not_trusted() -> None:
+def test_clipped_pixels_are_excluded() -> None:
     image = np.full((32, 32, 3), 100, np.uint8)
     image[:16, :16, 0] = 255
     small = read_photograph(image).within(16)
@@ -124,7 +124,7 @@ def test_clipped_pixels_are_not_trusted() -> None:
     )
 
 
-def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
+def test_landmarks_determine_camera_and_shape(person: Human, tmp_path: Path) -> None:
     head, size = person.head(subdivide=0), (300, 400)
     points = landmark_points(head, "ibug-68")
     positions = np.einsum("nk,nkc->nc", points.weight, head.positions_mm[points.point]) - head.centre_mm
@@ -156,7 +156,9 @@ def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
         ({"camera": 3}, "camera: expected"),
     ],
 )
-def test_refusals(person: Human, photo: NDArray[np.float32], given: dict[str, Any], message: str) -> None:
+def test_invalid_arguments_are_refused(
+    person: Human, photo: NDArray[np.float32], given: dict[str, Any], message: str
+) -> None:
     with pytest.raises(DermisError, match=message):
         fit(photo, person, **given)
 

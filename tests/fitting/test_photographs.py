@@ -35,7 +35,7 @@ def turned(pixels: Bytes, orientation: int = 6) -> bytes:
     return encoded(pixels, "PNG", exif=exif)
 
 
-def test_a_photograph_is_turned_by_exif(tmp_path: Path, pixels: Bytes) -> None:
+def test_photograph_is_rotated_by_exif_orientation(tmp_path: Path, pixels: Bytes) -> None:
     path = tmp_path / "face.png"
     path.write_bytes(turned(pixels))
     with pytest.warns(DermisWarning, match=r"face\.png: it is turned upright"):
@@ -45,7 +45,7 @@ def test_a_photograph_is_turned_by_exif(tmp_path: Path, pixels: Bytes) -> None:
 
 
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
-def test_a_turned_photograph_is_the_same_as_the_upright_one() -> None:
+def test_rotated_photograph_equals_the_upright_one() -> None:
     folder = Path(os.environ["DERMIS_DATA"]) / "field" / "photo"
     with pytest.warns(DermisWarning, match="it is turned upright"):
         turned = read_photograph(folder / "b_exif6.jpg")
@@ -68,7 +68,7 @@ def test_colours_of_display_p3_are_converted_and_clipped_levels_stay_clipped(
     assert photo.unclipped[3, 4] == 0.0 and photo.unclipped.sum() == 18 * 24 - 1
 
 
-def test_cmyk_deep_and_grey_photographs_are_read(tmp_path: Path, pixels: Bytes) -> None:
+def test_cmyk_16_bit_and_grey_photographs_are_read(tmp_path: Path, pixels: Bytes) -> None:
     inks = np.dstack([255 - pixels, np.zeros(pixels.shape[:2], np.uint8)])
     (tmp_path / "cmyk.tif").write_bytes(encoded(inks, "TIFF", "CMYK"))
     with pytest.warns(DermisWarning, match=r"cmyk\.tif: its CMYK is converted"):
@@ -93,7 +93,7 @@ def test_transparent_pixels_are_not_fitted(tmp_path: Path, pixels: Bytes) -> Non
     assert read_photograph(np.dstack([pixels, 0 * alpha])).unclipped.all()  # alpha that programs leave at 0
 
 
-def test_odd_pixels_of_a_linear_photograph_are_mended(tmp_path: Path) -> None:
+def test_invalid_pixels_of_a_linear_photograph_are_replaced(tmp_path: Path) -> None:
     linear = np.full((18, 24, 3), 0.25, np.float32)
     linear[2, 3], linear[4, 5] = np.nan, -0.01
     write_exr(tmp_path / "face.exr", linear)
@@ -105,7 +105,7 @@ def test_odd_pixels_of_a_linear_photograph_are_mended(tmp_path: Path) -> None:
         read_photograph(tmp_path / "face.exr")
 
 
-def test_unmixed_maps_are_upright_as_the_photograph(tmp_path: Path) -> None:
+def test_unmixed_maps_are_oriented_like_the_photograph(tmp_path: Path) -> None:
     colours = np.zeros((8, 12, 3), np.uint8)
     colours[:, :6], colours[:, 6:] = (220, 170, 150), (130, 90, 70)
     path = tmp_path / "skin.png"

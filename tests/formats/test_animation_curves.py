@@ -13,13 +13,13 @@ TIMES = np.array([0.5, 1.0, 2.5, 2.75])
 VALUES = RNG.normal(size=(4, 2, 3))
 
 
-def test_steps_hold_until_the_next_key() -> None:
+def test_step_keys_hold_until_the_next_key() -> None:
     curve = AnimationCurve(TIMES, VALUES, "STEP")
     for seconds, key in ((-1.0, 0), (0.5, 0), (0.999, 0), (1.0, 1), (2.6, 2), (2.75, 3), (9.0, 3)):
         np.testing.assert_array_equal(curve.sample(seconds), VALUES[key])
 
 
-def test_lines_between_keys() -> None:
+def test_linear_keys_are_interpolated() -> None:
     curve = AnimationCurve(TIMES, VALUES)
     expected = VALUES[1] + (1.75 - 1.0) / 1.5 * (VALUES[2] - VALUES[1])
     np.testing.assert_allclose(curve.sample(1.75), expected)
@@ -27,7 +27,7 @@ def test_lines_between_keys() -> None:
     np.testing.assert_array_equal(curve.sample(3.0), VALUES[3])
 
 
-def test_rotations_go_on_arcs_the_shorter_way() -> None:
+def test_rotations_interpolate_along_the_shorter_arc() -> None:
     turns = Rotation.random(4, random_state=2)
     quaternions = turns.as_quat() * [[1], [-1], [2], [1]]  # another sign, and of another length
     curve = AnimationCurve(TIMES, quaternions[:, None], is_rotation=True)
@@ -50,7 +50,7 @@ def _spline(before, after, s: float, step: float):
 
 
 @pytest.mark.parametrize("turns", [False, True])
-def test_cubic_splines(turns: bool) -> None:
+def test_cubic_splines_are_evaluated(turns: bool) -> None:
     keys = RNG.normal(size=(4, 3, 2, 4))
     curve = AnimationCurve(TIMES, keys, "CUBICSPLINE", turns)
     for seconds in (1.0, 1.3, 2.4):
@@ -63,7 +63,7 @@ def test_cubic_splines(turns: bool) -> None:
     np.testing.assert_allclose([curve.sample(0.0), curve.sample(3.0)], ends)
 
 
-def test_a_spline_has_the_tangents_of_its_keys() -> None:
+def test_spline_follows_the_tangents_of_its_keys() -> None:
     keys = RNG.normal(size=(4, 3, 1, 2))
     curve = AnimationCurve(TIMES, keys, "CUBICSPLINE")
     slope = (curve.sample(1.0 + 1e-6) - curve.sample(1.0)) / 1e-6
@@ -72,6 +72,6 @@ def test_a_spline_has_the_tangents_of_its_keys() -> None:
     np.testing.assert_allclose(slope, keys[2, 0], atol=1e-4)
 
 
-def test_keys_at_the_same_time_are_no_fault() -> None:
+def test_keys_at_equal_times_are_accepted() -> None:
     curve = AnimationCurve(np.array([0.0, 1.0, 1.0, 2.0]), VALUES)
     np.testing.assert_array_equal(curve.sample(1.0), VALUES[2])

@@ -25,13 +25,13 @@ def _edited(mesh: Mesh, **changes: object) -> Mesh:
     return replace(mesh, **changes)
 
 
-def test_sound_meshes_pass() -> None:
+def test_valid_meshes_pass() -> None:
     check_mesh(uv_sphere(100, 24, 12), "sphere")
     check_mesh(plane(200, 3), "plane")
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_positions_that_are_not_finite(bad: float) -> None:
+def test_infinite_positions_are_refused(bad: float) -> None:
     sphere = uv_sphere(100, 12, 6)
     positions = sphere.positions.copy()
     positions[[3, 7], 1] = bad
@@ -39,25 +39,25 @@ def test_positions_that_are_not_finite(bad: float) -> None:
     assert "finite positions" in message and "2 vertices" in message and "first 3" in message
 
 
-def test_uv_that_is_not_finite() -> None:
+def test_infinite_uv_is_refused() -> None:
     sphere = uv_sphere(100, 12, 6)
     uv = sphere.uv.copy()
     uv[5, 0] = np.nan
     assert "finite uv" in _refused(_edited(sphere, uv=uv))
 
 
-def test_positions_beyond_a_kilometre() -> None:
+def test_positions_beyond_a_kilometre_are_refused() -> None:
     assert "--unit-mm" in _refused(plane(1e7))
 
 
-def test_no_triangles() -> None:
+def test_meshes_without_triangles_are_refused() -> None:
     sphere = uv_sphere(100, 12, 6)
     nothing = _edited(sphere, triangles=sphere.triangles[:0], material=sphere.material[:0])
     assert "it has none" in _refused(nothing)
 
 
 @pytest.mark.parametrize("index", [-1, 10_000])
-def test_index_out_of_range(index: int) -> None:
+def test_indices_out_of_range_are_refused(index: int) -> None:
     sphere = uv_sphere(100, 12, 6)
     triangles = sphere.triangles.copy()
     triangles[4, 1] = index
@@ -74,7 +74,7 @@ def test_uv_outside_one_tile_names_the_range_and_udim() -> None:
 
 @pytest.mark.parametrize("shift", [2e-4, -2e-4])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_uv_that_leaves_the_tile_on_one_side_only(shift: float, axis: int) -> None:
+def test_uv_outside_the_tile_on_one_side_is_reported(shift: float, axis: int) -> None:
     flat = plane(100, 2)
     uv = flat.uv.copy()
     uv[:, axis] += np.float32(shift)

@@ -31,7 +31,7 @@ def test_a_compressed_ball_is_read_with_its_attributes(tmp_path: Path) -> None:
     assert mesh_file.notes == ()
 
 
-def test_the_loaded_ball_is_that_before_compression(tmp_path: Path) -> None:
+def test_loaded_ball_equals_the_uncompressed_one(tmp_path: Path) -> None:
     mesh = load_rigged(DracoFile().write(tmp_path / "a.glb")).mesh
     assert len(mesh.triangles) == len(BALL.triangles)
     np.testing.assert_allclose(
@@ -48,9 +48,7 @@ def test_geometry_that_is_stored_without_compression_as_well_needs_no_decoder(tm
     assert len(load_rigged(compressed.write(tmp_path / "a.glb")).mesh.triangles) == len(BALL.triangles)
 
 
-def test_without_the_package_the_refusal_names_the_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_decoder_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = DracoFile().write(tmp_path / "a.glb")
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     with pytest.raises(

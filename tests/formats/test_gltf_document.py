@@ -20,7 +20,7 @@ ROWS = np.array([[0, 1, -2], [0, 0, 0], [7, 0, 0], [0, 0, 3]], float)
 @pytest.mark.parametrize("gap", [0, 8])
 @pytest.mark.parametrize("suffix", [".gltf", ".glb"])
 @pytest.mark.parametrize("kind", ["<f4", "<i1", "<i2"])
-def test_rows_of_numbers_close_or_with_gaps(tmp_path: Path, gap: int, suffix: str, kind: str) -> None:
+def test_packed_and_strided_accessors_are_read(tmp_path: Path, gap: int, suffix: str, kind: str) -> None:
     file = GltfFile()
     file.numbers([1, 2, 3], "<u1")
     index = file.numbers(ROWS, kind, gap=gap)
@@ -29,7 +29,7 @@ def test_rows_of_numbers_close_or_with_gaps(tmp_path: Path, gap: int, suffix: st
     assert document.read_values(index).dtype == np.dtype(kind)
 
 
-def test_sparse_numbers_over_zeros_and_over_others(tmp_path: Path) -> None:
+def test_sparse_accessors_with_and_without_base_are_read(tmp_path: Path) -> None:
     file = GltfFile()
     alone, below = file.sparse(ROWS), file.numbers(np.ones((4, 3)))
     over = file.sparse(ROWS)
@@ -39,7 +39,7 @@ def test_sparse_numbers_over_zeros_and_over_others(tmp_path: Path) -> None:
     np.testing.assert_array_equal(document.read_values(over), [[0, 1, -2], [1, 1, 1], [7, 0, 0], [0, 0, 3]])
 
 
-def test_normalised_integers_are_fractions(tmp_path: Path) -> None:
+def test_normalised_integers_are_converted_to_fractions(tmp_path: Path) -> None:
     file = GltfFile()
     plain = file.numbers([[255, 0, 51]], "<u1")
     share = file.numbers([[255, 0, 51]], "<u1", normalized=True)
@@ -50,7 +50,7 @@ def test_normalised_integers_are_fractions(tmp_path: Path) -> None:
     np.testing.assert_allclose(document.read_floats(signed), [[1, -1, 0]])
 
 
-def test_numbers_beyond_their_buffer_and_from_nowhere_are_refused(tmp_path: Path) -> None:
+def test_accessors_outside_or_without_buffer_are_refused(tmp_path: Path) -> None:
     file = GltfFile()
     index = file.numbers(ROWS)
     file.tree["accessors"][index]["count"] = 5
@@ -62,7 +62,7 @@ def test_numbers_beyond_their_buffer_and_from_nowhere_are_refused(tmp_path: Path
             document.read_values(one)
 
 
-def test_strips_and_fans_are_triangles(tmp_path: Path) -> None:
+def test_strips_and_fans_become_triangles(tmp_path: Path) -> None:
     for mode, order in ((5, [0, 1, 3, 2]), (6, [0, 1, 2, 3])):
         file = GltfFile()
         mesh = add_mesh(file, SQUARE, [order])
@@ -73,7 +73,7 @@ def test_strips_and_fans_are_triangles(tmp_path: Path) -> None:
         np.testing.assert_allclose(loaded.normals, np.tile([0, 0, 1], (4, 1)), atol=1e-6)
 
 
-def test_nodes_in_a_circle_are_refused_by_name(tmp_path: Path) -> None:
+def test_node_cycles_are_refused_by_name(tmp_path: Path) -> None:
     file = GltfFile()
     mesh = add_mesh(file)
     file.add("nodes", mesh=mesh, name="face")
@@ -83,7 +83,7 @@ def test_nodes_in_a_circle_are_refused_by_name(tmp_path: Path) -> None:
         load_mesh(file.write(tmp_path / "a.gltf", 0))
 
 
-def test_names_of_nodes_are_made_different(tmp_path: Path) -> None:
+def test_node_names_are_made_unique(tmp_path: Path) -> None:
     file = GltfFile()
     for name in ("bone", "bone", "", "bone 2"):
         file.add("nodes", name=name)
@@ -91,7 +91,7 @@ def test_names_of_nodes_are_made_different(tmp_path: Path) -> None:
     assert nodes.names == ("bone", "bone 2", "node 2", "bone 2 2")
 
 
-def test_parts_come_as_trimesh_has_them(tmp_path: Path) -> None:
+def test_parts_match_trimesh(tmp_path: Path) -> None:
     """Order and position of each primitive of a node tree are compared with another reader."""
     import trimesh
 

@@ -23,7 +23,7 @@ def thin_primitive(egg: Egg, mode: int) -> Tree:
     return {"mode": mode, "attributes": {"POSITION": egg.primitive()["attributes"]["POSITION"]}}
 
 
-def test_a_sound_file_has_no_notes(tmp_path: Path) -> None:
+def test_complete_file_has_no_notes(tmp_path: Path) -> None:
     assert notes_of(Egg(), tmp_path) == ""
 
 

@@ -42,7 +42,7 @@ def ball(path: Path, kind: str, normalized: bool, *, scaled_uv: bool = True) -> 
 
 @pytest.mark.parametrize("normalized", [False, True])
 @pytest.mark.parametrize("kind", ["<i1", "<i2"])
-def test_quantised_attributes_are_those_of_floats(kind: str, normalized: bool, tmp_path: Path) -> None:
+def test_quantised_attributes_match_float_attributes(kind: str, normalized: bool, tmp_path: Path) -> None:
     exact, read = ball(tmp_path / "a.glb", "<f4", False), ball(tmp_path / "b.glb", kind, normalized)
     step = 1.0 / np.iinfo(kind).max
     assert len(read.positions) == len(exact.positions)
@@ -51,7 +51,7 @@ def test_quantised_attributes_are_those_of_floats(kind: str, normalized: bool, t
     np.testing.assert_allclose(read.normals, exact.normals, atol=2 * step)
 
 
-def test_integer_uv_that_a_texture_scales_are_those_of_the_plain_file(tmp_path: Path) -> None:
+def test_integer_uv_with_texture_transform_match_plain_uv(tmp_path: Path) -> None:
     plain, quantised = Egg(), Egg()
     uv = uv_sphere(0.12, 12, 8).uv
     for mesh, material in enumerate((quantised.skin, quantised.cloth)):

@@ -40,7 +40,7 @@ def turn(axis: int, degrees: float, at: tuple[float, float, float] = (0, 0, 0)) 
 
 
 @pytest.mark.parametrize("form", ["dense", "sparse", "bytes"])
-def test_targets_by_name(tmp_path: Path, form: str) -> None:
+def test_targets_are_named(tmp_path: Path, form: str) -> None:
     file = GltfFile()
     deltas = {
         "dense": lambda rows: file.numbers(rows),
@@ -60,7 +60,7 @@ def test_targets_by_name(tmp_path: Path, form: str) -> None:
     np.testing.assert_allclose(posed[order[1]], expected[order[0]], atol=2.0 if form == "bytes" else 1e-4)
 
 
-def test_a_cached_rig_is_the_one_that_was_read(tmp_path: Path) -> None:
+def test_cached_rig_equals_the_one_read(tmp_path: Path) -> None:
     file = _arm(GltfFile(), weights=[0.25])
     path = file.write(tmp_path / "a.glb", 0)
     first, second = loaded(path)[1], loaded(path)[1]
@@ -89,7 +89,7 @@ def test_targets_without_names_are_numbered(tmp_path: Path) -> None:
     assert rig.targets.names == ("only one", "target 1")
 
 
-def test_a_name_in_two_meshes_is_one_target(tmp_path: Path) -> None:
+def test_equal_names_in_two_meshes_form_one_target(tmp_path: Path) -> None:
     file = GltfFile()
     face = add_mesh(file, targets={"open": file.numbers(UP), "smile": file.numbers(OUT)})
     teeth = add_mesh(file, SQUARE - [0, 0, 1], targets={"open": file.numbers(2 * UP)})
@@ -100,7 +100,7 @@ def test_a_name_in_two_meshes_is_one_target(tmp_path: Path) -> None:
     np.testing.assert_allclose(change, np.where(rig.positions_mm[:, 2] < -50, 100, 50), atol=1e-4)
 
 
-def test_units_and_axes_go_for_displacements_too(tmp_path: Path) -> None:
+def test_units_and_axes_apply_to_displacements(tmp_path: Path) -> None:
     file = GltfFile()
     # in the file the square stands along z and looks along -y
     standing = SQUARE[:, [0, 2, 1]]
@@ -112,7 +112,7 @@ def test_units_and_axes_go_for_displacements_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved(rig, {"up": 1.0}) - rig.positions_mm, 10 * UP, atol=1e-5)
 
 
-def test_the_rest_has_default_weights(tmp_path: Path) -> None:
+def test_rest_pose_uses_default_weights(tmp_path: Path) -> None:
     file = GltfFile()
     mesh = add_mesh(file, targets={"up": file.numbers(UP), "out": file.numbers(OUT)}, weights=[1.0, 0.0])
     node = file.add("nodes", mesh=mesh, weights=[0.0, 0.5])
@@ -134,7 +134,7 @@ def _lips(apart: float, seam: float = 0.0) -> tuple[GltfFile, int]:
     return file, file.add("nodes", mesh=mesh)
 
 
-def test_lips_that_touch_are_two_and_their_corner_is_one(tmp_path: Path) -> None:
+def test_touching_lips_stay_separate_and_share_the_corner(tmp_path: Path) -> None:
     file, node = _lips(apart=0.2, seam=5e-5)  # at the seam 0.005 mm apart: one point all the same
     rigged, rig = loaded(file.write(tmp_path / "a.gltf", node))
     at = [np.flatnonzero((rigged.mesh.positions == [x, 0, 0]).all(axis=1)) for x in (0, 100, 200)]
@@ -146,7 +146,7 @@ def test_lips_that_touch_are_two_and_their_corner_is_one(tmp_path: Path) -> None
     np.testing.assert_array_equal(rigged.mesh.point, again.mesh.point)
 
 
-def test_what_no_target_parts_stays_one(tmp_path: Path) -> None:
+def test_vertices_that_no_target_separates_stay_merged(tmp_path: Path) -> None:
     file, node = _lips(apart=5e-5)
     rigged, rig = loaded(file.write(tmp_path / "a.gltf", node))
     assert len(rig.positions_mm) == 9
@@ -201,7 +201,7 @@ def _by_vertex(rigged: RiggedMesh, points: np.ndarray) -> np.ndarray:
     return points[rigged.mesh.point]
 
 
-def test_a_skin_moves_as_the_specification_says(tmp_path: Path) -> None:
+def test_skinning_matches_the_specification(tmp_path: Path) -> None:
     world = _world()
     bind = np.linalg.inv(world)
     rigged, rig = loaded(_arm(GltfFile(), bind).write(tmp_path / "a.glb", 0))
@@ -216,7 +216,7 @@ def test_a_skin_moves_as_the_specification_says(tmp_path: Path) -> None:
     np.testing.assert_allclose(_by_vertex(rigged, moved(rig, {"lean": 0.5}, local)), expected, atol=1e-3)
 
 
-def test_the_rest_is_where_the_joints_are_not_where_they_were_bound(tmp_path: Path) -> None:
+def test_rest_pose_uses_joint_nodes_instead_of_bind_matrices(tmp_path: Path) -> None:
     bind = np.stack([np.eye(4), turn(0, 30)])
     rigged, rig = loaded(_arm(GltfFile(), bind).write(tmp_path / "a.glb", 0))
     np.testing.assert_allclose(rigged.mesh.positions, 100 * _formula(_world(), bind, 0.0), atol=1e-4)
@@ -224,7 +224,7 @@ def test_the_rest_is_where_the_joints_are_not_where_they_were_bound(tmp_path: Pa
     np.testing.assert_allclose(leaning, 100 * _formula(_world(), bind, 1.0), atol=1e-3)
 
 
-def test_eight_influences_become_the_four_largest(tmp_path: Path) -> None:
+def test_eight_influences_are_reduced_to_the_four_largest(tmp_path: Path) -> None:
     file = _arm(GltfFile(), np.stack([np.eye(4)] * 2))
     given = file.tree["meshes"][0]["primitives"][0]["attributes"]
     rng = np.random.default_rng(1)
@@ -254,7 +254,7 @@ def _clip(file: GltfFile, node: int, path: str = "rotation") -> None:
     file.add("animations", samplers=[sampler], channels=[channel])
 
 
-def test_rigid_meshes_follow_the_bone_above_them(tmp_path: Path) -> None:
+def test_rigid_meshes_follow_their_parent_bone(tmp_path: Path) -> None:
     """The meshes are an eye below a joint, a hat below an animated node, and a static wall."""
     file = _arm(GltfFile(), np.linalg.inv(_world()))
     small = [add_mesh(file, 0.1 * SQUARE + [0, 0, k]) for k in (1, 2, 3)]
@@ -280,7 +280,7 @@ def test_rigid_meshes_follow_the_bone_above_them(tmp_path: Path) -> None:
     np.testing.assert_allclose(posed[hat_at] - [0, 500, 0], around[:, [1, 0, 2]] * [-1, 1, 1], atol=1e-3)
 
 
-def test_weights_alone_make_no_bones(tmp_path: Path) -> None:
+def test_animated_weights_create_no_bones(tmp_path: Path) -> None:
     file = GltfFile()
     node = file.add("nodes", mesh=add_mesh(file, targets={"up": file.numbers(UP)}))
     _clip(file, node, "weights")
@@ -288,7 +288,7 @@ def test_weights_alone_make_no_bones(tmp_path: Path) -> None:
     assert rig.skeleton is None
 
 
-def test_a_still_file_has_no_rig(tmp_path: Path) -> None:
+def test_static_file_has_no_rig(tmp_path: Path) -> None:
     file = GltfFile()
     path = file.write(tmp_path / "a.glb", file.add("nodes", mesh=add_mesh(file)))
     assert load_rigged(path, unit_mm=100).rig is None
@@ -302,7 +302,7 @@ def test_a_still_file_has_no_rig(tmp_path: Path) -> None:
         ("rest", r"finite weights of targets"),
     ],
 )
-def test_damaged_targets_are_refused_by_name(tmp_path: Path, damage: str, words: str) -> None:
+def test_damaged_targets_are_named_in_the_refusal(tmp_path: Path, damage: str, words: str) -> None:
     file = GltfFile()
     rows = UP[:3] if damage == "count" else np.where(damage == "nan", np.nan, UP)
     more = {"weights": ["nan"]} if damage == "rest" else {}
@@ -322,7 +322,7 @@ def test_damaged_targets_are_refused_by_name(tmp_path: Path, damage: str, words:
         ({"JOINTS_0": None}, "joints and weights of a mesh with a skin"),
     ],
 )
-def test_damaged_skins_are_refused_by_name(tmp_path: Path, change: dict, words: str) -> None:
+def test_damaged_skins_are_named_in_the_refusal(tmp_path: Path, change: dict, words: str) -> None:
     file = _arm(GltfFile())
     given = file.tree["meshes"][0]["primitives"][0]["attributes"]
     for name, rows in change.items():
@@ -334,7 +334,7 @@ def test_damaged_skins_are_refused_by_name(tmp_path: Path, change: dict, words: 
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.5])
-def test_a_bone_without_extent_is_refused_where_points_follow_it(tmp_path: Path, fraction: float) -> None:
+def test_zero_scale_bone_with_points_is_refused(tmp_path: Path, fraction: float) -> None:
     file = _arm(GltfFile())
     file.tree["nodes"][2]["scale"] = [0, 0, 0]  # the head, which is each vertex's first joint
     given = file.tree["meshes"][0]["primitives"][0]["attributes"]

@@ -52,7 +52,7 @@ def posed_mm(head: Head, pose: Pose) -> np.ndarray:
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_a_head_reads_back_as_it_moves(rigged: Head, tmp_path: Path, pose: Pose) -> None:
+def test_head_reads_back_with_its_deformation(rigged: Head, tmp_path: Path, pose: Pose) -> None:
     back = load_head(written(rigged, tmp_path / "back.glb"), subdivide=0)
     assert (back.targets, back.bones) == (rigged.targets, rigged.bones)
     assert np.abs(posed_mm(back, pose) - posed_mm(rigged, pose)).max() < SAME_MM
@@ -60,11 +60,11 @@ def test_a_head_reads_back_as_it_moves(rigged: Head, tmp_path: Path, pose: Pose)
     assert np.array_equal(back.mesh.triangles, rigged.mesh.triangles)
 
 
-def test_the_same_head_is_the_same_file(rigged: Head) -> None:
+def test_equal_heads_give_identical_files(rigged: Head) -> None:
     assert encode_head(rigged, roughness=0.3) == encode_head(rigged, roughness=0.3)
 
 
-def test_targets_rest_where_they_are_told(rigged: Head, tmp_path: Path) -> None:
+def test_targets_keep_their_rest_weights(rigged: Head, tmp_path: Path) -> None:
     """A head with default weights is written from its neutral shape."""
     resting = load_head(written(rigged, tmp_path / "resting.glb", weights={"jawOpen": 0.5}), subdivide=0)
     half = Pose({"jawOpen": 0.5})
@@ -75,7 +75,7 @@ def test_targets_rest_where_they_are_told(rigged: Head, tmp_path: Path) -> None:
         assert np.abs(posed_mm(head, Pose()) - posed_mm(rigged, half)).max() < SAME_MM
 
 
-def test_bones_of_their_own_have_one_above_them(rigged: Head, tmp_path: Path) -> None:
+def test_bones_without_a_common_parent_get_one(rigged: Head, tmp_path: Path) -> None:
     rig = rigged.control
     assert rig.skeleton is not None
     local = np.linalg.inv(rig.skeleton.inverse_bind)
@@ -113,7 +113,7 @@ def test_a_head_without_rig_is_written(tmp_path: Path) -> None:
     assert back.mesh.materials[0].kind == "skin"
 
 
-def test_a_finer_mesh_moves_with_its_targets(rigged: Head, tmp_path: Path) -> None:
+def test_subdivided_mesh_moves_with_its_targets(rigged: Head, tmp_path: Path) -> None:
     fine = subdivide_head(rigged, 1)
     back = load_head(written(fine, tmp_path / "fine.glb"), subdivide=0)
     for pose in POSES[:2]:
@@ -121,7 +121,7 @@ def test_a_finer_mesh_moves_with_its_targets(rigged: Head, tmp_path: Path) -> No
     assert np.abs(posed_mm(back, POSES[2]) - posed_mm(fine, POSES[2])).max() < 1.0
 
 
-def test_normals_turn_with_targets(rigged: Head, tmp_path: Path) -> None:
+def test_normals_change_with_targets(rigged: Head, tmp_path: Path) -> None:
     document = check_rules(written(rigged, tmp_path / "face.glb"))
     (primitive,) = document.tree["meshes"][0]["primitives"]
     target = primitive["targets"][rigged.targets.index("jawOpen")]
@@ -132,7 +132,7 @@ def test_normals_turn_with_targets(rigged: Head, tmp_path: Path) -> None:
     assert np.abs(document.read_floats(target["NORMAL"])).max() > 0.2
 
 
-def test_four_bones_are_those_that_miss_least() -> None:
+def test_four_bones_minimise_the_error() -> None:
     """Chosen bones are compared with the four largest weights, by squared distance over a few rotations."""
     points = DeformableMesh(Human().head())
     rig, finer = points.rig, points.refinement

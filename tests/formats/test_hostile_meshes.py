@@ -56,7 +56,7 @@ OBJ = {
 
 
 @pytest.mark.parametrize("name", OBJ)
-def test_obj_files_of_more_than_a_head_are_refused(tmp_path: Path, name: str) -> None:
+def test_oversized_obj_files_are_refused(tmp_path: Path, name: str) -> None:
     change, words = OBJ[name]
     (tmp_path / "a.obj").write_text(change(obj_text()))
     message = refused(load_mesh, tmp_path / "a.obj")
@@ -64,18 +64,18 @@ def test_obj_files_of_more_than_a_head_are_refused(tmp_path: Path, name: str) ->
 
 
 @pytest.mark.parametrize("line", ["g{0}x{0}y", "mtllib{0}x{0}y", "usemtl{0}x{0}"])
-def test_a_line_of_spaces_takes_no_time(tmp_path: Path, line: str) -> None:
+def test_lines_of_spaces_are_read_quickly(tmp_path: Path, line: str) -> None:
     (tmp_path / "a.obj").write_text(line.format(" " * 65_000) + "\n" + obj_text())
     load_mesh(tmp_path / "a.obj")
 
 
-def test_a_material_of_spaces_and_digits_takes_no_time(tmp_path: Path) -> None:
+def test_material_lines_of_spaces_and_digits_are_read_quickly(tmp_path: Path) -> None:
     lines = ("bump -bm " + "1" * 4000 + "x", "bump a" + " " * 4000 + "-bm", "bump" + " -cc a" * 600 + " b")
     (tmp_path / "a.mtl").write_text("newmtl skin\n" + "\n".join(lines * 100))
     assert "bump" in read_library(tmp_path / "a.obj", "mtllib a.mtl\n").materials["skin"].textures
 
 
-def test_libraries_are_limited_together(tmp_path: Path) -> None:
+def test_total_size_of_material_libraries_is_limited(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("newmtl skin\n" + "#\n" * 1_000_000)
     (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nmtllib ./a.mtl\nmtllib ././a.mtl\n{obj_text()}")
     with pytest.raises(DermisError, match=r"a\.mtl: expected material libraries of at most"):
@@ -83,7 +83,7 @@ def test_libraries_are_limited_together(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("colour", ["nan 0 0", "0 nan 0", "0 0 nan"])
-def test_colours_that_are_none_are_refused(tmp_path: Path, colour: str) -> None:
+def test_invalid_colours_are_refused(tmp_path: Path, colour: str) -> None:
     (tmp_path / "a.mtl").write_text(f"newmtl skin\nKd {colour}\n")
     (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{obj_text()}")
     assert load_rigged(tmp_path / "a.obj").materials[0].unused == ("Kd",)
@@ -95,7 +95,7 @@ def test_colours_that_are_none_are_refused(tmp_path: Path, colour: str) -> None:
     assert "colours of materials from 0 to 1" in refused(load_mesh, path)
 
 
-def test_relief_that_a_material_makes_infinite_is_left_out(tmp_path: Path) -> None:
+def test_infinite_relief_is_left_out(tmp_path: Path) -> None:
     slopes = np.full((4, 4, 3), (160, 128, 250), np.uint8)
     (tmp_path / "n.png").write_bytes(encode_png(slopes))
     (tmp_path / "a.mtl").write_text("newmtl skin\nnorm -bm 1e300 n.png\n")
@@ -126,7 +126,7 @@ PLY += "end_header\n"
         (PLY.format("many", "property float x\n", 1), "a name and a number"),
     ],
 )
-def test_ply_headers_of_more_than_a_head_are_refused(tmp_path: Path, header: str, words: str) -> None:
+def test_oversized_ply_headers_are_refused(tmp_path: Path, header: str, words: str) -> None:
     (tmp_path / "a.ply").write_text(header + "0 0 0\n" * 9)
     assert words in refused(load_mesh, tmp_path / "a.ply")
 
@@ -197,7 +197,7 @@ def _far(file: GltfFile, node: int) -> list[int]:
         (_far, "positions"),
     ],
 )
-def test_scenes_of_more_than_a_head_are_refused(
+def test_oversized_scenes_are_refused(
     tmp_path: Path, change: Callable[[GltfFile, int], list[int]], words: str
 ) -> None:
     file, node = square()
@@ -205,21 +205,21 @@ def test_scenes_of_more_than_a_head_are_refused(
     assert re.search(words, refused(load_rigged, path))
 
 
-def test_nodes_of_one_name_take_no_time(tmp_path: Path) -> None:
+def test_many_equal_node_names_are_read_quickly(tmp_path: Path) -> None:
     file, node = square()
     file.tree["nodes"] += [{"name": "a"} for _ in range(60_000)]
     load_mesh(file.write(tmp_path / "a.glb", node))
 
 
 @pytest.mark.parametrize("index", [-1, 1.0, "0", True, 2**60, None])
-def test_numbers_of_things_that_there_are_not(tmp_path: Path, index: object) -> None:
+def test_invalid_mesh_indices_are_refused(tmp_path: Path, index: object) -> None:
     file, node = square()
     file.tree["nodes"][node]["mesh"] = index
     assert "there are 1 meshes" in refused(load_mesh, file.write(tmp_path / "a.glb", node))
 
 
 @pytest.mark.parametrize("relief", ["1", [1], {"mm": 1}, -1, 0, True, 2**60])
-def test_a_relief_that_is_no_length_is_refused(tmp_path: Path, relief: object) -> None:
+def test_relief_that_is_not_a_length_is_refused(tmp_path: Path, relief: object) -> None:
     file, node = square()
     file.tree["materials"] = [{"extras": {"dermis": {"height_mm": relief}}}]
     assert "valid textures" in refused(embedded_materials, file.write(tmp_path / "a.gltf", node))
@@ -238,7 +238,7 @@ def test_a_relief_that_is_no_length_is_refused(tmp_path: Path, relief: object) -
         "http://b/b.bin",
     ],
 )
-def test_nothing_outside_of_its_folder_is_read_for_a_gltf_file(tmp_path: Path, uri: str) -> None:
+def test_gltf_references_outside_the_folder_are_refused(tmp_path: Path, uri: str) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     (tmp_path / "b.bin").write_bytes(bytes(100))
@@ -255,7 +255,7 @@ def test_nothing_outside_of_its_folder_is_read_for_a_gltf_file(tmp_path: Path, u
     assert "files in its own folder or below" in refused(embedded_materials, path)
 
 
-def test_no_pipe_and_no_endless_name_is_waited_for(tmp_path: Path) -> None:
+def test_pipes_and_overlong_names_are_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for uri, words in (("pipe", "not a regular file"), ("a" * 5000, "own folder|cannot be read")):
         file, node = square()
@@ -268,7 +268,7 @@ def test_no_pipe_and_no_endless_name_is_waited_for(tmp_path: Path) -> None:
     assert "is not in its folder" in file.materials[0].missing["colour"] and "pipe" in file.notes[0]
 
 
-def test_pictures_of_a_file_are_limited_together(tmp_path: Path) -> None:
+def test_total_size_of_pictures_is_limited(tmp_path: Path) -> None:
     import struct
     import zlib
 
@@ -284,7 +284,7 @@ def test_pictures_of_a_file_are_limited_together(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"asset": ' + "1" * 5000 + "}", '{"nodes": 5}', "null"])
-def test_trees_that_are_none_are_refused(tmp_path: Path, text: str) -> None:
+def test_invalid_json_documents_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.gltf").write_text(text)
     for read in (load_mesh, embedded_materials, lambda path: read_clip(path, None)):
         assert "a glTF file" in refused(read, tmp_path / "a.gltf") or read is load_mesh

@@ -78,7 +78,7 @@ def test_obj_without_its_mtl_keeps_its_groups(obj: Path) -> None:
     assert mesh.materials[0].colour == (0.8, 0.8, 0.8)
 
 
-def test_obj_groups_by_g_alone(obj: Path) -> None:
+def test_obj_groups_by_g_only_are_read(obj: Path) -> None:
     text = "\n".join(line for line in obj.read_text().splitlines() if "mtl" not in line)
     obj.write_text(text)
     assert [(m.name, m.kind) for m in load_mesh(obj).materials] == [("face", "skin"), ("ball", "opaque")]
@@ -86,7 +86,7 @@ def test_obj_groups_by_g_alone(obj: Path) -> None:
     assert [(m.name, m.kind) for m in named.materials] == [("face", "opaque"), ("ball", "skin")]
 
 
-def test_obj_comments_and_line_ends_are_no_damage(obj: Path) -> None:
+def test_obj_comments_and_line_ends_are_accepted(obj: Path) -> None:
     whole = load_mesh(obj)
     text = obj.read_text().replace("v 2 0 0\n", "v 2 0 0 # tip\n").replace("7/3\n", "7/3 # usemtl skin\n")
     obj.write_bytes(text.replace("\n", "\r\n").encode())
@@ -107,7 +107,7 @@ def test_relative_indices_count_from_the_last_vertex(obj: Path) -> None:
     np.testing.assert_array_equal(load_mesh(obj).positions, absolute.positions)
 
 
-def test_v_origin_of_obj(obj: Path) -> None:
+def test_obj_v_starts_at_the_bottom(obj: Path) -> None:
     # the file's lowest vertices have v = 0.2, counted from the bottom by the format
     for origin, low, high in (("auto", 0.8, 0.1), ("bottom", 0.8, 0.1), ("top", 0.2, 0.9)):
         mesh = load_mesh(obj, v_origin=origin)
@@ -118,7 +118,7 @@ def test_v_origin_of_obj(obj: Path) -> None:
 
 
 @pytest.mark.parametrize(("u", "v"), [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
-def test_ply_uv_names_and_origin(tmp_path: Path, u: str, v: str) -> None:
+def test_ply_uv_names_are_recognised_and_v_starts_at_the_bottom(tmp_path: Path, u: str, v: str) -> None:
     path = tmp_path / "head.ply"
     path.write_text(PLY.format(u=u, v=v))
     mesh = load_mesh(path)
@@ -127,7 +127,7 @@ def test_ply_uv_names_and_origin(tmp_path: Path, u: str, v: str) -> None:
     assert [(m.name, m.kind) for m in mesh.materials] == [("head", "skin")]
 
 
-def test_normals_of_the_file_are_kept_where_sound_and_computed_where_not(tmp_path: Path) -> None:
+def test_valid_normals_are_kept_and_others_computed(tmp_path: Path) -> None:
     path = tmp_path / "head.ply"
     path.write_text(PLY.format(u="s", v="t"))
     mesh = load_mesh(path)
@@ -159,7 +159,7 @@ def test_z_up_turns_the_face_to_plus_z(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_mesh(path).normals[:, 1], -1, atol=1e-6)
 
 
-def test_uv_missing_by_rounding_only_is_put_back(obj: Path) -> None:
+def test_uv_outside_by_rounding_is_clamped(obj: Path) -> None:
     obj.write_text(obj.read_text().replace("vt 0.1 0.2", "vt -0.00005 0.2"))
     assert load_mesh(obj).uv.min() == 0
 
@@ -177,7 +177,9 @@ def test_uv_missing_by_rounding_only_is_put_back(obj: Path) -> None:
         ("a.fbx", b"Kaydara", r"\.fbx.*|suffix"),
     ],
 )
-def test_what_is_not_a_mesh_is_refused_by_name(tmp_path: Path, name: str, content: bytes, words: str) -> None:
+def test_file_that_is_not_a_mesh_is_named_in_the_refusal(
+    tmp_path: Path, name: str, content: bytes, words: str
+) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(DermisError, match=words) as caught:
@@ -185,7 +187,7 @@ def test_what_is_not_a_mesh_is_refused_by_name(tmp_path: Path, name: str, conten
     assert str(caught.value).startswith(str(path))
 
 
-def test_missing_file(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match="no such file"):
         load_mesh(tmp_path / "none.obj")
 

@@ -44,7 +44,7 @@ def _by_height(mesh):
     return mesh.uv[y.argmin()], mesh.uv[y.argmax()]
 
 
-def test_v_origin_of_glb(tmp_path: Path) -> None:
+def test_glb_v_starts_at_the_top(tmp_path: Path) -> None:
     path = _glb(tmp_path / "face.glb")
     for origin, low, high in (("auto", 0.2, 0.7), ("top", 0.2, 0.7), ("bottom", 0.8, 0.3)):
         bottom, top = _by_height(load_mesh(path, v_origin=origin))
@@ -52,14 +52,14 @@ def test_v_origin_of_glb(tmp_path: Path) -> None:
         assert top[1] == pytest.approx(high, abs=1e-6)
 
 
-def test_node_transform_and_colour_of_glb(tmp_path: Path) -> None:
+def test_glb_node_transform_and_colour_are_applied(tmp_path: Path) -> None:
     mesh = load_mesh(_glb(tmp_path / "face.glb"))
     np.testing.assert_allclose(mesh.positions.min(axis=0), [1000, 2000, 3000])
     assert mesh.materials[0].name == "Skin"
     assert mesh.materials[0].colour == pytest.approx((1.0, 0.2, 0.0), abs=1e-6)
 
 
-def test_mirrored_node_keeps_its_outside(tmp_path: Path) -> None:
+def test_mirrored_node_keeps_outward_normals(tmp_path: Path) -> None:
     mesh = load_mesh(_glb(tmp_path / "face.glb", mirror=True))
     corners = mesh.positions[mesh.triangles[0]]
     # mirrored in x, the face still looks to +Z
@@ -74,7 +74,7 @@ def test_glb_without_material_keeps_its_uv(tmp_path: Path) -> None:
     assert _by_height(mesh)[0][1] == pytest.approx(0.2, abs=1e-6)
 
 
-def test_a_group_without_a_name_is_called_after_the_file(tmp_path: Path) -> None:
+def test_unnamed_group_takes_the_file_name(tmp_path: Path) -> None:
     """The name is correct also if a copy of the file was read before under another name."""
     nameless = _glb(tmp_path / "first.glb", material=None).read_bytes().replace(b'"face"', b'""    ')
     for name in ("first", "second"):
@@ -106,7 +106,7 @@ def _gltf(path: Path, **changes: object) -> Path:
     return path
 
 
-def test_integer_uv_of_gltf(tmp_path: Path) -> None:
+def test_integer_gltf_uv_is_read(tmp_path: Path) -> None:
     mesh = load_mesh(_gltf(tmp_path / "face.gltf"))
     np.testing.assert_allclose(mesh.uv, [[0, 0.2], [1, 0.2], [0, 1]], atol=1e-6)
 
@@ -118,11 +118,11 @@ def test_gltf_without_its_buffer_is_refused(tmp_path: Path) -> None:
         load_mesh(path)
 
 
-def test_unit_is_metres(tmp_path: Path) -> None:
+def test_gltf_unit_is_metres(tmp_path: Path) -> None:
     path = _glb(tmp_path / "face.glb")
     np.testing.assert_allclose(load_mesh(path).size_mm, [200, 300, 0], atol=1e-3)
     np.testing.assert_allclose(load_mesh(path, unit_mm=10).size_mm, [2, 3, 0], atol=1e-5)
 
 
-def test_a_group_without_uv_is_known(tmp_path: Path) -> None:
+def test_group_without_uv_is_recorded(tmp_path: Path) -> None:
     assert load_rigged(_glb(tmp_path / "face.glb", drop_uv=True)).surface.has_uv == (False,)

@@ -62,7 +62,9 @@ def test_undamaged_file_loads(files: dict[str, bytes], tmp_path: Path, kind: str
 @pytest.mark.parametrize("kind", FORMATS)
 @given(data=st.data())
 @PATIENT
-def test_flipped_bytes(files, tmp_path_factory, kind: str, data: st.DataObject) -> None:
+def test_files_with_flipped_bytes_are_read_or_refused(
+    files, tmp_path_factory, kind: str, data: st.DataObject
+) -> None:
     content = bytearray(files[kind])
     for _ in range(data.draw(st.integers(1, 6))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))

@@ -31,7 +31,7 @@ def _encoded(normals: np.ndarray, full: int = 255) -> np.ndarray:
     return np.rint((unit + 1) / 2 * full).astype(dtype)
 
 
-def test_no_files_are_no_maps() -> None:
+def test_no_files_give_no_maps() -> None:
     assert load_maps() == Maps()
 
 
@@ -58,7 +58,7 @@ def test_grey_colour_is_repeated_in_all_channels_with_a_note(tmp_path: Path) -> 
     np.testing.assert_allclose(colour, 0.502887, atol=1e-6)
 
 
-def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
+def test_height_is_read_equally_at_every_bit_depth(tmp_path: Path) -> None:
     levels = np.random.default_rng(0).integers(0, 256, SHAPE).astype(np.uint8)
     write_exr(tmp_path / "h.exr", np.repeat(levels[..., None] / 255, 3, axis=2))
     deep = _png(tmp_path / "16.png", levels.astype(np.uint16) * 257)
@@ -117,7 +117,7 @@ def test_a_large_file_of_another_kind_is_refused_each_time(tmp_path: Path) -> No
                 load_maps(**{role: path})  # type: ignore[arg-type]
 
 
-def test_steps_of_8_bits_go_and_slopes_stay() -> None:
+def test_8_bit_quantisation_is_smoothed_and_slopes_stay() -> None:
     ramp = np.arange(64)[None, :] * 0.13 + np.arange(48)[:, None] * 0.07
     inside = (slice(4, -4), slice(4, -4))
     np.testing.assert_allclose(smooth_quantisation(ramp)[inside], ramp[inside], atol=1e-5)
@@ -125,7 +125,7 @@ def test_steps_of_8_bits_go_and_slopes_stay() -> None:
     assert across.std() < np.diff(np.round(ramp)[inside], axis=1).std() / 3
 
 
-def test_normals_become_slopes(tmp_path: Path) -> None:
+def test_normals_are_converted_to_slopes(tmp_path: Path) -> None:
     slope_u, slope_up = 0.3, -0.2
     normals = np.broadcast_to([-slope_u, -slope_up, 1.0], (*SHAPE, 3))
     for full, error in ((255, 0.01), (65535, 4e-5)):
@@ -135,7 +135,7 @@ def test_normals_become_slopes(tmp_path: Path) -> None:
         np.testing.assert_allclose(down, np.broadcast_to([slope_u, -slope_up], (*SHAPE, 2)), atol=error)
 
 
-def test_signed_float_normals_are_seen_to_be_signed(tmp_path: Path) -> None:
+def test_signed_float_normals_are_recognised(tmp_path: Path) -> None:
     unit = np.array([-0.6, 0.0, 0.8], np.float32)
     write_exr(tmp_path / "n.exr", np.tile(unit, (*SHAPE, 1)))
     write_exr(tmp_path / "m.exr", np.tile((unit + 1) / 2, (*SHAPE, 1)))
@@ -144,7 +144,7 @@ def test_signed_float_normals_are_seen_to_be_signed(tmp_path: Path) -> None:
         np.testing.assert_allclose(slopes, np.broadcast_to([0.75, 0], (*SHAPE, 2)), atol=1e-5)
 
 
-def test_empty_space_of_a_normal_map_is_flat(tmp_path: Path) -> None:
+def test_unused_texels_of_a_normal_map_are_flat(tmp_path: Path) -> None:
     pixels = np.zeros((*SHAPE, 3), np.uint8)
     pixels[:12] = (128, 128, 255)
     slopes = load_maps(normal=_png(tmp_path / "n.png", pixels)).normal
@@ -153,7 +153,7 @@ def test_empty_space_of_a_normal_map_is_flat(tmp_path: Path) -> None:
     assert np.abs(slopes).max() < 0.005
 
 
-def test_grey_maps_are_plain_numbers(tmp_path: Path) -> None:
+def test_grey_maps_are_read_linearly(tmp_path: Path) -> None:
     path = _png(tmp_path / "g.png", np.full((*SHAPE, 3), 51, np.uint8))
     maps = load_maps(specular=path, roughness=path)
     np.testing.assert_allclose(maps.specular, np.full(SHAPE, 0.2), atol=1e-7)
@@ -200,14 +200,14 @@ def test_float_colours_are_checked(tmp_path: Path, value: float, says: str) -> N
         load_maps(colour=tmp_path / "c.exr")
 
 
-def test_unknown_direction_of_green_is_refused(tmp_path: Path) -> None:
+def test_unknown_green_channel_direction_is_refused(tmp_path: Path) -> None:
     path = _png(tmp_path / "n.png", np.full((*SHAPE, 3), (128, 128, 255), np.uint8))
     with pytest.raises(DermisError, match="normal_y"):
         load_maps(normal=path, normal_y="left")  # type: ignore[arg-type]
 
 
 @pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
-def test_head_scan_normals_lean_as_its_heights_do() -> None:
+def test_head_scan_normals_match_its_heights() -> None:
     from dermis.formats.samples import SAMPLES, fetch_sample
 
     files, height_mm = fetch_sample("lee_perry_smith"), SAMPLES["lee_perry_smith"].height_mm
@@ -231,7 +231,7 @@ def test_head_scan_has_no_other_normal_map() -> None:
 
 
 @pytest.mark.parametrize("side", [16, 100, 2048])
-def test_mean_colour_is_that_of_painted_texels(side: int) -> None:
+def test_mean_colour_is_over_covered_texels(side: int) -> None:
     """It is correct for small maps, too, and computed once."""
     colour = np.random.default_rng(4).uniform(0.1, 0.9, (side, side, 3)).astype(np.float32)
     colour[:, side // 2 :] = 0.0

@@ -109,7 +109,7 @@ def same_triangles(mesh: Mesh, other: Mesh) -> bool:
     return np.array_equal(mesh.triangles, other.triangles) and np.array_equal(mesh.positions, other.positions)
 
 
-def test_a_sound_mesh_has_no_notes(tmp_path: Path) -> None:
+def test_valid_mesh_has_no_notes(tmp_path: Path) -> None:
     loaded = load(tmp_path, normals=BALL.normals)
     assert loaded.notes == () and np.array_equal(loaded.mesh.triangles, BALL.triangles)
     np.testing.assert_array_equal(loaded.mesh.uv, BALL.uv)
@@ -134,13 +134,13 @@ def test_repeated_triangles_are_left_out(tmp_path: Path, turn: int) -> None:
     assert same_triangles(loaded.mesh, load(tmp_path).mesh)
 
 
-def test_triangles_with_a_front_and_a_back_are_drawn_once(tmp_path: Path) -> None:
+def test_coinciding_opposite_triangles_are_kept_once(tmp_path: Path) -> None:
     loaded = load(tmp_path, triangles=np.vstack((BALL.triangles, BALL.triangles[:, ::-1])))
     assert note(loaded) == f"left out {TRIANGLES} triangles that repeat others"
     assert volume(loaded.mesh) == pytest.approx(1)
 
 
-def test_a_fin_becomes_a_sheet_of_its_own(tmp_path: Path) -> None:
+def test_fin_becomes_a_separate_surface(tmp_path: Path) -> None:
     a, b = BALL.triangles[200, :2]
     loaded = load(tmp_path, with_points([[0, 0, 0.3]], [[a, b, COUNT]]))
     assert note(loaded) == "separated the sheets that meet at 1 edge of more than two triangles"
@@ -151,7 +151,7 @@ def test_a_fin_becomes_a_sheet_of_its_own(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.normals[:COUNT], plain.normals, atol=1e-6)
 
 
-def test_an_inner_wall_becomes_a_sheet_of_its_own(tmp_path: Path) -> None:
+def test_inner_wall_becomes_a_separate_surface(tmp_path: Path) -> None:
     ring = np.flatnonzero(np.abs(BALL.positions[:, 1]) < 1e-6)[:-1]
     wall = np.column_stack((ring, np.roll(ring, -1), np.full(len(ring), COUNT)))
     loaded = load(tmp_path, with_points([[0, 0, 0]], wall))
@@ -179,7 +179,7 @@ def test_a_surface_that_meets_itself_at_an_edge_is_cut_there(tmp_path: Path, tri
     assert "separated the sheets" in loaded.notes[0] and len(loaded.mesh.triangles) == len(triangles)
 
 
-def test_many_sheets_at_one_edge_are_separated(tmp_path: Path) -> None:
+def test_many_surfaces_at_one_edge_are_separated(tmp_path: Path) -> None:
     tips = [[np.cos(t), np.sin(t), 0.5] for t in np.linspace(0, 6, 20)]
     fan = [[0, 1, 2 + k] for k in range(20)]
     positions = [[0, 0, 0], [0, 0, 1], *tips]
@@ -188,13 +188,13 @@ def test_many_sheets_at_one_edge_are_separated(tmp_path: Path) -> None:
     assert "at 1 edge" in note(loaded) and len(np.unique(loaded.mesh.point)) == 60
 
 
-def test_too_many_crowded_edges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.formats.mesh_repair._MAX_CROWDED_EDGES", 1)
+def test_too_many_non_manifold_edges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dermis.formats.mesh_repair._MAX_NON_MANIFOLD_EDGES", 1)
     with pytest.raises(DermisError, match="non-manifold"):
         load(tmp_path, with_points([[0, 0, 0.3]], [[0, 25, COUNT], [60, 61, COUNT], [80, 81, COUNT]]))
 
 
-def test_parts_of_different_materials_in_one_place_are_both_kept(tmp_path: Path) -> None:
+def test_coinciding_parts_of_different_materials_are_kept(tmp_path: Path) -> None:
     file = GltfFile()
     both = [add_mesh(file, BALL.positions, one) for one in (BALL.triangles, BALL.triangles[100:120])]
     file.tree["materials"] = [{"name": "skin"}, {"name": "paint"}]
@@ -207,8 +207,50 @@ def test_parts_of_different_materials_in_one_place_are_both_kept(tmp_path: Path)
     assert edges(loaded.mesh.point[loaded.mesh.triangles[skin]])[2].min() == 2
 
 
+def load_groups(folder: Path, *groups: tuple[str, NDArray[Any]]) -> RiggedMesh:
+    """Return a mesh of groups of triangles of a ball, as an OBJ file."""
+    rows = [f"v {x} {y} {z}" for x, y, z in 1000 * BALL.positions] + [f"vt {u} {1 - v}" for u, v in BALL.uv]
+    for name, triangles in groups:
+        rows += [f"usemtl {name}", *(f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in triangles + 1)]
+    (folder / "a.obj").write_text("\n".join(rows))
+    return load_rigged(folder / "a.obj", unit_mm=1.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "kept"),
+    [
+        (("skin", "paint"), "skin"),
+        (("paint", "skin"), "skin"),
+        (("skin_b", "skin_a"), "skin_b"),
+        (("skin", "b", "a"), "skin"),
+    ],
+)
+@pytest.mark.parametrize("inside_out", [False, True])
+def test_of_coinciding_shells_the_skin_or_the_first_is_kept(
+    tmp_path: Path, names: tuple[str, ...], kept: str, inside_out: bool
+) -> None:
+    first, *others = names
+    copy = BALL.triangles[:, ::-1] if inside_out else BALL.triangles
+    loaded = load_groups(tmp_path, (first, BALL.triangles), *((name, copy) for name in others))
+    assert [one.name for one in loaded.mesh.materials] == [kept] and len(loaded.mesh.triangles) == TRIANGLES
+    assert loaded.surface.has_uv == (True,) and len(loaded.surface.in_file) == 1
+    assert f"left out {TRIANGLES * len(others):,} triangles that repeat others" in loaded.notes
+    left_out = ", ".join(sorted(set(names) - {kept}, key=names.index))
+    assert f"nothing remains of these groups: {left_out}" in loaded.notes
+
+
+def test_group_of_only_flat_triangles_is_left_out(tmp_path: Path) -> None:
+    flat = np.array([[0, 0, 1], [2, 2, 2]])
+    loaded = load_groups(tmp_path, ("skin_b", flat), ("skin", BALL.triangles), ("hair", BALL.triangles[:9]))
+    assert [one.name for one in loaded.mesh.materials] == ["skin", "hair"]
+    assert np.bincount(loaded.mesh.material).tolist() == [TRIANGLES, 9]
+    assert "nothing remains of these groups: skin_b" in loaded.notes
+    with pytest.raises(DermisError, match=r"has no triangles|no area|area"):
+        load_groups(tmp_path, ("skin", flat), ("hair", BALL.triangles[:1]))
+
+
 @pytest.mark.parametrize("of_file", ["none", "outwards", "inwards"])
-def test_a_closed_mesh_that_is_inside_out_is_reversed(tmp_path: Path, of_file: str) -> None:
+def test_inverted_closed_mesh_is_reversed(tmp_path: Path, of_file: str) -> None:
     normals = {"none": None, "outwards": BALL.normals, "inwards": -BALL.normals}[of_file]
     loaded = load(tmp_path, inverted(BALL), normals=normals)
     check_mesh(loaded.mesh, "mended")
@@ -227,14 +269,14 @@ def test_triangles_of_both_windings_are_made_consistent(tmp_path: Path) -> None:
     assert f"reversed {some.sum()} triangles" in note(loaded) and volume(loaded.mesh) == pytest.approx(1)
 
 
-def test_normals_that_point_inwards_are_turned(tmp_path: Path) -> None:
+def test_inward_normals_are_flipped(tmp_path: Path) -> None:
     loaded = load(tmp_path, normals=-BALL.normals)
     assert note(loaded) == f"turned {COUNT} normals outwards"
     np.testing.assert_allclose(loaded.mesh.normals, BALL.normals, atol=1e-6)
 
 
 @pytest.mark.parametrize("height", [-0.06, 0.0])
-def test_an_open_mesh_is_judged_by_the_side_that_is_seen(tmp_path: Path, height: float) -> None:
+def test_open_mesh_is_oriented_by_its_visible_side(tmp_path: Path, height: float) -> None:
     above = BALL.triangles[BALL.positions[BALL.triangles].mean(axis=1)[:, 1] > height]
     assert load(tmp_path, triangles=above).notes == ()
     loaded = load(tmp_path, triangles=above[:, ::-1])
@@ -242,7 +284,7 @@ def test_an_open_mesh_is_judged_by_the_side_that_is_seen(tmp_path: Path, height:
     assert (crosses(loaded.mesh) * loaded.mesh.positions[loaded.mesh.triangles[:, 0]]).sum(axis=1).min() > 0
 
 
-def test_a_flat_piece_follows_the_normals_of_the_file(tmp_path: Path) -> None:
+def test_flat_component_follows_the_normals_of_the_file(tmp_path: Path) -> None:
     patch = plane(0.06, 4)
     assert load(tmp_path, patch, normals=patch.normals).notes == load(tmp_path, inverted(patch)).notes == ()
     loaded = load(tmp_path, inverted(patch), normals=patch.normals)
@@ -250,24 +292,24 @@ def test_a_flat_piece_follows_the_normals_of_the_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(loaded.mesh.normals, patch.normals)
 
 
-def test_a_hollow_patch_is_not_turned(tmp_path: Path) -> None:
+def test_concave_patch_is_not_reversed(tmp_path: Path) -> None:
     above = BALL.triangles[BALL.positions[BALL.triangles].mean(axis=1)[:, 1] > 0.07]
     assert load(tmp_path, triangles=above[:, ::-1], normals=-BALL.normals).notes == ()
 
 
-def test_an_eyeball_that_is_inside_out_is_reversed_alone(tmp_path: Path) -> None:
+def test_only_an_inverted_eyeball_is_reversed(tmp_path: Path) -> None:
     eye = moved(uv_sphere(0.012, 12, 8), 0.03, 0.02, 0.092)
     loaded = load(tmp_path, joined(BALL, inverted(eye)))
     assert note(loaded).startswith(f"reversed {len(eye.triangles)} triangles of")
 
 
-def test_the_inner_wall_of_a_hollow_mesh_is_not_turned(tmp_path: Path) -> None:
+def test_inner_wall_of_a_hollow_mesh_is_not_reversed(tmp_path: Path) -> None:
     shell = joined(BALL, inverted(uv_sphere(0.09, 24, 12)))
     assert load(tmp_path, shell).notes == ()
     assert f"reversed {2 * TRIANGLES:,} triangles" in note(load(tmp_path, inverted(shell)))
 
 
-def test_a_strip_of_one_side_is_not_changed(tmp_path: Path) -> None:
+def test_moebius_strip_is_unchanged(tmp_path: Path) -> None:
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)[:, None]
     along = np.hstack((np.cos(turn), np.sin(turn), 0 * turn))
     across = 0.3 * np.hstack(
@@ -282,7 +324,7 @@ def test_a_strip_of_one_side_is_not_changed(tmp_path: Path) -> None:
     check_mesh(load(tmp_path, mesh).mesh, "strip")
 
 
-def test_normals_without_length_are_computed(tmp_path: Path) -> None:
+def test_zero_normals_are_recomputed(tmp_path: Path) -> None:
     normals = BALL.normals.copy()
     normals[3], normals[5] = np.nan, 0
     loaded = load(tmp_path, normals=normals)
@@ -290,7 +332,7 @@ def test_normals_without_length_are_computed(tmp_path: Path) -> None:
     np.testing.assert_allclose(loaded.mesh.normals, BALL.normals, atol=0.02)
 
 
-def test_vertices_that_no_triangle_uses_may_be_anything(tmp_path: Path) -> None:
+def test_unused_vertices_may_have_any_values(tmp_path: Path) -> None:
     positions = np.vstack((BALL.positions[:5], [[np.nan] * 3, [1e30] * 3], BALL.positions[5:]))
     uv = np.vstack((BALL.uv[:5], [[np.inf] * 2] * 2, BALL.uv[5:]))
     triangles = BALL.triangles + 2 * (BALL.triangles >= 5)
@@ -304,13 +346,13 @@ def test_uv_slightly_outside_the_tile_are_clamped(tmp_path: Path) -> None:
     np.testing.assert_allclose(loaded.mesh.uv, BALL.uv, atol=0.0151)
 
 
-def test_uv_a_tile_off_are_moved(tmp_path: Path) -> None:
+def test_uv_one_tile_away_are_moved(tmp_path: Path) -> None:
     loaded = load(tmp_path, uv=BALL.uv + np.array([3, -2]))
     assert note(loaded) == "moved 1 of 1 uv chart by whole tiles into [0, 1]"
     np.testing.assert_allclose(loaded.mesh.uv, BALL.uv, atol=1e-6)
 
 
-def test_each_uv_chart_is_moved_by_itself(tmp_path: Path) -> None:
+def test_each_uv_chart_is_moved_separately(tmp_path: Path) -> None:
     both = joined(BALL, moved(uv_sphere(0.02, 12, 8), 0, 0, 0.2))
     shift = np.where(np.arange(len(both.uv)) < COUNT, 0, 1)[:, None]
     loaded = load(tmp_path, both, uv=both.uv + shift)
@@ -330,7 +372,9 @@ REPEATED, MIRRORED, CLAMPED = 10497, 33648, 33071
     ("wrap", "shift", "is_moved"),
     [(REPEATED, 1, True), (MIRRORED, 2, True), (MIRRORED, 1, False), (CLAMPED, 1, False)],
 )
-def test_uv_are_moved_as_pictures_repeat(tmp_path: Path, wrap: int, shift: int, is_moved: bool) -> None:
+def test_uv_are_moved_by_the_repetition_of_pictures(
+    tmp_path: Path, wrap: int, shift: int, is_moved: bool
+) -> None:
     try:
         notes = load(tmp_path, uv=BALL.uv + np.array([shift, 0]), sampler={"wrapS": wrap}).notes
     except DermisError:
@@ -338,7 +382,7 @@ def test_uv_are_moved_as_pictures_repeat(tmp_path: Path, wrap: int, shift: int, 
     assert any("whole tiles" in text for text in notes) == is_moved
 
 
-def test_targets_and_bones_follow_separated_sheets(tmp_path: Path) -> None:
+def test_targets_and_bones_follow_separated_surfaces(tmp_path: Path) -> None:
     a, b = BALL.triangles[200, :2]
     finned, file = with_points([[0, 0, 0.3]], [[0, 0, 1], [a, b, COUNT]]), GltfFile()
     share = np.clip(5 * finned.positions[:, 1] + 0.5, 0, 1)
@@ -375,7 +419,7 @@ def test_quads_follow_their_triangles(tmp_path: Path) -> None:
     np.testing.assert_array_equal(one[:, [0, 2]], two[:, [2, 0]])
 
 
-def test_a_sequence_moves_a_mended_head(tmp_path: Path) -> None:
+def test_sequence_animates_a_repaired_head(tmp_path: Path) -> None:
     for frame, scale in enumerate((1, 1.1)):
         rows = [f"v {x * scale} {y} {z}" for x, y, z in 1000 * BALL.positions]
         rows += [f"vt {u} {1 - v}" for u, v in BALL.uv]

@@ -25,7 +25,7 @@ def _tests_are_importable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_decoding, "_CPU_S", 1.0)
 
 
-def test_arrays_go_to_the_decoder_and_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arrays_pass_through_the_decoder_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "json.py").write_text("raise SystemExit(1)")  # a hostile file in the working directory
     monkeypatch.chdir(tmp_path)
     answer = answer_to("sound")
@@ -44,12 +44,12 @@ def test_arrays_go_to_the_decoder_and_back(tmp_path: Path, monkeypatch: pytest.M
         ("refuse", "^a.x: expected one, but it has two. Remove it.$"),
     ],
 )
-def test_faults_of_a_decoder_are_refusals(fault: str, message: str) -> None:
+def test_decoder_errors_become_refusals(fault: str, message: str) -> None:
     with pytest.raises(DermisError, match=message):
         answer_to(fault)
 
 
-def test_a_decoder_that_waits_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stalled_decoder_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_decoding, "_MAX_WAIT", 0.01)
     with pytest.raises(DermisError, match="its decoder takes more than 1 s"):
         answer_to("loop")

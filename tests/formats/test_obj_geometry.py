@@ -61,11 +61,11 @@ FORMS: dict[str, str | bytes] = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_the_same_square_in_other_words(tmp_path: Path, form: str) -> None:
+def test_equivalent_statements_give_the_same_square(tmp_path: Path, form: str) -> None:
     same(read(tmp_path, FORMS[form]), read(tmp_path, SQUARE))
 
 
-def test_corners_may_have_other_attributes_in_each_face(tmp_path: Path) -> None:
+def test_corner_attributes_may_differ_per_face(tmp_path: Path) -> None:
     faces = "f 1/1/1 2/2/1 3/3/1\nf 1/1 3/3 4/4\n"
     part = only(read(tmp_path, f"{CORNERS}{UV}vn 0 0 1\n{faces}"))
     assert part.normals is not None and part.uv is not None and len(part.triangles) == 2
@@ -75,13 +75,13 @@ def test_corners_may_have_other_attributes_in_each_face(tmp_path: Path) -> None:
     np.testing.assert_array_equal(part.positions[part.triangles[1]], [[0, 0, 0], [2, 3, 0], [0, 3, 0]])
 
 
-def test_normals_without_uv(tmp_path: Path) -> None:
+def test_normals_without_uv_are_read(tmp_path: Path) -> None:
     part = only(read(tmp_path, f"{CORNERS}vn 0 0 1\nf 1//1 2//1 3//1 4//1\n"))
     assert part.uv is None and part.normals is not None
     np.testing.assert_array_equal(part.normals, np.tile([0, 0, 1], (4, 1)))
 
 
-def test_faces_without_uv_become_a_part_of_their_own(tmp_path: Path) -> None:
+def test_faces_without_uv_become_a_separate_part(tmp_path: Path) -> None:
     file = read(tmp_path, f"{CORNERS}{UV}usemtl skin\nf 1/1 2/2 3/3\nf 1 3 4/4\n")
     assert file.notes == ("1 of 2 faces have no uv",)
     first, second = file.parts
@@ -89,7 +89,7 @@ def test_faces_without_uv_become_a_part_of_their_own(tmp_path: Path) -> None:
     np.testing.assert_array_equal(second.positions[second.triangles[0]], [[0, 0, 0], [2, 3, 0], [0, 3, 0]])
 
 
-def test_groups_keep_the_order_in_which_they_have_faces(tmp_path: Path) -> None:
+def test_groups_are_ordered_by_their_first_face(tmp_path: Path) -> None:
     faces = "g empty\ng b\nf 1/1 2/2 3/3\ng a\nf 1/1 3/3 4/4\ng b\nf 2/2 3/3 4/4\n"
     file = read(tmp_path, f"{CORNERS}{UV}{faces}")
     assert [(part.group.names, len(part.triangles)) for part in file.parts] == [
@@ -99,7 +99,7 @@ def test_groups_keep_the_order_in_which_they_have_faces(tmp_path: Path) -> None:
     ]
 
 
-def test_objects_are_groups_only_where_nothing_else_has_a_name(tmp_path: Path) -> None:
+def test_objects_become_groups_only_without_other_names(tmp_path: Path) -> None:
     text = f"{CORNERS}{UV}o Face\nf 1/1 2/2 3/3\no Eye_L\nf 1/1 3/3 4/4\n"
     assert [part.group.names for part in read(tmp_path, text).parts] == [("Face",), ("Eye_L",)]
     assert [part.group.names for part in read(tmp_path, f"g\n{text}").parts] == [("Face",), ("Eye_L",)]
@@ -120,7 +120,7 @@ def test_an_mtl_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:
     assert only(file).group.colour == (0.5, 0.25, 0.125)
 
 
-def test_text_in_half_a_character_of_utf16_is_refused(tmp_path: Path) -> None:
+def test_truncated_utf16_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_bytes(b"\xff\xfe" + b"v\0 \x001")
     with pytest.raises(DermisError, match=r"a\.obj: expected an OBJ file"):
@@ -165,7 +165,7 @@ def test_polypaint_of_zbrush_colours_the_vertices(tmp_path: Path) -> None:
     assert file.notes == ()
 
 
-def test_colours_of_vertices_go_before_polypaint_with_a_note(tmp_path: Path) -> None:
+def test_vertex_colours_override_polypaint_with_a_note(tmp_path: Path) -> None:
     file = read(tmp_path, coloured(["1 0 0"] * 4) + "\n#MRGB ffff0000ff008000ff0000ffff4080bf\n")
     np.testing.assert_array_equal(only(file).colours, [[1, 0, 0]] * 4)
     assert file.notes == ("the polypaint (#MRGB) is left out: vertices have colours of their own",)
@@ -177,7 +177,7 @@ def test_damaged_polypaint_is_left_out_with_a_note(tmp_path: Path, paint: str) -
     assert only(file).colours is None and "polypaint" in file.notes[0]
 
 
-def test_a_joined_part_carries_colours_white_where_there_are_none(tmp_path: Path) -> None:
+def test_joined_parts_without_colours_are_white(tmp_path: Path) -> None:
     red = only(read(tmp_path, coloured(["1 0 0"] * 4)))
     plain = only(read(tmp_path, SQUARE))
     joined = join_parts([red, plain], tmp_path / "a.obj")
@@ -187,7 +187,7 @@ def test_a_joined_part_carries_colours_white_where_there_are_none(tmp_path: Path
     assert join_parts([plain, plain], tmp_path / "a.obj").colours is None
 
 
-def test_positions_are_divided_by_their_weight(tmp_path: Path) -> None:
+def test_homogeneous_positions_are_divided_by_their_weight(tmp_path: Path) -> None:
     file = read(tmp_path, SQUARE.replace("v 2 3 0\n", "v 4 6 0 2\n"))
     np.testing.assert_array_equal(only(file).positions, only(read(tmp_path, SQUARE)).positions)
     assert file.notes == ("vertices have a fourth coordinate: their positions are divided by it",)
@@ -210,17 +210,17 @@ NOTES = {
 
 
 @pytest.mark.parametrize("statement", NOTES)
-def test_what_is_not_drawn_is_noted_once(tmp_path: Path, statement: str) -> None:
+def test_undrawn_elements_are_noted_once(tmp_path: Path, statement: str) -> None:
     (note,) = read(tmp_path, SQUARE + statement).notes
     assert NOTES[statement] in note
 
 
 @pytest.mark.parametrize("statement", ["s 1\n", "mg 1 0.1\n", "# a comment\n", "\n \n", "g\n", "mtllib\n"])
-def test_what_has_no_visual_meaning_is_not_noted(tmp_path: Path, statement: str) -> None:
+def test_statements_without_visual_meaning_are_not_noted(tmp_path: Path, statement: str) -> None:
     same(read(tmp_path, SQUARE + statement), read(tmp_path, SQUARE))
 
 
-def test_flat_shading_is_no_loss_where_there_are_normals(tmp_path: Path) -> None:
+def test_flat_shading_is_not_noted_when_normals_exist(tmp_path: Path) -> None:
     assert read(tmp_path, f"s off\n{CORNERS}vn 0 0 1\nf 1//1 2//1 3//1\n").notes == ()
 
 

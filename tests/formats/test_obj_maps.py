@@ -68,20 +68,20 @@ def test_a_grey_bump_map_is_a_height_map(statement: str, tmp_path: Path) -> None
     np.testing.assert_allclose(maps.height, 0.5 * whole.height, atol=1e-6)
 
 
-def test_heights_without_a_length_are_left_out_with_a_word(tmp_path: Path) -> None:
+def test_heights_without_scale_are_left_out_with_a_note(tmp_path: Path) -> None:
     path = head(tmp_path, "bump b.png\nmap_Kd c.png", b=RAMP, c=plain(9, 9, 9))
     with pytest.warns(DermisWarning, match=r"bump: .*b\.png.*height_mm"):
         maps = dermis.load_head(path).maps
     assert maps.height is None and maps.colour is not None
 
 
-def test_a_normal_map_goes_before_a_bump_map(tmp_path: Path) -> None:
+def test_normal_map_overrides_bump_map(tmp_path: Path) -> None:
     maps = loaded_quietly(head(tmp_path, "bump b.png\nnorm n.png", b=RAMP, n=NORMALS)).maps
     assert maps.normal is not None and maps.height is None
     np.testing.assert_allclose(maps.normal[..., 0], LEANING, atol=1e-5)
 
 
-def test_maps_that_are_given_replace_those_of_the_material(tmp_path: Path) -> None:
+def test_option_maps_override_those_of_the_material(tmp_path: Path) -> None:
     path = head(tmp_path, "map_Kd gone.png\nnorm gone too.png\nmap_Ks s.png", s=RAMP)
     write_png(tmp_path / "mine.png", plain(0, 255, 0))
     maps = loaded_quietly(path, colour=tmp_path / "mine.png", height=tmp_path / "s.png", height_mm=0.02).maps
@@ -89,7 +89,7 @@ def test_maps_that_are_given_replace_those_of_the_material(tmp_path: Path) -> No
     assert maps.height is not None and maps.normal is None and maps.specular is not None
 
 
-def test_notes_name_all_that_is_missing(tmp_path: Path) -> None:
+def test_notes_name_all_missing_files(tmp_path: Path) -> None:
     path = head(tmp_path, "map_Kd gone.png\nmap_Ks C:\\Users\\me\\away.png\nmap_Pr r.tga")
     (tmp_path / "r.tga").write_bytes(b"\0\0\2" + bytes(30))
     with pytest.warns(DermisWarning) as caught:
@@ -104,7 +104,7 @@ def test_notes_name_all_that_is_missing(tmp_path: Path) -> None:
         dermis.load_head(path)
 
 
-def test_nothing_outside_the_folder_is_read(tmp_path: Path) -> None:
+def test_files_outside_the_folder_are_not_read(tmp_path: Path) -> None:
     write_png(tmp_path / "secret.png", plain(255, 0, 0))
     (tmp_path / "inside").mkdir()
     for name in ("../secret.png", str(tmp_path / "secret.png"), "link.png"):
@@ -119,7 +119,7 @@ def test_nothing_outside_the_folder_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(loaded_quietly(path).maps.colour, [[[0, 0, 1]]])
 
 
-def test_the_skin_has_the_map_and_not_the_eyes(tmp_path: Path) -> None:
+def test_map_applies_to_the_skin_and_not_the_eyes(tmp_path: Path) -> None:
     lines = obj_text().splitlines()
     first = next(number for number, line in enumerate(lines) if line.startswith("f"))
     eye = ["usemtl eye", *lines[first : first + 9]]
@@ -134,7 +134,7 @@ def test_the_skin_has_the_map_and_not_the_eyes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (2, 2), (4, 4), (8, 8), (1, 3), (5, 2)])
-def test_maps_of_a_few_texels_are_drawn(
+def test_tiny_maps_are_drawn(
     shape: tuple[int, int], tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Uniform maps of any size result in the picture of a map with one texel."""
@@ -162,6 +162,6 @@ def test_a_gltf_file_may_have_placeholders(tmp_path: Path) -> None:
     assert maps.colour is not None and maps.colour.shape == (1, 1, 3)
 
 
-def test_a_length_needs_heights(tmp_path: Path) -> None:
+def test_height_scale_needs_a_height_map(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match="height_mm: expected a height map with it"):
         dermis.load_head(head(tmp_path, "map_Kd c.png", c=plain(1, 1, 1)), height_mm=0.02)

@@ -16,7 +16,7 @@ from dermis.scene.heads import load_head
 
 
 @pytest.mark.parametrize("form", ["binary", "text", "binary that begins with solid"])
-def test_a_stl_file_is_read_with_common_vertices(form: str, tmp_path: Path) -> None:
+def test_stl_vertices_are_merged(form: str, tmp_path: Path) -> None:
     path = write_stl(tmp_path / "a.stl", text=form == "text", header=b"solid" if "solid" in form else b"")
     (part,) = read_mesh_file(path).parts
     np.testing.assert_allclose(part.positions[part.triangles], BALL.positions[BALL.triangles], atol=1e-4)

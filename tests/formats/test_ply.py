@@ -60,13 +60,15 @@ def is_house(part: MeshPart) -> bool:
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("number", ["float", "double"])
 @pytest.mark.parametrize("faces", ["list uchar int vertex_indices", "list int uint vertex_index"])
-def test_triangles_and_quads_in_every_layout(tmp_path: Path, order: str, number: str, faces: str) -> None:
+def test_triangles_and_quads_are_read_in_every_encoding(
+    tmp_path: Path, order: str, number: str, faces: str
+) -> None:
     file = read(tmp_path, house(XYZ_UV.replace("float", number), faces=faces), order)
     assert is_house(only(file)) and file.notes == ()
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_properties_around_lists_of_other_lengths(tmp_path: Path, order: str) -> None:
+def test_properties_around_lists_of_varying_lengths_are_read(tmp_path: Path, order: str) -> None:
     faces = [(7, [0, 1, 2, 3], 0.5, [], 1), (7, [3, 2, 4], 0.25, [1.5, 2.5], 1)]
     properties = (
         "uchar flags, list uchar int vertex_indices, float quality, list ushort double quality, short id"
@@ -76,14 +78,14 @@ def test_properties_around_lists_of_other_lengths(tmp_path: Path, order: str) ->
 
 
 @pytest.mark.parametrize("names", ["s t", "u v", "texture_u texture_v", "s_coord t_coord", "tu tv"])
-def test_names_of_uv(tmp_path: Path, names: str) -> None:
+def test_uv_property_names_are_recognised(tmp_path: Path, names: str) -> None:
     u, v = names.split()
     file = read(tmp_path, house(f"{XYZ}, float {u}, float {v}"))
     assert is_house(only(file)) and file.notes == ()
 
 
 @pytest.mark.parametrize("ends", [b"\r\n", b"\r"])
-def test_headers_with_other_line_ends(tmp_path: Path, ends: bytes) -> None:
+def test_headers_with_other_line_ends_are_read(tmp_path: Path, ends: bytes) -> None:
     for order in ORDERS:
         content = ply_bytes(house(), order)
         size = content.index(b"end_header\n") + len(b"end_header\n")
@@ -95,7 +97,7 @@ WEDGE_FACES = f"{INDICES}, list uchar float texcoord"
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_uv_of_corners(tmp_path: Path, order: str) -> None:
+def test_uv_per_corner_is_read(tmp_path: Path, order: str) -> None:
     faces = [(index, uv) for (index,), uv in zip(QUAD_AND_TRIANGLE, WEDGES, strict=True)]
     elements = {"vertex": (f"{XYZ}, float nx, float ny, float nz", [(*p, 0, 0, 1) for p in PLACES])}
     part = only(read(tmp_path, elements | {"face": (WEDGE_FACES, faces)}, order))
@@ -106,7 +108,7 @@ def test_uv_of_corners(tmp_path: Path, order: str) -> None:
     assert len(part.positions) == 7  # two vertices have another uv in each face
 
 
-def test_faces_without_uv_become_a_part_of_their_own(tmp_path: Path) -> None:
+def test_faces_without_uv_become_a_separate_part(tmp_path: Path) -> None:
     faces = [(QUAD_AND_TRIANGLE[0][0], WEDGES[0]), (QUAD_AND_TRIANGLE[1][0], [])]
     file = read(tmp_path, {"vertex": (XYZ, PLACES), "face": (WEDGE_FACES, faces)})
     assert file.notes == ("1 of 2 faces have no uv",)
@@ -135,7 +137,7 @@ def test_colours_of_vertices_are_srgb(tmp_path: Path, order: str, names: str) ->
     assert is_house(only(file)) and file.notes == ()
 
 
-def test_colours_as_fractions_and_as_wide_integers(tmp_path: Path) -> None:
+def test_colours_are_read_as_fractions_and_wide_integers(tmp_path: Path) -> None:
     for kind, scale in (("float", 1 / 255), ("ushort", 257)):
         values = [tuple(type(scale)(level * scale) for level in levels) for levels in LEVELS]
         file = read(tmp_path, coloured(f"{kind} red, {kind} green, {kind} blue", values), "binary_big_endian")
@@ -158,7 +160,7 @@ def test_transparency_of_vertices_is_noted_where_it_varies(tmp_path: Path) -> No
         assert file.notes == notes
 
 
-def test_the_picture_is_named_in_a_comment(tmp_path: Path) -> None:
+def test_picture_name_is_read_from_a_comment(tmp_path: Path) -> None:
     assert read(tmp_path, house()).materials == ()
     comments = ["made by a scanner", "TextureFile my face.png"]
     (note,) = read(tmp_path, house(), "binary_little_endian", comments).notes
@@ -168,7 +170,7 @@ def test_the_picture_is_named_in_a_comment(tmp_path: Path) -> None:
     assert material.textures["colour"].picture == tmp_path / "my face.png"
 
 
-def test_of_several_pictures_that_of_most_faces_is_used_with_a_note(tmp_path: Path) -> None:
+def test_most_used_of_several_pictures_is_used_with_a_note(tmp_path: Path) -> None:
     faces = [([0, 1, 2], 1), ([0, 2, 3], 1), ([3, 2, 4], 0)]
     elements = {"vertex": (XYZ_UV, VERTICES), "face": (f"{INDICES}, int texnumber", faces)}
     file = read(tmp_path, elements, comments=["TextureFile a.png", "TextureFile b.png", "TextureFile c.png"])
@@ -176,7 +178,7 @@ def test_of_several_pictures_that_of_most_faces_is_used_with_a_note(tmp_path: Pa
     assert read(tmp_path, elements).notes == ()
 
 
-def test_strips_are_triangles(tmp_path: Path) -> None:
+def test_strips_become_triangles(tmp_path: Path) -> None:
     strips = [([0, 1, 3, 2, 4, -1, 3, 2, 4],), ([0, 1, 1, 3],)]
     elements = {"vertex": (XYZ_UV, VERTICES), "tristrips": ("list int int vertex_indices", strips)}
     for order in ORDERS:
@@ -201,7 +203,7 @@ NOTES: dict[str, Elements] = {
 
 
 @pytest.mark.parametrize("names", NOTES)
-def test_what_is_not_drawn_is_noted_once(tmp_path: Path, names: str) -> None:
+def test_undrawn_elements_are_noted_once(tmp_path: Path, names: str) -> None:
     for order in ORDERS:
         assert read(tmp_path, NOTES[names], order).notes == (f"these are left out: {names}",)
 
@@ -213,7 +215,7 @@ def test_faces_of_two_corners_are_noted(tmp_path: Path) -> None:
     assert file.notes == ("2 faces of fewer than three corners are left out",)
 
 
-def test_what_has_no_visual_meaning_is_not_noted(tmp_path: Path) -> None:
+def test_properties_without_visual_meaning_are_not_noted(tmp_path: Path) -> None:
     vertices = [(*vertex, 1, 2, 3) for vertex in VERTICES]
     file = read(
         tmp_path, house(f"{XYZ_UV}, float confidence, float quality, float scalar_Curvature", vertices)
@@ -274,7 +276,7 @@ def test_damaged_text_is_refused(tmp_path: Path, old: bytes, new: bytes, words: 
         read_bytes(tmp_path, content.replace(old, new))
 
 
-def test_blank_bytes_at_the_end_are_no_damage(tmp_path: Path) -> None:
+def test_trailing_blank_bytes_are_accepted(tmp_path: Path) -> None:
     content = ply_bytes(house(), "binary_little_endian")
     assert is_house(only(read_bytes(tmp_path, content + b"\r\n")))
     with pytest.raises(DermisError, match="2 bytes follow its last element"):

@@ -78,7 +78,7 @@ def test_registry_is_well_formed() -> None:
             assert re.fullmatch("[0-9a-f]{64}", file.sha256)
 
 
-def test_heads_say_how_large_and_which_way_up() -> None:
+def test_heads_state_their_unit_and_axes() -> None:
     head = SAMPLES["lee_perry_smith"]
     assert (head.unit_mm, head.v_origin, head.height_mm) == (50.35, "bottom", 0.025)
     assert set(head.files) == {"mesh", "colour", "specular", "normal", "height", "licence"}
@@ -92,7 +92,7 @@ def test_registry_cannot_be_changed() -> None:
         SAMPLES["lebombo"].files["mine"] = None  # type: ignore[index]
 
 
-def test_unknown_sample_is_refused_with_the_known_ones() -> None:
+def test_unknown_sample_is_refused_with_known_ones_listed() -> None:
     for ask in (fetch_sample, is_available):
         with pytest.raises(DermisError, match=r"'mine'.*lee_perry_smith, royal_esplanade, lebombo"):
             ask("mine")
@@ -164,14 +164,18 @@ def test_damaged_file_in_the_cache_is_fetched_again(
     assert fetch_sample("tiny")["environment"].read_bytes() == CONTENT
 
 
-def test_changed_file_at_home_is_refused(cache: Path, home: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_file_at_its_source_is_refused(
+    cache: Path, home: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     _register(monkeypatch, _sample(f"{home}/tiny.hdr", content=b"what it was"))
     with pytest.raises(DermisError, match="the file has changed"):
         fetch_sample("tiny")
     assert not (cache / "env" / "tiny.hdr").exists()
 
 
-def test_file_gone_from_home_is_refused(cache: Path, home: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_missing_at_its_source_is_refused(
+    cache: Path, home: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     _register(monkeypatch, _sample(f"{home}/gone/tiny.hdr"))
     with pytest.raises(DermisError, match=r"(?s)HTTPError.*gone/tiny\.hdr"):
         fetch_sample("tiny")

@@ -35,18 +35,18 @@ def refusal(mesh: Mesh, name: str, unit_mm: float | None = None) -> str:
 
 @pytest.mark.parametrize("unit_mm", [1, 10, 25.4, 100, 1000])
 @pytest.mark.parametrize(("mesh", "height"), [(figure(), 1700), (HEAD, 240)], ids=["figure", "head"])
-def test_the_unit_of_figures_and_heads_is_found(mesh: Mesh, height: float, unit_mm: float) -> None:
+def test_unit_of_figures_and_heads_is_guessed(mesh: Mesh, height: float, unit_mm: float) -> None:
     found = settled(scaled(mesh, 1 / unit_mm), "skin.obj")
     assert found.mesh.size_mm[1] == pytest.approx(height, rel=1e-3)
 
 
 @pytest.mark.parametrize("unit_mm", [1, 10, 100, 1000])
 @pytest.mark.parametrize("mesh", [HAND, FINGER, arm(), patch()], ids=["hand", "finger", "arm", "patch"])
-def test_the_unit_of_pieces_of_skin_is_found(mesh: Mesh, unit_mm: float) -> None:
+def test_unit_of_skin_patches_is_guessed(mesh: Mesh, unit_mm: float) -> None:
     assert guess_unit_mm(mesh.positions / np.float32(unit_mm), mesh.triangles) == unit_mm
 
 
-def test_a_guess_is_noted_with_the_size_that_follows() -> None:
+def test_guessed_unit_is_noted_with_the_resulting_size() -> None:
     (note,) = settled(scaled(figure(), 0.01), "body.ply").notes
     assert note == "its unit is not stated; 1 unit = 100 mm makes it 1.7 m high; --unit-mm sets another"
     (note,) = settled(scaled(figure(), 0.1), "body.obj").notes  # not a doll of 170 mm
@@ -80,11 +80,11 @@ def test_a_head_of_metres_has_a_note() -> None:
         (scaled(figure(), 1000), "--unit-mm: 1, for a program that writes millimetres, makes it 1.7 m high"),
     ],
 )
-def test_a_metre_that_is_too_large_is_refused_with_the_unit_that_fits(mesh: Mesh, advice: str) -> None:
+def test_refusal_of_metres_names_the_fitting_unit(mesh: Mesh, advice: str) -> None:
     message = refusal(mesh, "skin.glb")
     assert "forgotten unit?" in message and "at 1000 mm per unit" in message and advice in message
 
 
-def test_no_unit_is_advised_that_makes_an_unusual_size() -> None:
+def test_units_that_give_an_unusual_size_are_not_suggested() -> None:
     assert refusal(scaled(HEAD, 34), "scan.glb").endswith("with --unit-mm.")  # 8.2 m, or 82 mm in cm
     assert refusal(uv_sphere(0.1, 12, 6), "scan.obj", 1.0).endswith("with --unit-mm.")

@@ -46,14 +46,14 @@ def material_of(folder: Path, text: str) -> FileMaterial:
     return one
 
 
-def test_a_package_is_decoded_in_another_process(tmp_path: Path) -> None:
+def test_package_is_decoded_in_another_process(tmp_path: Path) -> None:
     (part,) = read_text(tmp_path, name="a.usdz").parts
     assert len(part.triangles) == len(BALL.triangles)
 
 
 @in_process
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_head_of_a_phone_is_loaded(suffix: str, tmp_path: Path) -> None:
+def test_head_captured_by_a_phone_is_loaded(suffix: str, tmp_path: Path) -> None:
     text = stage(metadata='metersPerUnit = 1\nupAxis = "Y"')
     with pytest.warns(match="roughness 0.5"):
         head = load_head(write_usd(tmp_path / f"a.{suffix}", text), subdivide=0)
@@ -65,7 +65,7 @@ def test_a_head_of_a_phone_is_loaded(suffix: str, tmp_path: Path) -> None:
 
 
 @in_process
-def test_uv_and_triangles_are_those_of_the_file(tmp_path: Path) -> None:
+def test_uv_and_triangles_equal_those_of_the_file(tmp_path: Path) -> None:
     rigged = load_rigged(write_usd(tmp_path / "a.usda"))
     given = np.column_stack((1000 * BALL.positions, BALL.uv))
     found = np.column_stack((rigged.mesh.positions, rigged.mesh.uv))
@@ -88,7 +88,7 @@ def facing(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
         ('metersPerUnit = 1\nupAxis = "Y"', {"unit_mm": 10.0, "up": "z"}),
     ],
 )
-def test_unit_and_axis_are_those_of_the_file_or_of_the_user(
+def test_unit_and_axis_are_those_of_the_file_unless_given(
     metadata: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
     text = stage(mesh(scale=100), material(), metadata=metadata)
@@ -96,6 +96,22 @@ def test_unit_and_axis_are_those_of_the_file_or_of_the_user(
     turned = 1000 * BALL.positions[:, [0, 2, 1]] * [1, 1, -1]
     np.testing.assert_allclose(np.sort(rigged.mesh.positions, axis=0), np.sort(turned, axis=0), atol=1e-2)
     assert any("its unit is not stated" in note for note in rigged.notes) == ("metersPerUnit" not in metadata)
+
+
+@in_process
+@pytest.mark.filterwarnings("ignore::dermis.base.errors.DermisWarning")
+@pytest.mark.parametrize("suffix", ["usda", "usdc"])
+def test_an_up_axis_that_the_user_states_replaces_that_of_the_file(suffix: str, tmp_path: Path) -> None:
+    text = stage(mesh(scale=100), material(), metadata='metersPerUnit = 0.01\nupAxis = "Z"')
+    path = write_usd(tmp_path / f"a.{suffix}", text)
+    for positions in (
+        load_rigged(path, up="y").mesh.positions,
+        load_head(path, up="y", subdivide=0).mesh.positions,
+    ):
+        np.testing.assert_allclose(positions.max(axis=0), 1000 * BALL.positions.max(axis=0), rtol=1e-2)
+    found = load_rigged(path, up="y", front="x").mesh.positions
+    turned = 1000 * BALL.positions[:, [2, 1, 0]] * [-1, 1, 1]
+    np.testing.assert_allclose(np.sort(found, axis=0), np.sort(turned, axis=0), atol=1e-2)
 
 
 @in_process
@@ -263,7 +279,7 @@ def test_pictures_of_roughness_normals_and_opacity_are_read(tmp_path: Path) -> N
 
 
 @in_process
-def test_a_texture_transform_is_that_of_the_specification(tmp_path: Path) -> None:
+def test_texture_transform_matches_the_specification(tmp_path: Path) -> None:
     reader = """float2 inputs:st.connect = </model/face/place.outputs:result>"""
     place = """
     def Shader "place" {
@@ -312,7 +328,7 @@ def test_an_unlit_scan_has_the_colours_of_its_emission(tmp_path: Path) -> None:
 
 
 @in_process
-def test_another_kind_of_surface_is_noted(tmp_path: Path) -> None:
+def test_other_surface_types_are_noted(tmp_path: Path) -> None:
     found = material_of(tmp_path, material().replace('"UsdPreviewSurface"', '"ND_standard_surface"'))
     assert found.unused == ("surface ND_standard_surface",)
 
@@ -320,7 +336,7 @@ def test_another_kind_of_surface_is_noted(tmp_path: Path) -> None:
 @in_process
 @pytest.mark.parametrize("file", ["lost.png", "../other.png", "/etc/hostname", "https://a.example/other.png"])
 @pytest.mark.parametrize("suffix", ["usda", "usdz"])
-def test_pictures_that_are_not_there_are_noted(suffix: str, file: str, tmp_path: Path) -> None:
+def test_missing_pictures_are_noted(suffix: str, file: str, tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "other.png").write_bytes(PICTURE)
     (found,) = read_text(tmp_path, stage(mesh(), material(file=file)), f"in/a.{suffix}").materials
@@ -328,7 +344,7 @@ def test_pictures_that_are_not_there_are_noted(suffix: str, file: str, tmp_path:
 
 
 @in_process
-def test_a_picture_of_another_machine_is_looked_up_in_the_folder(tmp_path: Path) -> None:
+def test_absolute_picture_path_is_looked_up_in_the_folder(tmp_path: Path) -> None:
     texture = material_of(tmp_path, material(file="/elsewhere/skin.png")).textures["colour"]
     assert texture.picture == tmp_path / "skin.png"
 
@@ -412,7 +428,7 @@ def test_layers_outside_the_folder_are_refused(text: str, name: str, tmp_path: P
 
 
 @in_process
-def test_layers_of_layers_are_checked_as_well(tmp_path: Path) -> None:
+def test_nested_layers_are_checked(tmp_path: Path) -> None:
     (tmp_path / "inner.usda").write_text(LAYER.format("/etc/head.usda"))
     variants = """#usda 1.0
 def "model" (
@@ -460,12 +476,12 @@ def test_value_clips_are_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_faults_are_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
+def test_invalid_values_are_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=rf"a\.usda: expected {message}"):
         read_text(tmp_path, stage().replace(old, new, 1))
 
 
-def test_a_fault_of_the_text_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_text_error_is_refused_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(
         DermisError, match=r"a\.usda: expected a USD scene, but it cannot be opened \(a\.usda:7:"
     ):

@@ -44,7 +44,7 @@ def displacements(targets: MorphTargets, name: str) -> np.ndarray:
 
 
 @VERSIONS
-def test_the_face_of_an_avatar_looks_at_the_viewer(version: int, tmp_path: Path) -> None:
+def test_avatar_faces_the_viewer(version: int, tmp_path: Path) -> None:
     mesh = load_rigged(VrmFile(version).write(tmp_path / "a.vrm")).mesh
     assert mesh.positions[:, 2].max() > 140 > 125 > -mesh.positions[:, 2].min()
 
@@ -55,7 +55,7 @@ def test_a_front_that_the_user_states_is_used(tmp_path: Path) -> None:
 
 
 @VERSIONS
-def test_expressions_are_targets_beside_those_of_the_file(version: int, tmp_path: Path) -> None:
+def test_expressions_are_added_to_the_targets_of_the_file(version: int, tmp_path: Path) -> None:
     avatar = VrmFile(version)
     avatar.add_expression("happy", {0: 1.0, 1: 0.5})
     avatar.add_expression("mine", {1: 0.25}, custom=True)
@@ -77,7 +77,7 @@ def test_a_target_of_the_file_keeps_its_name(version: int, tmp_path: Path) -> No
     np.testing.assert_array_equal(displacements(targets, "smile"), expected)
 
 
-def test_materials_called_skin_are_the_skin_of_an_avatar() -> None:
+def test_materials_named_skin_are_the_skin_of_an_avatar() -> None:
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], float)
     groups = [MaterialGroup((name,)) for name in VROID]
     parts = [MeshPart(group, square, None, None, np.array([[0, 1, 2]])) for group in groups]
@@ -85,7 +85,7 @@ def test_materials_called_skin_are_the_skin_of_an_avatar() -> None:
 
 
 @VERSIONS
-def test_what_of_an_avatar_is_left_out_is_noted(version: int, tmp_path: Path) -> None:
+def test_ignored_avatar_data_is_noted(version: int, tmp_path: Path) -> None:
     avatar = VrmFile(version)
     expression = avatar.add_expression("happy", {0: 1.0})
     if version == 0:

@@ -57,7 +57,7 @@ def from_rectangle(size: tuple[float, float], place: Floats) -> float:
     return polygon_irradiance(corners - place, np.array([0.0, 0.0, 1.0]))
 
 
-def test_irradiance_opposite_the_middle_is_lamberts() -> None:
+def test_irradiance_on_the_axis_matches_lambert() -> None:
     for width, height, distance in ((1.0, 1.0, 1.0), (3.0, 0.5, 2.0), (10.0, 20.0, 0.7)):
         exact = from_rectangle((width, height), np.array([0.0, 0.0, distance]))
         assert facing_irradiance(width, height, distance) == pytest.approx(exact, rel=1e-12)
@@ -65,7 +65,7 @@ def test_irradiance_opposite_the_middle_is_lamberts() -> None:
 
 
 @pytest.mark.parametrize("size", [(40, 40), (300, 200), (100, 900)])
-def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
+def test_parts_of_a_rectangle_add_up(size: tuple[float, float]) -> None:
     light = RectangleLight(position=(200, 300, 400), target=(0, 10, 0), width_mm=size[0], height_mm=size[1])
     parts = KIND.parts(light)
     assert all(isinstance(part, RectangleLight) for part in parts)
@@ -84,7 +84,7 @@ def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats
 
 
 @pytest.mark.parametrize("size", [(30, 30), (240, 60), (400, 400)])
-def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]) -> None:
+def test_irradiance_of_a_rectangle_matches_quadrature(renderer: Renderer, size: tuple[float, float]) -> None:
     """Compare a floor below the light, from a height of 300 mm and up to 100 mm off its axis."""
     given = {"width_mm": size[0], "height_mm": size[1], "irradiance": (1.0, 2.0, 3.0), "shadows": False}
     made, points = entered(renderer, FLOOR, RectangleLight(**above(FLOOR, 300.0, **given)))
@@ -95,7 +95,7 @@ def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]
 
 
 @pytest.mark.parametrize("radius", [5.0, 80.0, 200.0])
-def test_irradiance_of_a_sphere(renderer: Renderer, radius: float) -> None:
+def test_irradiance_of_a_sphere_matches_the_closed_form(renderer: Renderer, radius: float) -> None:
     """Compare with pi (r / d)^2 times the cosine, for spheres above the horizon."""
     made, points = entered(
         renderer, FLOOR, SphereLight(**above(FLOOR, 300.0, radius_mm=radius, shadows=False))
@@ -107,7 +107,7 @@ def test_irradiance_of_a_sphere(renderer: Renderer, radius: float) -> None:
 
 @pytest.mark.parametrize("part", [0, 3, 6, 15])
 @pytest.mark.parametrize("kind", ["rectangle", "sphere"])
-def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
+def test_visible_parts_match_numpy(renderer: Renderer, kind: str, part: int) -> None:
     rng = np.random.default_rng(5)
     points = rng.uniform(-80, 80, (SIZE, SIZE, 3)).astype(np.float32)
     given = {"position": (150.0, 120.0, 260.0), "irradiance": (1.0, 2.0, 3.0), "shadows": False}
@@ -138,7 +138,7 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
     assert (towards[..., 3] == 1).all()
 
 
-def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
+def test_stripe_has_the_given_width(renderer: Renderer, close: float) -> None:
     """Expect 1/e^2 of the centre at half the width, and nothing beyond the ends, averaged over texels."""
     light = StripeLight(
         direction=(0, 0, -1),
@@ -208,7 +208,7 @@ def test_a_shadow_fades_as_the_light_is_wide(renderer: Renderer, kind: str) -> N
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
-def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
+def test_soft_visibility_matches_numpy(renderer: Renderer, kind: str) -> None:
     """Points in and above the shadow of a plate have their own normals; rounding decides at texel edges."""
     light: Light = {
         "rectangle": RectangleLight(**above(PLATE, 300.0, width_mm=70, height_mm=40)),
@@ -244,7 +244,7 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
     assert off.mean() < 0.02 and np.abs(made - exact).max() < 0.15
 
 
-def test_shadows_harden_towards_what_casts_them(renderer: Renderer) -> None:
+def test_shadows_sharpen_towards_their_caster(renderer: Renderer) -> None:
     """The same light over plates at 4 and 24 mm: the penumbra grows with the height."""
     widths = []
     for height in (4.0, 24.0):
@@ -260,7 +260,7 @@ def test_shadows_harden_towards_what_casts_them(renderer: Renderer) -> None:
     assert widths[1] > 4 * widths[0]
 
 
-def test_a_wide_rectangle_is_seen_part_by_part(renderer: Renderer) -> None:
+def test_wide_rectangle_is_divided_into_shadow_maps(renderer: Renderer) -> None:
     """For a light as wide as its distance, the shadow's profile is the occluded fraction of the light."""
     light = RectangleLight(**above(PLATE, 300.0, width_mm=300, height_mm=40, softness_mm=0.1))
     x, seen = visibility(renderer, PLATE, light)
@@ -312,7 +312,7 @@ def test_too_many_parts_are_refused(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("samples", [1, 4, 5, 16, 64])
-def test_strips_hold_no_more_samples_than_drivers_go_round_loops(renderer: Renderer, samples: int) -> None:
+def test_samples_per_strip_stay_below_driver_loop_limits(renderer: Renderer, samples: int) -> None:
     """Under three rectangles of 500 mm with 16 samples, strips of 256 samples left 4 % of a face black."""
     usual = dict(device_constants(renderer.device)).get("STRIP", 1)
     strip = (dict(strip_constants(renderer.device, samples)) or {"STRIP": usual})["STRIP"]

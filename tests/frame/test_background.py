@@ -59,7 +59,7 @@ def test_the_environment_is_sharp_or_blurred(renderer: Renderer, tmp_path: Any, 
         assert row[18] > 0.6 and row[29] < 1.9 and (np.diff(row) > -1e-3).all()
 
 
-def test_an_environment_that_is_not_there_is_refused(renderer: Renderer) -> None:
+def test_background_environment_without_environment_is_refused(renderer: Renderer) -> None:
     with pytest.raises(DermisError, match="background environment: expected an environment"):
         drawn(renderer, background="environment")
 
@@ -77,7 +77,7 @@ def over(colours: NDArray[Any], alpha: NDArray[Any], behind: float) -> NDArray[A
 
 
 @pytest.mark.parametrize("tone", ["none", "filmic"])
-def test_alpha_lays_the_head_over_anything(renderer: Renderer, tone: str) -> None:
+def test_alpha_composites_the_head_over_any_background(renderer: Renderer, tone: str) -> None:
     """Premultiplied floats over a colour equal the picture with that colour; bytes have straight alpha."""
     made = drawn(renderer, tone=tone)
     floats, levels = made.linear_rgba(), made.rgba8()
@@ -101,7 +101,7 @@ def test_hairs_count_as_coverage(renderer: Renderer) -> None:
     assert alpha[0].max() > 200 and alpha[1].max() == 0
 
 
-def test_many_pictures_have_alpha_too(renderer: Renderer) -> None:
+def test_alpha_is_available_for_sequences(renderer: Renderer) -> None:
     settings = settings_of(samples=4).model_dump()
     one = drawn(renderer)
     expected = one.rgba8(), one.linear_rgba()

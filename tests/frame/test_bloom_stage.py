@@ -30,7 +30,7 @@ def bloomed(device: Device, picture: Floats, share: float) -> Floats:
 
 
 @pytest.mark.parametrize(("size", "count"), [((96, 80), 2), ((130, 67), 2), ((20, 12), 1), ((256, 128), 3)])
-def test_twin(device: Device, size: tuple[int, int], count: int) -> None:
+def test_bloom_matches_numpy(device: Device, size: tuple[int, int], count: int) -> None:
     picture = np.random.default_rng(1).exponential(size=(size[1], size[0], 4)).astype(np.float32)
     made, exact = (
         bloomed(device, picture, 0.3),
@@ -56,7 +56,7 @@ def test_even_light_stays_even(device: Device) -> None:
     assert np.abs(bloomed(device, picture, 1.0)[..., :3] - 0.7).max() < TWIN
 
 
-def test_only_when_asked(renderer: Renderer) -> None:
+def test_bloom_runs_only_when_enabled(renderer: Renderer) -> None:
     scene = scene_of(head_of(plane(30.0)), frontal())
     ran = []
     for share in (0.0, 0.3):

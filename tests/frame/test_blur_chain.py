@@ -33,18 +33,18 @@ def test_one_gaussian_costs_less_than_six(texels_per_mm: float) -> None:
 
 
 @pytest.mark.parametrize("texels_per_mm", [0.1, 0.75, 1.5, 3.0, 6.0])
-def test_six_gaussians_need_no_steps(texels_per_mm: float) -> None:
+def test_six_gaussians_need_no_intermediate_steps(texels_per_mm: float) -> None:
     led, steps = add_intermediate_levels(SIX, texels_per_mm, MOST)
     assert np.array_equal(led, SIX) and steps == ()
 
 
-def test_steps_are_told_from_the_profiles_levels() -> None:
+def test_intermediate_steps_are_separate_from_profile_levels() -> None:
     blur = Blur(np.array([1.0, 2.0, 3.0]), np.zeros((3, 3)), (0, 0, 1, 2), intermediate_levels=(1, 3))
     assert blur.profile_levels == (0, 2)
 
 
 @pytest.mark.parametrize("texels_per_mm", [1.5, 3.0, 6.0])
-def test_a_wide_gaussian_in_steps_is_that_gaussian(device: Device, texels_per_mm: float) -> None:
+def test_wide_gaussian_in_steps_equals_one_blur(device: Device, texels_per_mm: float) -> None:
     """Compare a blurred point of light with the analytic peak."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     coarser = _upload_coarser(

@@ -76,7 +76,7 @@ def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> Non
 
 
 @pytest.mark.parametrize("absorption", [0.0, 4.0])
-def test_a_white_head_of_hair_gains_no_light(renderer: Renderer, absorption: float) -> None:
+def test_white_hair_does_not_gain_light(renderer: Renderer, absorption: float) -> None:
     head = wool(4000, absorption, cover=2.0)
     scene = replace(lit(head, rho_s=0.0), lights=(), environment=Environment(name="uniform"))
     made = picture(renderer, scene, occlusion="none", samples=4)[..., :3]

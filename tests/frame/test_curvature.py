@@ -46,21 +46,21 @@ def half_pipe(radius_mm: float, segments: int = 48) -> Mesh:
 
 
 @pytest.mark.parametrize("radius_mm", [5.0, 20.0, 100.0])
-def test_sphere(device: Device, radius_mm: float) -> None:
+def test_curvature_of_a_sphere_is_its_inverse_radius(device: Device, radius_mm: float) -> None:
     """Expect 1/r at every corner, poles and seam included."""
     assert np.allclose(found(device, uv_sphere(radius_mm, 64, 32)), 1 / radius_mm, rtol=0.01)
 
 
-def test_plane(device: Device) -> None:
+def test_curvature_of_a_plane_is_zero(device: Device) -> None:
     assert found(device, plane(50.0, 8)).max() < 1e-6
 
 
-def test_cylinder(device: Device) -> None:
+def test_curvature_of_a_cylinder_matches_its_radius(device: Device) -> None:
     """The root mean square of curvatures 1/r and 0 is 1/r over the square root of 2."""
     assert np.allclose(found(device, half_pipe(20.0)), np.sqrt(0.5) / 20.0, rtol=0.01)
 
 
-def test_triangles_without_area_do_no_harm(device: Device) -> None:
+def test_degenerate_triangles_leave_curvature_finite(device: Device) -> None:
     ball = uv_sphere(20.0, 48, 24)
     spoilt = replace(
         ball,
@@ -71,14 +71,14 @@ def test_triangles_without_area_do_no_harm(device: Device) -> None:
 
 
 @pytest.mark.parametrize("radius_mm", [9.0, 30.0])  # an even and an odd number of steps
-def test_as_in_float64(device: Device, radius_mm: float) -> None:
+def test_curvature_agrees_with_float64(device: Device, radius_mm: float) -> None:
     """Compare on a dented ball, whose seams cross curved regions."""
     mesh = dented(radius_mm)
     steps = make_curvature(device, mesh).steps
     assert np.allclose(found(device, mesh), curvature_twin(mesh, steps), rtol=1e-4, atol=1e-6)
 
 
-def test_it_moves_with_the_surface(device: Device) -> None:
+def test_curvature_follows_the_deformed_surface(device: Device) -> None:
     ball, dent = cut_sphere(30.0, 16), dented(30.0)
     points = np.zeros((int(ball.point.max()) + 1, 3), np.float32)
     points[dent.point] = dent.positions

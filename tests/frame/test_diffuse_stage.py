@@ -68,7 +68,7 @@ def metric(atlas: Atlas) -> Floats:
 
 @pytest.mark.parametrize("shear", [0.0, 0.8])
 @pytest.mark.parametrize("edge", ["repeated", "skipped"])
-def test_twin(device: Device, shear: float, edge: str) -> None:
+def test_blur_matches_numpy(device: Device, shear: float, edge: str) -> None:
     atlas = random_atlas(64, shear)
     source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
     made = blur(device, source, resting(device, atlas), edge=edge)
@@ -88,7 +88,7 @@ def test_empty_texels_show_the_clear_colour(device: Device) -> None:
     assert np.abs(white[atlas.coverage] - 1).max() < FLAT
 
 
-def test_combined_twin(device: Device) -> None:
+def test_combined_blur_matches_numpy(device: Device) -> None:
     rng = np.random.default_rng(4)
     space = make_levels(device, 64, ((0,) * 6,), FLOAT_FORMAT)
     values = rng.random((5, 64, 64, 4)).astype(np.float32)
@@ -123,7 +123,7 @@ def point_of_light(atlas: Atlas) -> tuple[Floats, tuple[int, int], Floats, float
 
 
 @pytest.mark.parametrize("name", [*UNIFORM, "2 : 1"])
-def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> None:
+def test_impulse_response_is_the_sum_of_gaussians(device: Device, name: str) -> None:
     """A lit texel of power 1 receives R(r) times its area; the unblurred level is left out."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), r2, area = point_of_light(atlas)
@@ -138,7 +138,7 @@ def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> No
 
 
 @pytest.mark.parametrize("name", UNIFORM | UNEVEN)
-def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) -> None:
+def test_impulse_response_is_round_with_the_given_variance(device: Device, name: str) -> None:
     """Compare the second moments along x and y [mm2] at every level."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), _, _ = point_of_light(atlas)
@@ -155,7 +155,7 @@ def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) 
 
 @pytest.mark.parametrize("size", [64, 200])
 @pytest.mark.parametrize("mesh", [uv_sphere(40.0, 24, 12), plane(60.0, 2, uv_scale=0.7)])
-def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> None:
+def test_uniform_light_stays_uniform(device: Device, mesh: Any, size: int) -> None:
     """Constant light stays constant up to the edges of charts and in the gutter."""
     atlas = build_atlas(mesh, size)
     colour = np.array([1.0, 0.3, 2.7])
@@ -165,7 +165,7 @@ def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> 
         assert not level[~atlas.coverage].any()
 
 
-def test_the_order_of_the_axes_does_not_matter(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_axis_order_does_not_matter(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """With uniform stretch, blurring along v first gives the same result."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
@@ -185,7 +185,7 @@ def test_a_symmetric_patch_stays_symmetric(device: Device) -> None:
 
 
 @pytest.mark.parametrize("texels_per_mm", [1.0, 3.0, 6.0])
-def test_one_wide_gaussian_alone_is_smooth(device: Device, texels_per_mm: float) -> None:
+def test_single_wide_gaussian_is_smooth(device: Device, texels_per_mm: float) -> None:
     """Without a narrower level before it, the source must not be sampled sparsely."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     source, _, r2, area = point_of_light(atlas)

@@ -70,7 +70,7 @@ def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR
 
 
 @pytest.mark.parametrize("surface", [DRY, {}], ids=["matched", "refracting"])
-def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
+def test_angular_response_matches_the_law_for_all_directions(renderer: Renderer, surface: Any) -> None:
     """The response is finite for grazing entry and exit."""
     eta = 1.0 if surface else 1.4
     cosines = np.concatenate([[0.0, 1e-7, 1e-4, 3e-3], np.linspace(0.01, 1.0, 12)])
@@ -103,7 +103,7 @@ def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
 
 @pytest.mark.parametrize("technique", ["none", "texture-space", "screen-space"])
 @pytest.mark.parametrize("surface", [DRY, {"roughness": 0.5, "rho_s": 0.4}], ids=["matched", "refracting"])
-def test_even_light_on_a_plane(
+def test_uniform_light_on_a_plane_matches_the_law(
     renderer: Renderer, close: float, profile: str, surface: Any, technique: str
 ) -> None:
     """Compare at oblique view and light, without specular reflection."""
@@ -129,7 +129,7 @@ def test_a_colour_map_counts_by_its_mean(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("technique", ["none", "texture-space", "pre-integrated"])
-def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str) -> None:
+def test_uniform_environment_matches_the_law(renderer: Renderer, profile: str, technique: str) -> None:
     """A matched half-space under uniform light returns the light that enters it."""
     room, told = Environment(name="uniform"), angular_response(COLOUR, 1.0)
     for degrees in (10.0, 80.0):
@@ -148,7 +148,7 @@ def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str)
         np.testing.assert_allclose(made, COLOUR * expected, rtol=2e-3)
 
 
-def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Renderer, profile: str) -> None:
+def test_angular_response_integrates_to_the_albedo(renderer: Renderer, profile: str) -> None:
     angles = np.degrees(np.arccos(np.sqrt((np.arange(12) + 0.5) / 12)))
     for direction, expected in (
         ("lambertian", 1.0),
@@ -173,7 +173,7 @@ def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Rend
 
 
 @pytest.mark.parametrize("technique", ["texture-space", "screen-space", "pre-integrated"])
-def test_light_from_around_is_not_multiplied_by_what_scattered_once(
+def test_environment_light_has_no_single_scattering_factor(
     renderer: Renderer, profile: str, technique: str
 ) -> None:
     """Bumps with grazing light and view have little light below except from the surface around them."""
@@ -197,7 +197,7 @@ def test_light_from_around_is_not_multiplied_by_what_scattered_once(
     assert (turned.max(axis=(0, 1)) < 1.6 * plain.max(axis=(0, 1))).all()
 
 
-def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, profile: str) -> None:
+def test_light_from_outside_the_footprint_leaves_isotropically(renderer: Renderer, profile: str) -> None:
     """In a shadow there is no single scattering: no direction becomes negative, and no edge appears.
 
     Lambertian skin is as bright there, or a pixel nearer to the light, by the oblique offset.

@@ -45,7 +45,7 @@ def scenes() -> dict[int, Scene]:
     return {k: scene_of(k) for k in range(3)}
 
 
-def test_a_picture_does_not_tell_who_was_drawn_before(renderer: Renderer, scenes: dict[int, Scene]) -> None:
+def test_picture_does_not_depend_on_the_previous_person(renderer: Renderer, scenes: dict[int, Scene]) -> None:
     fresh = Renderer(renderer.device.adapter.name)
     forth, back = pictures(renderer, (0, 1, 2), scenes), pictures(fresh, (2, 1, 0), scenes)
     for k in range(3):
@@ -68,7 +68,7 @@ class Made:
         monkeypatch.setattr(device, "buffer", noted)
 
 
-def test_a_new_person_takes_what_is_new_to_the_device(
+def test_only_data_of_a_new_person_is_uploaded(
     renderer: Renderer, scenes: dict[int, Scene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only hairs are uploaded: no atlas, no triangles, no morph targets."""

@@ -68,7 +68,7 @@ def facing(normal: Floats, seed: int) -> Floats:
     return np.where(twins.dot(v, normal)[..., None] > 0, v, -v)
 
 
-def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
+def test_shader_functions_match_numpy(renderer: Renderer, room: str) -> None:
     environment = Environment(name=room, rotation_degrees=70.0, exposure=0.6)
     lit = run_frame(renderer, around(WHITE, environment), occlusion="none").bindings
     rng = np.random.default_rng(3)
@@ -96,7 +96,9 @@ def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
 
 
 @pytest.mark.parametrize("rotation", [0.0, 90.0])
-def test_what_enters_is_the_sum_over_all_directions(renderer: Renderer, room: str, rotation: float) -> None:
+def test_irradiance_matches_the_sum_over_all_directions(
+    renderer: Renderer, room: str, rotation: float
+) -> None:
     """Compare each texel of a ball with the sum of panorama texels times cosines; the sun is a light."""
     scene = around(
         head_of(BALL), Environment(name=room, rotation_degrees=rotation, exposure=2.0), rho_s=0.0, mix=0.0
@@ -133,7 +135,7 @@ def middle(image: Floats) -> Floats:
 
 @pytest.mark.parametrize("energy", ["none", "full"])
 @pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])
-def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str) -> None:
+def test_white_ball_passes_the_furnace_test(renderer: Renderer, rho_s: float, energy: str) -> None:
     """All light leaves again; without an energy term the specular reflection is added on top."""
     scene = around(WHITE, Environment(name="uniform"), rho_s=rho_s, roughness=0.3, energy=energy)
     inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
@@ -146,7 +148,7 @@ def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str
         assert seen.max() < 1.01
 
 
-def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
+def test_uniform_sky_lights_all_directions_equally(renderer: Renderer) -> None:
     """Render a matte plane under radiance 3 times its colour, at any rotation."""
     head = head_of(plane(100.0))
     environment = Environment(name="uniform", exposure=3.0, rotation_degrees=33.0)
@@ -181,7 +183,7 @@ def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> 
     assert np.abs(record["mirrors"] - table).max() < 1e-6
 
 
-def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str, close: float) -> None:
+def test_exposure_scales_suns_too(renderer: Renderer, room: str, close: float) -> None:
     """Suns may exceed the limits of lights in files."""
     plain, bright = (
         download(
@@ -205,7 +207,7 @@ SEEN = {"background": "environment", "background_blur": SMOOTHEST}
 
 
 @pytest.mark.parametrize("rotation", [60.0, -150.0])
-def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: float) -> None:
+def test_environment_is_drawn_behind_the_head(renderer: Renderer, room: str, rotation: float) -> None:
     """Compare along the ray of each pixel; rotated by 60 degrees, the window is on the right."""
     environment = Environment(name=room, rotation_degrees=rotation, exposure=0.5)
     camera = front_camera(WHITE, frame_mm=600.0)
@@ -224,7 +226,7 @@ def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: flo
         assert image[24, 38, 2] > 2 * image[24, 9, 2]
 
 
-def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str) -> None:
+def test_background_is_a_colour_by_default(renderer: Renderer, room: str) -> None:
     scene = around(WHITE, Environment(name=room))
     image = download(
         renderer.device, run_frame(renderer, scene, background=(0, 1, 0)).resources.post.picture.exposed
@@ -232,7 +234,7 @@ def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str)
     assert np.allclose(image[0, 0], [0, 1, 0, 0])
 
 
-def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
+def test_poles_have_no_seams(renderer: Renderer, tmp_path: Path) -> None:
     """With half of the sky bright, the reflection across the zenith changes gradually."""
     radiance = np.where(directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
     write_exr(tmp_path / "half.exr", radiance.astype(np.float32))

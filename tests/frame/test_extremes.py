@@ -42,7 +42,7 @@ def check(renderer: Renderer, scene: dermis.Scene, **settings: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_lights(renderer: Renderer, small: dermis.Head, kind: str) -> None:
+def test_extreme_lights_give_finite_pictures(renderer: Renderer, small: dermis.Head, kind: str) -> None:
     model = LIGHTS[kind]
     needed = {name: value for name, value in NEEDED.items() if name in model.model_fields}
     taken = 0
@@ -59,14 +59,16 @@ def test_lights(renderer: Renderer, small: dermis.Head, kind: str) -> None:
 
 
 @pytest.mark.parametrize("field", numeric_fields(dermis.Camera))
-def test_cameras(renderer: Renderer, small: dermis.Head, field: str) -> None:
+def test_extreme_cameras_give_finite_pictures(renderer: Renderer, small: dermis.Head, field: str) -> None:
     for end in ends(dermis.Camera, field):
         for position in ((0.0, 0.0, 1100.0), END):
             camera = dermis.Camera(**{"position": position, "frame_mm": 30.0, "up": (0, 1, 0), field: end})
             check(renderer, dermis.Scene(small, camera=camera))
 
 
-def test_settings_and_surroundings(renderer: Renderer, small: dermis.Head) -> None:
+def test_extreme_settings_and_environments_give_finite_pictures(
+    renderer: Renderer, small: dermis.Head
+) -> None:
     around = [
         dermis.Environment("uniform", **{field: end})
         for field in numeric_fields(dermis.Environment)
@@ -80,7 +82,7 @@ def test_settings_and_surroundings(renderer: Renderer, small: dermis.Head) -> No
             check(renderer, dermis.Scene(small), **{field: end})
 
 
-def test_skins(renderer: Renderer, small: dermis.Head, tmp_path: Path) -> None:
+def test_extreme_skins_give_finite_pictures(renderer: Renderer, small: dermis.Head, tmp_path: Path) -> None:
     for field in numeric_fields(dermis.Skin):
         for end in ends(dermis.Skin, field):
             check(renderer, dermis.Scene(small, skin=dermis.Skin(**{field: end})))
@@ -92,7 +94,7 @@ def test_skins(renderer: Renderer, small: dermis.Head, tmp_path: Path) -> None:
             check(renderer, dermis.Scene(small, skin=skin), technique=technique)
 
 
-def test_a_human_far_away(renderer: Renderer) -> None:
+def test_distant_human_gives_a_finite_picture(renderer: Renderer) -> None:
     """Products of corners of small triangles cancel in single precision."""
     camera = dermis.Camera(position=(6e4, 6e4, 6e4), target=(5, 20, 90), frame_mm=30)
     check(renderer, dermis.Scene("human", camera=camera), size=(128, 128))

@@ -52,7 +52,7 @@ def traced(places: Floats, ways: Floats) -> Floats:
     return np.array(found).reshape(*places.shape[:2], 2)
 
 
-def test_the_iris_is_seen_where_a_traced_ray_meets_it(renderer: Renderer) -> None:
+def test_refracted_iris_matches_a_traced_ray(renderer: Renderer) -> None:
     rng = np.random.default_rng(1)
     turn, off = rng.uniform(0, 2 * np.pi, (SIZE, SIZE)), 5.5 * np.sqrt(rng.random((SIZE, SIZE)))
     x, y = off * np.cos(turn), off * np.sin(turn)
@@ -108,23 +108,23 @@ def axes(head: Head, pose: Pose) -> Floats:
     return np.asarray([frame[2, :3] / np.linalg.norm(frame[2, :3]) for frame in frames])
 
 
-def test_at_rest_both_look_forward(head: Head) -> None:
+def test_both_eyes_look_forward_at_rest(head: Head) -> None:
     np.testing.assert_allclose(axes(head, Pose()), [[0, 0, 1], [0, 0, 1]], atol=1e-6)
 
 
-def test_targets_of_gaze_turn_them(head: Head) -> None:
+def test_gaze_targets_rotate_the_eyes(head: Head) -> None:
     left, right = axes(head, Pose({"eyeLookOutLeft": 1, "eyeLookInRight": 1}))  # both to the head's left
     assert left[0] > 0.4 and right[0] > 0.4 and abs(left[1]) < 1e-6
     up, still = axes(head, Pose({"eyeLookUpLeft": 0.5}))
     assert up[1] > 0.1 and still[1] == pytest.approx(0, abs=1e-6)
 
 
-def test_a_turn_that_is_given_adds_to_the_gaze(head: Head) -> None:
+def test_given_rotation_adds_to_the_gaze(head: Head) -> None:
     both = axes(head, Pose({"eyeLookOutLeft": 1}, {"eye.L": (0, -28, 0)}))
     np.testing.assert_allclose(both[0], [0, 0, 1], atol=1e-6)
 
 
-def test_frames_have_the_apex_on_their_axis(head: Head) -> None:
+def test_apex_lies_on_the_axis_of_the_eye_frame(head: Head) -> None:
     pose = Pose({"eyeLookOutLeft": 0.7}, {"head": (5, 20, 10)})
     assert head.eyes is not None
     motion = pose.motion(head.control)
@@ -145,7 +145,7 @@ def test_both_eyes_converge(head: Head, place: tuple[float, float, float]) -> No
         assert np.degrees(np.arctan2(np.hypot(x, y), z)) < 1.0
 
 
-def test_gaze_needs_eyes_and_a_place(head: Head) -> None:
+def test_gaze_needs_eyes_and_a_target_point(head: Head) -> None:
     with pytest.raises(DermisError, match="eyes that turn"):
         looking_at(replace(head, eyes=None), (0, 0, 500))
     with pytest.raises(DermisError, match="3 numbers"):
@@ -177,7 +177,7 @@ def test_closed_lids_leave_no_gap(renderer: Renderer, seed: int | None) -> None:
 
 
 @pytest.mark.parametrize("white", [False, True])
-def test_in_even_light_nothing_is_brighter_than_it(renderer: Renderer, head: Head, white: bool) -> None:
+def test_uniform_light_bounds_the_radiance(renderer: Renderer, head: Head, white: bool) -> None:
     """In uniform light eyes, brows and lashes are no brighter than it; thin parts are left out."""
     middle = tuple(float(c) for c in -np.array(head.centre_mm))
     skin = Maps(colour=np.ones((4, 4, 3), np.float32)) if white else head.maps
@@ -187,7 +187,7 @@ def test_in_even_light_nothing_is_brighter_than_it(renderer: Renderer, head: Hea
     assert shown.max() < 1.02
 
 
-def test_looks_change_the_iris_alone(renderer: Renderer, head: Head) -> None:
+def test_eye_appearance_changes_the_iris_only(renderer: Renderer, head: Head) -> None:
     assert head.eyes is not None
     middle = tuple(float(c) for c in -np.array(head.centre_mm))
     camera = Camera(position=(middle[0], middle[1], middle[2] + 600), target=middle, frame_mm=110.0)
@@ -209,6 +209,6 @@ def test_looks_change_the_iris_alone(renderer: Renderer, head: Head) -> None:
 @pytest.mark.parametrize(
     "wrong", [{"eumelanin": 1.2}, {"pupil_mm": 0.5}, {"seed": 0.5}, {"redness": float("nan")}]
 )
-def test_looks_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_eye_appearance_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(DermisError, match=f"eyes: {next(iter(wrong))}"):
         EyeLook(**wrong)  # type: ignore[arg-type]

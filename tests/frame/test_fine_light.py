@@ -56,16 +56,14 @@ def spread(light: StripeLight, x_mm: float, sub: int, width: float = 1.0) -> Flo
 
 @pytest.mark.parametrize("atlas", [64, 128])
 @pytest.mark.parametrize("x_mm", [0.0, 0.4, 1.1])
-def test_a_stripe_on_coarse_texels_spreads_as_the_profile_says(
-    renderer: Renderer, x_mm: float, atlas: int
-) -> None:
+def test_stripe_on_coarse_texels_follows_the_profile(renderer: Renderer, x_mm: float, atlas: int) -> None:
     """A stripe of 1.5 mm on texels of 1.5 and 0.75 mm is 3 to 64 % off without the picture's correction."""
     made, exact = across(renderer, stripe(x_mm, 1.5), atlas), spread(stripe(x_mm, 1.5), x_mm, 1)
     assert np.sqrt(((made - exact) ** 2).sum() / (exact**2).sum()) < 0.04
 
 
 @pytest.mark.parametrize("samples", [1, 16])
-def test_pixels_average_as_their_samples_would(renderer: Renderer, samples: int) -> None:
+def test_pixel_average_matches_its_samples(renderer: Renderer, samples: int) -> None:
     """A stripe of 0.5 mm within pixels of 0.33 mm: point samples would have 12 % too much light."""
     middle = FRAME_MM / PIXELS / 2
     light = stripe(middle, 0.5)
@@ -74,7 +72,7 @@ def test_pixels_average_as_their_samples_would(renderer: Renderer, samples: int)
     assert np.allclose(made, exact, rtol=0.03)
 
 
-def test_texels_hold_all_light_wherever_it_falls_among_them(renderer: Renderer) -> None:
+def test_texels_conserve_light_at_any_subtexel_offset(renderer: Renderer) -> None:
     """Move a stripe half as wide as a texel by fractions of a texel; point samples hold 0 to 320 %."""
     held = [
         entered_light(renderer, lit(renderer, stripe(x, 0.75), 64))[16:48, :, 0].sum(axis=1).mean()

@@ -45,12 +45,12 @@ def test_taps_reach_the_truncation(variance: float) -> None:
     assert len(kernel(variance)) == 2 * tap_count(variance) + 1
 
 
-def test_no_variance_is_no_blur() -> None:
+def test_zero_variance_does_not_blur() -> None:
     assert kernel(0.0).tolist() == [1.0]
 
 
 @pytest.mark.parametrize("variance", [1.0, 4.0, 9.0])
-def test_a_wide_kernel_is_the_gaussian(variance: float) -> None:
+def test_wide_kernel_matches_the_gaussian(variance: float) -> None:
     weights = kernel(variance)
     n = np.arange(len(weights)) - len(weights) // 2
     exact = np.exp(-(n**2) / (2 * variance)) / math.sqrt(2 * math.pi * variance)

@@ -38,13 +38,13 @@ def levels(device: Device) -> list[np.ndarray]:
     ]
 
 
-def test_it_gains_a_thousandth_and_loses_more_to_its_halves(levels: list[np.ndarray]) -> None:
+def test_published_blur_gains_a_thousandth_and_half_floats_lose_more(levels: list[np.ndarray]) -> None:
     """The seven weights sum to 1.001 in each pass; some adapters truncate half floats."""
     for k, level in enumerate(levels, start=1):
         assert 0.985 < level.sum() < 1.002 ** (2 * k)
 
 
-def test_it_is_too_wide(levels: list[np.ndarray]) -> None:
+def test_published_blur_is_too_wide(levels: list[np.ndarray]) -> None:
     """The weights have a variance of 1.08, and interpolation adds more for steps below one texel."""
     y, x = np.indices((SIZE, SIZE)) - SIZE // 2
     for level, variance in zip(levels, VARIANCES, strict=True):
@@ -52,14 +52,14 @@ def test_it_is_too_wide(levels: list[np.ndarray]) -> None:
         assert 1.05 < wide / variance < 1.6
 
 
-def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
+def test_seven_taps_leave_gaps(levels: list[np.ndarray]) -> None:
     """A wide Gaussian of a narrow source shows its taps."""
     row = levels[-1][SIZE // 2]
     exact = np.exp(-((np.arange(SIZE) - SIZE // 2) ** 2) / (2 * VARIANCES[-1] * TEXELS_PER_MM**2))
     assert np.abs(row / row.max() - exact)[SIZE // 2 - 12 : SIZE // 2 + 13].max() > 0.01
 
 
-def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
+def test_clear_colour_does_not_darken_edges(device: Device) -> None:
     """Weights of 1.001 must not give coverage above 1, which would subtract the clear colour."""
     space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
     upload(device, space.stacks[0], np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))

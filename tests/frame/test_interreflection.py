@@ -23,7 +23,7 @@ SIDE = 64
 
 
 @pytest.mark.parametrize("albedo", [0.3, 0.6])
-def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
+def test_integrating_sphere_matches_its_closed_form(renderer: Renderer, albedo: float) -> None:
     """Bounces add albedo / (1 - albedo) times the direct light."""
     ball = uv_sphere(40.0, 48, 24)
     within = replace(ball, normals=-ball.normals, triangles=np.ascontiguousarray(ball.triangles[:, ::-1]))
@@ -41,7 +41,7 @@ def test_an_integrating_sphere(renderer: Renderer, albedo: float) -> None:
 
 
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
-def test_a_white_corner_in_a_furnace(renderer: Renderer, direction: str) -> None:
+def test_white_corner_passes_the_furnace_test(renderer: Renderer, direction: str) -> None:
     """The light of the wall replaces the uniform light that it hides."""
     head = corner(colour=np.ones((4, 4, 3)))
     scene = replace(scene_of(head, rho_s=0.0, direction=direction), environment=Environment(name="uniform"))
@@ -56,7 +56,7 @@ def test_a_white_corner_in_a_furnace(renderer: Renderer, direction: str) -> None
     assert np.abs(shares - 1.0).max() < 6.0 * FURNACE_OF_LINKS  # cells are met by few lines
 
 
-def test_a_new_camera_leaves_it_as_it_is(renderer: Renderer) -> None:
+def test_camera_change_does_not_recompute_interreflection(renderer: Renderer) -> None:
     head = corner()
     run_frame(renderer, scene_of(head, frontal()), atlas=SIDE)
     assert "interreflection" in renderer.graph.executed_stages

@@ -47,7 +47,7 @@ def head() -> Head:
     )
 
 
-def test_points_of_the_head_lie_where_the_matrices_say(renderer: Renderer, head: Head) -> None:
+def test_points_project_as_the_matrices_state(renderer: Renderer, head: Head) -> None:
     camera = dermis.Camera.from_opencv(K, R, T, SIZE)
     scene = dermis.Scene(head, camera=camera)
     points = surface_points(renderer, scene, Settings(size=SIZE, atlas=64))
@@ -71,7 +71,7 @@ def test_a_click_in_the_viewer_finds_the_same_points(head: Head) -> None:
         np.testing.assert_allclose(seen[:2] / seen[2], (column, row), atol=1e-6)
 
 
-def test_there_and_back() -> None:
+def test_intrinsics_survive_a_round_trip() -> None:
     camera = dermis.Camera.from_opencv(K, R, T[:, None], SIZE)
     for back, given in zip(camera.to_opencv(SIZE), (K, R, T), strict=True):
         np.testing.assert_allclose(back, given, atol=1e-9)
@@ -79,7 +79,7 @@ def test_there_and_back() -> None:
     np.testing.assert_allclose(behind.to_opencv(SIZE).t, -T, atol=1e-9)
 
 
-def test_a_usual_camera_has_its_principal_point_in_the_middle() -> None:
+def test_default_principal_point_is_the_centre() -> None:
     camera = dermis.Camera(position=(0, 0, 1000), frame_mm=200)
     k, turned, moved = camera.to_opencv((400, 300))
     np.testing.assert_allclose(k, [[1500, 0, 199.5], [0, 1500, 149.5], [0, 0, 1]], atol=1e-9)
@@ -105,7 +105,7 @@ def test_a_crop_is_a_part_of_the_whole_picture(renderer: Renderer, head: Head, t
     np.testing.assert_allclose(images[1][inner, inner], whole[inner, inner], rtol=2e-3, atol=2e-3)
 
 
-def test_hairs_are_cropped_too(renderer: Renderer) -> None:
+def test_strands_are_cropped_too(renderer: Renderer) -> None:
     human = dermis.load_head("human")
     eye = {"position": (30, 22, 500), "target": (30, 22, 80)}
     whole = dermis.Camera(**eye, frame_mm=60)
@@ -139,12 +139,12 @@ def test_hairs_are_cropped_too(renderer: Renderer) -> None:
         ({"t": (0, 0, np.nan)}, "t: expected numbers"),
     ],
 )
-def test_what_is_no_camera_is_refused(given: dict, said: str) -> None:
+def test_invalid_cameras_are_refused(given: dict, said: str) -> None:
     with pytest.raises(DermisError, match=said):
         dermis.Camera.from_opencv(**{"K": K, "R": R, "t": T, "size": SIZE} | given)
 
 
-def test_other_renderers_say_that_they_lack_it() -> None:
+def test_other_renderers_refuse_intrinsics() -> None:
     check_camera(dermis.Camera((0, 0, 900)), "Mitsuba")
     with pytest.raises(DermisError, match="in the middle and square pixels, for Mitsuba"):
         check_camera(dermis.Camera.from_opencv(K, R, T, SIZE), "Mitsuba")

@@ -39,7 +39,9 @@ def entered(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])
 @pytest.mark.parametrize("names", [(name,) for name in LIGHTS] + [tuple(LIGHTS)], ids="+".join)
-def test_lights_on_a_sphere(renderer: Renderer, names: tuple[str, ...], rho_s: float, close: float) -> None:
+def test_irradiance_of_lights_on_a_sphere_matches_numpy(
+    renderer: Renderer, names: tuple[str, ...], rho_s: float, close: float
+) -> None:
     scene = scene_of(PLAIN, *(LIGHTS[name] for name in names), rho_s=rho_s, roughness=0.35, mix=0.5)
     atlas = cached_atlas(SPHERE, SIZE)
     twin = twins.entering(scene, *twins.surface(atlas, PLAIN)) * twins.DEFAULT_COLOUR**0.5
@@ -50,7 +52,7 @@ def test_lights_on_a_sphere(renderer: Renderer, names: tuple[str, ...], rho_s: f
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
-def test_share_of_the_colour_map(renderer: Renderer, mix: float, close: float) -> None:
+def test_colour_map_factor_follows_the_mix(renderer: Renderer, mix: float, close: float) -> None:
     """The texel centres of a map of the size of the atlas are those of the atlas."""
     v, u = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE
     wave = np.stack([0.5 + 0.3 * np.cos(2 * np.pi * u), 0.4 + 0.2 * np.sin(3 * v), 0.3 + 0 * u], axis=-1)
@@ -82,7 +84,7 @@ def test_specular_map_is_a_factor_with_mean_one(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize(("constant", "same"), [(0.3, 0.5), (0.15, 0.25)])
-def test_the_constant_scales_a_roughness_map(renderer: Renderer, constant: float, same: float) -> None:
+def test_roughness_scales_its_map(renderer: Renderer, constant: float, same: float) -> None:
     """The default roughness leaves the map unchanged."""
     rough = head_of(SPHERE, roughness=np.full((8, 8), 0.5))
     mapped = scene_of(rough, LIGHTS["directional"], roughness=constant)
@@ -90,6 +92,6 @@ def test_the_constant_scales_a_roughness_map(renderer: Renderer, constant: float
     assert np.abs(entered(renderer, mapped) - entered(renderer, plain)).max() < TWIN
 
 
-def test_no_light_is_black(renderer: Renderer) -> None:
+def test_no_light_gives_zero_irradiance(renderer: Renderer) -> None:
     made = entered(renderer, scene_of(PLAIN, DirectionalLight(direction=(0, 0, -1), irradiance=(0, 0, 0))))
     assert not made[..., :3].any()

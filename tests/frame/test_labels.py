@@ -51,13 +51,13 @@ def test_labels_cover_the_head_and_nothing_else(seen: dict[str, Observation]) ->
         assert ((labels == 0) | labelled(one, *hair))[~head].all()
 
 
-def test_left_and_right_are_the_persons_own(seen: dict[str, Observation]) -> None:
+def test_left_and_right_are_those_of_the_person(seen: dict[str, Observation]) -> None:
     for part in ("eye", "iris", "brow", "ear"):
         right, left = (np.argwhere(labelled(seen["mean"], f"{side}_{part}"))[:, 1] for side in SIDES)
         assert right.mean() < SIZE / 2 < left.mean(), part
 
 
-def test_face_synthetics_is_a_mapping_of_the_classes(seen: dict[str, Observation]) -> None:
+def test_face_synthetics_classes_are_mapped(seen: dict[str, Observation]) -> None:
     table = np.array([one.face_synthetics for one in label_classes()])
     for one in seen.values():
         own, other = one.outputs["label"], one.outputs["label_face_synthetics"]

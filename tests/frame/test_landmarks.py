@@ -23,7 +23,7 @@ ALIKE_MM = 0.05
 
 
 @pytest.mark.parametrize("who", ["mean", "drawn"])
-def test_the_tip_of_the_nose_is_nearest(seen: dict[str, Observation], who: str) -> None:
+def test_nose_tip_is_nearest_to_the_camera(seen: dict[str, Observation], who: str) -> None:
     depth, nose = seen[who].outputs["depth"], labelled(seen[who], "nose")
     nearest = np.argwhere(nose & (depth == depth[nose].min()))[0][::-1]
     tip = marks(seen["mean"]).positions_mm[30]
@@ -32,7 +32,7 @@ def test_the_tip_of_the_nose_is_nearest(seen: dict[str, Observation], who: str) 
         assert np.linalg.norm(nearest - marks(seen[who]).pixels[30]) < 4
 
 
-def test_all_are_projected_by_the_camera(seen: dict[str, Observation]) -> None:
+def test_all_landmarks_are_projected_by_the_camera(seen: dict[str, Observation]) -> None:
     for one in seen.values():
         for found in one.landmarks.values():
             x = found.positions_mm @ one.camera.R.T + one.camera.t
@@ -40,7 +40,7 @@ def test_all_are_projected_by_the_camera(seen: dict[str, Observation]) -> None:
             assert np.abs(pixels[:, :2] / pixels[:, 2:] - found.pixels).max() < 1e-3
 
 
-def test_those_of_a_symmetric_person_are_symmetric(seen: dict[str, Observation]) -> None:
+def test_landmarks_of_a_symmetric_person_are_symmetric(seen: dict[str, Observation]) -> None:
     places = marks(seen["mean"]).positions_mm
     jaw = list(zip(range(8), range(16, 8, -1), strict=True))
     for right, left in [*jaw, (36, 45), (39, 42), (37, 44), (41, 46), (31, 35), (48, 54), (59, 55), (17, 26)]:
@@ -49,7 +49,7 @@ def test_those_of_a_symmetric_person_are_symmetric(seen: dict[str, Observation])
 
 
 @pytest.mark.parametrize("who", ["mean", "drawn"])
-def test_the_order_is_that_of_ibug(seen: dict[str, Observation], who: str) -> None:
+def test_landmark_order_is_that_of_ibug(seen: dict[str, Observation], who: str) -> None:
     x, y = marks(seen[who]).pixels.T
     assert (np.diff(x[17:27]) > 0).all() and (np.diff(y[27:31]) > 0).all()  # brows, bridge
     assert x[36] < x[39] < x[42] < x[45] and (np.diff(x[48:55]) > 0).all() and (np.diff(x[54:60]) < 0).all()
@@ -57,7 +57,7 @@ def test_the_order_is_that_of_ibug(seen: dict[str, Observation], who: str) -> No
     assert (y[37:39] < y[40:42][::-1]).all() and (y[61:64] <= y[65:68][::-1] + 1).all()
 
 
-def test_what_is_hidden_is_not_visible(seen: dict[str, Observation]) -> None:
+def test_occluded_landmarks_are_not_visible(seen: dict[str, Observation]) -> None:
     front, side, shut = (marks(seen[name]).visible for name in ("mean", "side", "shut"))
     assert front[17:].all()
     assert not side[[36, 37, 38, 41, 68, 17, 18, 19, 0, 1, 2]].any()  # the far side
@@ -65,7 +65,7 @@ def test_what_is_hidden_is_not_visible(seen: dict[str, Observation]) -> None:
     assert shut[68] and not shut[69]  # the pupil under the lid
 
 
-def test_the_heads_pose_moves_with_its_bone(seen: dict[str, Observation]) -> None:
+def test_head_pose_follows_its_bone(seen: dict[str, Observation]) -> None:
     rest, turned = seen["mean"], seen["turned"]
     assert rest.head_pose == pytest.approx(np.column_stack([rest.camera.R, rest.camera.t]), abs=1e-6)
     places = marks(rest).positions_mm[[27, 28, 36, 45]].astype(float)  # rigid parts of the head
@@ -100,7 +100,7 @@ def test_a_table_by_vertex_works_for_any_mesh(renderer: Renderer, ball: Head, tm
     assert one.gaze is None and one.outputs == {}
 
 
-def test_what_cannot_be_is_refused(renderer: Renderer, ball: Head, tmp_path: Path) -> None:
+def test_invalid_tables_are_refused(renderer: Renderer, ball: Head, tmp_path: Path) -> None:
     scene = Scene(ball, camera=around(ball))
     with pytest.raises(DermisError, match="topology of its own"):
         next(renderer.observe([scene], landmarks=("ibug-68",)))

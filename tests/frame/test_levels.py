@@ -54,7 +54,7 @@ def textures(device: Device, atlas: Atlas) -> AtlasTextures:
     return resting(device, atlas)
 
 
-def test_halvings_are_the_same_from_disk(
+def test_cached_halvings_equal_computed_ones(
     device: Device, atlas: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
@@ -124,7 +124,7 @@ def test_constant_light_stays_constant_at_every_resolution(
     assert np.abs(made[atlas.lit] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
-def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
+def test_excess_variance_of_halving_is_subtracted_from_the_next_level(device: Device) -> None:
     """With texels of 1 mm halving adds more than 0.4 mm2 to the second level; the third compensates."""
     atlas = build_atlas(plane(256.0), 256)
     coarser = _upload_coarser(
@@ -148,7 +148,7 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
         assert wide == pytest.approx(variance - 4 * 3 / 16, rel=0.01)  # what reading between texels will add
 
 
-def test_levels_are_held_at_their_own_resolution_alone() -> None:
+def test_levels_are_stored_only_at_their_resolutions() -> None:
     """Each resolution stores its levels and the last finer one; several layouts share the union of both."""
     assert levels_by_resolution(((0,),)) == (range(1),)
     assert levels_by_resolution(((0, 0, 0, 1, 1, 2),)) == (range(3), range(2, 5), range(4, 6))
@@ -160,7 +160,7 @@ def test_levels_are_held_at_their_own_resolution_alone() -> None:
 
 
 @pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])
-def test_halves_keep_the_light(
+def test_half_precision_keeps_the_light(
     device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, brightest: float
 ) -> None:
     """Half precision keeps the amount of light and its position, however bright it is."""
@@ -188,7 +188,7 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
     assert (max(found) > 0) == (texels_per_mm > 1.0)
 
 
-def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
+def test_halved_atlas_covers_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
     """Stretch and distances to the edge are halved, and gutters copy the same positions."""
     coarse = halve_mip(AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
     own, made = coarse.lit, textures.coarser[0].resources

@@ -40,7 +40,7 @@ def found(renderer: Renderer, scene: Scene, *names: str, **given: Any) -> Arrays
 
 
 @pytest.mark.parametrize("technique", TECHNIQUES.names)
-def test_diffuse_and_specular_are_the_picture(renderer: Renderer, technique: str) -> None:
+def test_diffuse_and_specular_add_up_to_the_picture(renderer: Renderer, technique: str) -> None:
     for scene in (SCENE, SCENE.replace(skin={"direction": "half-space", "specular_colour": "wrong"})):
         got = found(renderer, scene, *PARTS, technique=technique, seams="stitch")
         off = np.abs(got["diffuse"] + got["specular"] - got["linear"])
@@ -49,7 +49,7 @@ def test_diffuse_and_specular_are_the_picture(renderer: Renderer, technique: str
 
 
 @pytest.mark.parametrize("technique", ["texture-space", "screen-space", "none"])
-def test_they_are_those_of_one_sample_and_of_all_light(renderer: Renderer, technique: str) -> None:
+def test_light_outputs_include_all_lights_at_one_sample(renderer: Renderer, technique: str) -> None:
     one = found(renderer, SCENE, *PARTS, technique=technique)
     many = found(renderer, SCENE, *PARTS, technique=technique, samples=4, parts="specular", exposure=2.0)
     for name in PARTS:
@@ -64,7 +64,7 @@ def test_dry_skin_gives_back_its_albedo(renderer: Renderer) -> None:
     assert np.abs(np.pi * got["diffuse"] - got["irradiance"] * got["albedo"]).max() < 1e-5 * scale
 
 
-def test_albedo_and_irradiance_do_not_depend_on_what_spreads(renderer: Renderer) -> None:
+def test_albedo_and_irradiance_do_not_depend_on_the_profile(renderer: Renderer) -> None:
     dry, *others = (
         found(renderer, SCENE, *PARTS, technique=one, seams="stitch")
         for one in ("none", "texture-space", "screen-space", "pre-integrated")
@@ -75,7 +75,7 @@ def test_albedo_and_irradiance_do_not_depend_on_what_spreads(renderer: Renderer)
         assert np.abs(other["diffuse"] - dry["diffuse"]).max() > 1e-3
 
 
-def test_albedo_is_that_of_the_map_or_of_the_profile(renderer: Renderer) -> None:
+def test_albedo_comes_from_the_map_or_the_profile(renderer: Renderer) -> None:
     flat = head_of(plane(60.0), colour=np.broadcast_to([0.5, 0.25, 0.75], (8, 8, 3)))
     scene = scene_of(flat, frontal(), camera=front_camera(flat, frame_mm=40.0))
     for technique in ("none", "texture-space"):
@@ -88,7 +88,7 @@ def test_albedo_is_that_of_the_map_or_of_the_profile(renderer: Renderer) -> None
 
 
 @pytest.mark.parametrize("technique", ["texture-space", "gpu-gems-3"])
-def test_without_what_is_translucent_thin_parts_return_less(
+def test_thin_parts_return_less_without_translucency(
     renderer: Renderer, close: float, technique: str
 ) -> None:
     given = {"technique": technique, "seams": "stitch"}
@@ -101,14 +101,14 @@ def test_without_what_is_translucent_thin_parts_return_less(
     assert (thin["translucent"] <= thin["diffuse"] + SUM * scale).all()
 
 
-def test_of_two_layouts_the_light_through_is_blended_as_theirs(renderer: Renderer, close: float) -> None:
+def test_transmitted_light_of_two_layouts_is_blended(renderer: Renderer, close: float) -> None:
     thin = found(renderer, LIT_THROUGH, "diffuse", "translucent", seams="multi-uv")
     thick = found(renderer, LIT_THROUGH, "diffuse", seams="multi-uv", transmission="none")
     scale, returned = thin["diffuse"].max(), thin["diffuse"] - thin["translucent"]
     assert (returned > -close * scale).all() and (returned < thick["diffuse"] + close * scale).all()
 
 
-def test_visibility_is_none_of_a_lamp_behind_and_all_of_one_in_front(renderer: Renderer) -> None:
+def test_visibility_is_0_for_a_light_behind_and_1_in_front(renderer: Renderer) -> None:
     scene = scene_of(BALL, BEHIND, frontal(shadows=True), camera=front_camera(BALL))
     got = found(renderer, scene, "visibility", "irradiance", size=(64, 64), shadow_size=512)
     behind, before = np.moveaxis(got["visibility"], -1, 0)
@@ -118,7 +118,7 @@ def test_visibility_is_none_of_a_lamp_behind_and_all_of_one_in_front(renderer: R
     assert not got["visibility"][~seen].any()
 
 
-def test_a_light_gives_irradiance_where_it_is_visible(renderer: Renderer) -> None:
+def test_irradiance_is_positive_where_a_light_is_visible(renderer: Renderer) -> None:
     """A wall behind a small ball has hard and soft shadows, also of a lamp that is shaded in parts."""
     ball = uv_sphere(8.0, 24, 12), (0, 0, 30), (0.5, 0, 0.5)
     head = head_of(joined((plane(120.0, 8), (0, 0, 0), (0, 0, 0.5)), ball))
@@ -141,7 +141,7 @@ def test_a_light_gives_irradiance_where_it_is_visible(renderer: Renderer) -> Non
     assert np.abs(both["visibility"][..., 0] - shown).max() < 1e-6
 
 
-def test_thickness_of_a_slab_and_of_a_ball(renderer: Renderer) -> None:
+def test_thickness_of_a_slab_and_a_ball_is_exact(renderer: Renderer) -> None:
     slab = found(renderer, LIT_THROUGH, "thickness", seams="stitch", atlas=128)["thickness"]
     assert slab[12:-12, 12:-12] == pytest.approx(SLAB_MM, abs=0.02)
     small = head_of(uv_sphere(2.5, 24, 12))
@@ -162,7 +162,7 @@ def test_thickness_ends_where_no_light_passes(renderer: Renderer) -> None:
     assert np.abs(row - true)[thin].max() < 0.35 and (np.diff(row)[thin[1:]] > 0).all()
 
 
-def test_outputs_leave_the_picture_as_it_is(renderer: Renderer) -> None:
+def test_outputs_do_not_change_the_picture(renderer: Renderer) -> None:
     names = ("diffuse", "specular", "translucent", "visibility", "thickness")
     bare = renderer.draw(LIT_THROUGH, settings_of(samples=4, seams="stitch")).linear()
     with_them = found(renderer, LIT_THROUGH, *names, samples=4, seams="stitch")["linear"]
@@ -170,7 +170,7 @@ def test_outputs_leave_the_picture_as_it_is(renderer: Renderer) -> None:
     assert np.array_equal(bare, with_them) and np.array_equal(bare, again)
 
 
-def test_light_that_changes_changes_the_outputs(renderer: Renderer, close: float) -> None:
+def test_outputs_follow_a_changed_light(renderer: Renderer, close: float) -> None:
     """Passes that were skipped in a frame without outputs run for the next one."""
     names = ("diffuse", "translucent", "thickness")
     given = {"seams": "stitch", "technique": "texture-space"}
@@ -204,7 +204,7 @@ def test_pigments_are_those_of_the_person(face: tuple[Human, Arrays]) -> None:
     assert 0.01 < lips[skin].mean() < 0.2
 
 
-def test_eyes_and_teeth_have_a_surface_too(face: tuple[Human, Arrays]) -> None:
+def test_eyes_and_teeth_have_specular_outputs(face: tuple[Human, Arrays]) -> None:
     person, got = face
     mesh = person.head().mesh
     names = [one.name for one in mesh.materials]
@@ -220,7 +220,7 @@ def test_eyes_and_teeth_have_a_surface_too(face: tuple[Human, Arrays]) -> None:
     assert both.max() < SUM * got["linear"].max()
 
 
-def test_skin_that_is_alike_everywhere_has_its_own_pigments(renderer: Renderer) -> None:
+def test_uniform_skin_has_uniform_pigments(renderer: Renderer) -> None:
     medium = found(renderer, SCENE.replace(skin={"profile": "medium"}), "melanin", "blood")
     assert set(np.unique(medium["melanin"])) == {0.0, np.float32(0.15)}
     assert set(np.unique(medium["blood"])) == {0.0, np.float32(0.01)}
@@ -235,7 +235,7 @@ def test_skin_without_pigments_is_refused(renderer: Renderer, name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["translucent", "thickness"])
-def test_what_lets_no_light_through_is_refused(renderer: Renderer, name: str) -> None:
+def test_thickness_of_opaque_skin_is_refused(renderer: Renderer, name: str) -> None:
     for given in ({"technique": "none"}, {"technique": "screen-space"}, {"transmission": "none"}):
         with pytest.raises(DermisError, match=rf"output {name}: expected light that passes thin parts"):
             found(renderer, SCENE, name, **given)

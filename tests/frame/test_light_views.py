@@ -21,7 +21,7 @@ LIGHTS: tuple[Light, ...] = (
 )
 
 
-def test_each_sees_what_it_sees_alone() -> None:
+def test_each_view_equals_that_of_the_light_alone() -> None:
     together = light_shadow_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)
     assert [view is None for view in together] == [False, False, True, False]
     for light, view in zip(LIGHTS, together, strict=True):
@@ -33,7 +33,7 @@ def test_each_sees_what_it_sees_alone() -> None:
 
 
 @pytest.mark.parametrize("index", [0, 3])
-def test_maps_hold_the_head_tightly(index: int) -> None:
+def test_shadow_maps_fit_the_head_tightly(index: int) -> None:
     view = light_shadow_views(scene_of(BALL, *LIGHTS), BALL.mesh.outline, 64)[index]
     assert view
     corners = np.c_[BALL.mesh.positions, np.ones(len(BALL.mesh.positions))] @ view.clip.T
@@ -43,7 +43,7 @@ def test_maps_hold_the_head_tightly(index: int) -> None:
 
 
 @pytest.mark.parametrize("inside", [(0, 0, 5), (0, 0, 30.4)])
-def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
+def test_light_inside_the_head_is_named_in_the_refusal(inside: tuple[float, ...]) -> None:
     """A light inside the bounds, or so near that no map can cover the head, is refused by name."""
     lamp = PointLight(position=place(BALL, inside), target=(100.0, 0.0, 0.0))
     with pytest.raises(DermisError, match=r"light 2.*a position outside the head"):
@@ -51,7 +51,7 @@ def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
 
 
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
-def test_up_counts_however_short(length: float) -> None:
+def test_up_vector_counts_at_any_length(length: float) -> None:
     """The up vector counts at any allowed length; only one along the view is replaced."""
     tilted = view_axes((0.0, 0.6, -0.8), (0.0, 0.9 * length, 0.2 * length))
     assert np.allclose(tilted, [(1.0, 0.0, 0.0), (0.0, 0.8, 0.6), (0.0, 0.6, -0.8)])

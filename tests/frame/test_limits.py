@@ -110,7 +110,9 @@ def bare(renderer: Renderer) -> Renderer:
 
 
 @pytest.mark.parametrize("given", [*({"technique": name} for name in TECHNIQUES.names), WHOLE], ids=str)
-def test_bare_device_draws_the_same(renderer: Renderer, bare: Renderer, given: dict[str, Any]) -> None:
+def test_device_without_optional_features_draws_the_same(
+    renderer: Renderer, bare: Renderer, given: dict[str, Any]
+) -> None:
     head = Head("ball", uv_sphere(90.0, 24, 12), Maps())
     lights = [*load_lights("window"), *load_lights("rim"), *load_lights("laser")]
     scene = Scene(head, lights=lights, environment=Environment(name="uniform"))

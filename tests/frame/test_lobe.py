@@ -71,7 +71,7 @@ def near_the_mirror(seed: int) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.9])
 @pytest.mark.parametrize("fresnel", FRESNEL)
 @pytest.mark.parametrize("model", COMPUTED)
-def test_each_model_is_its_twin(renderer: Renderer, model: str, fresnel: str, m: float) -> None:
+def test_each_model_matches_numpy(renderer: Renderer, model: str, fresnel: str, m: float) -> None:
     for light, view in (directions(1), directions(2)), near_the_mirror(3):
         light[0, 0] = view[0, 0] = Z  # the peak itself
         reflectance, _, lobe, *_ = shader(renderer, light, view, m, 0.18, specular=model, fresnel=fresnel)
@@ -81,7 +81,7 @@ def test_each_model_is_its_twin(renderer: Renderer, model: str, fresnel: str, m:
 
 
 @pytest.mark.parametrize("m", [0.1, 0.2, 0.3, 0.5, 0.9])
-def test_kelemen_by_table(renderer: Renderer, m: float) -> None:
+def test_tabulated_kelemen_matches_the_formula(renderer: Renderer, m: float) -> None:
     """Compare with the table in float64, and with the lobe that the table approximates."""
     light, view = directions(1), directions(2)
     light[0, 0] = view[0, 0] = Z
@@ -92,7 +92,7 @@ def test_kelemen_by_table(renderer: Renderer, m: float) -> None:
 
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
-def test_kelemen_by_table_near_the_mirror_direction(renderer: Renderer, m: float) -> None:
+def test_tabulated_kelemen_matches_near_the_mirror_direction(renderer: Renderer, m: float) -> None:
     light, view = near_the_mirror(3)
     _, _, lobe, *_ = shader(renderer, light, view, m, 1.0, specular="kelemen")
     exact = kelemen(cosines(Z, light, view), m)
@@ -103,7 +103,7 @@ def test_kelemen_by_table_near_the_mirror_direction(renderer: Renderer, m: float
 
 @pytest.mark.parametrize("energy", ENERGY_SCHEMES)
 @pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow-smith", "phong-plain"])
-def test_shares_that_pass(renderer: Renderer, model: str, energy: str) -> None:
+def test_transmitted_fractions_match_numpy(renderer: Renderer, model: str, energy: str) -> None:
     light, view, m, rho_s = directions(7), directions(8), 0.25, 0.6
     *_, entering, everywhere, leaving = shader(renderer, light, view, m, rho_s, specular=model, energy=energy)
     law = ENERGY_SCHEMES[energy]
@@ -114,13 +114,13 @@ def test_shares_that_pass(renderer: Renderer, model: str, energy: str) -> None:
     assert worst(leaving, law.exitance_factor(outwards, mean, rho_s)) < LOBE_TWIN
 
 
-def test_nothing_enters_beyond_all_of_the_light(renderer: Renderer) -> None:
+def test_entering_light_is_never_negative(renderer: Renderer) -> None:
     """The published albedo exceeds 1 for smooth lobes at grazing light: entering light is clamped at 0."""
     *_, entering, _, leaving = shader(renderer, directions(5), directions(6), 0.06, 1.0, energy="published")
     assert entering.min() == 0.0 and leaving.min() == 0.0
 
 
-def test_relief_that_turns_away_from_the_eye_reflects_as_seen_at_its_horizon(renderer: Renderer) -> None:
+def test_back_facing_relief_reflects_as_at_grazing_view(renderer: Renderer) -> None:
     """Light from behind is included, where the lobe of an invisible normal is unbounded."""
     rng = np.random.default_rng(4)
     view = directions(9)

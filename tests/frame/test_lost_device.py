@@ -45,16 +45,16 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> subprocess.CompletedProcess
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_the_picture_is_the_same(ran: subprocess.CompletedProcess[str], stage: str) -> None:
+def test_recovered_device_draws_the_same_picture(ran: subprocess.CompletedProcess[str], stage: str) -> None:
     assert f"{stage}: same\n" in ran.stdout, ran.stdout + ran.stderr[-2000:]
 
 
 @pytest.mark.parametrize("name", ["animate", "render"])
-def test_a_second_loss_is_told(ran: subprocess.CompletedProcess[str], name: str) -> None:
+def test_second_device_loss_is_an_error(ran: subprocess.CompletedProcess[str], name: str) -> None:
     assert ran.returncode == 0 and f"{name} twice: 2\n" in ran.stdout
     assert len(TWICE.findall(ran.stderr)) == 2 and "Traceback" not in ran.stderr
     assert "DEVICE LOST" not in ran.stderr  # wgpu's own words
 
 
-def test_a_loss_that_is_mended_is_told(ran: subprocess.CompletedProcess[str]) -> None:
+def test_recovered_device_loss_is_logged(ran: subprocess.CompletedProcess[str]) -> None:
     assert re.search(r"note: .+ was lost by its driver; it is opened again", ran.stderr)

@@ -33,13 +33,13 @@ def all_mips(device: Device, texture: Any) -> list[Floats]:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_tilted_plane_has_one_slope_up_to_the_edge(device: Device, shape: tuple[int, int]) -> None:
+def test_tilted_plane_has_constant_slope_up_to_the_edge(device: Device, shape: tuple[int, int]) -> None:
     y, x = np.mgrid[: shape[0], : shape[1]]
     want = [0.25 if shape[1] > 1 else 0, -0.5 if shape[0] > 1 else 0]
     np.testing.assert_allclose(slopes_of(device, 0.25 * x - 0.5 * y) - want, 0, atol=2e-5)
 
 
-def test_wave_has_its_derivative(device: Device) -> None:
+def test_slopes_of_a_wave_are_its_derivative(device: Device) -> None:
     y, x = np.mgrid[:128, :96]
     k, q = 2 * np.pi * 3 / 96, 2 * np.pi * 5 / 128
     made = slopes_of(device, np.sin(k * x + q * y))[1:-1, 1:-1]
@@ -50,14 +50,14 @@ def test_wave_has_its_derivative(device: Device) -> None:
     np.testing.assert_allclose(made[..., 0], slope * k, atol=0.02 * k)
 
 
-def test_rows_and_columns_are_alike(device: Device) -> None:
+def test_slopes_are_symmetric_in_rows_and_columns(device: Device) -> None:
     """Each invocation handles many rows of one column."""
     height = noise((150, 40)).astype(float)
     turned = slopes_of(device, height.T)[..., ::-1].swapaxes(0, 1)
     np.testing.assert_allclose(slopes_of(device, height), turned, atol=HALVES)
 
 
-def test_bands_do_not_show(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_row_bands_leave_no_seams(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Large maps are uploaded a few rows at a time."""
     height = noise((150, 42)).astype(float)
     at_once = slopes_of(device, height)

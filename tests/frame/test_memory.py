@@ -74,7 +74,7 @@ def held(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> Held:
     return Held(renderer.device, monkeypatch)
 
 
-def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held) -> None:
+def test_frame_frees_resources_of_the_previous_one(renderer: Renderer, held: Held) -> None:
     """The memory is that of a fresh renderer, whatever was rendered before."""
     alone = {}
     for kind in KINDS:
@@ -87,7 +87,7 @@ def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held
 
 
 @pytest.mark.parametrize("kind", ["texture-space", "two layouts", "gpu-gems-3", "none"])
-def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind: str) -> None:
+def test_atlas_memory_matches_the_estimate(renderer: Renderer, held: Held, kind: str) -> None:
     """The difference of two sizes cancels resources of other sizes; halved levels take less."""
     if renderer.device.adapter.kind != "CPU":
         pytest.skip("only a software adapter takes main memory, and levels of floats")
@@ -103,7 +103,7 @@ def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind:
     assert taken == foreseen if kind in ("gpu-gems-3", "none") else 0.6 * foreseen < taken < foreseen
 
 
-def test_techniques_without_an_atlas_ask_for_none(
+def test_techniques_without_an_atlas_allocate_none(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sizes that no device could allocate are accepted."""

@@ -18,7 +18,7 @@ BALL = head_of(uv_sphere(30.0, 24, 12))
 IN_BUFFERS = (("MESH_IN_BUFFERS", 1),)
 
 
-def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_buffers_equal_textures(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = run_frame(renderer, scene_of(BALL, frontal()), atlas=64)
     adapter = replace(renderer.device.adapter, kind="DiscreteGPU")  # which reads buffers
     with monkeypatch.context() as patch:

@@ -56,7 +56,7 @@ def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> 
 
 
 @pytest.mark.parametrize("technique", TECHNIQUES)
-def test_it_is_an_incident_meter(renderer: Renderer, technique: str) -> None:
+def test_meter_measures_incident_light(renderer: Renderer, technique: str) -> None:
     """Dark skin is metered like light skin for every technique, so that it stays dark."""
     dark = head_of(plane(100.0), colour=np.full((8, 8, 3), 0.05))
     both = [
@@ -66,7 +66,7 @@ def test_it_is_an_incident_meter(renderer: Renderer, technique: str) -> None:
     assert both[0] == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
 
 
-def test_surroundings_count_as_the_light_that_falls_in(renderer: Renderer) -> None:
+def test_environment_counts_as_incident_light(renderer: Renderer) -> None:
     scene = Scene(FLAT, (), front_camera(FLAT), environment=Environment(name="uniform", exposure=4.0))
     assert metered(renderer, scene, occlusion="none") == pytest.approx(METER_KEY / 4.0, rel=HALVES)
 
@@ -79,7 +79,7 @@ def glossy(irradiance: float, share: float) -> Scene:
     return scene_of(head, frontal(irradiance), mix=0.0, **DULL)
 
 
-def test_highlights_stop_it_down_by_one_stop_at_most(renderer: Renderer) -> None:
+def test_highlights_reduce_exposure_by_at_most_one_stop(renderer: Renderer) -> None:
     for irradiance in (1.0, 9.0):
         usual, scene = METER_KEY * np.pi / irradiance, glossy(irradiance, 0.2)
         found = metered(renderer, scene, technique="none")
@@ -103,7 +103,7 @@ def test_only_skin_is_metered(renderer: Renderer) -> None:
     assert count["plain"] == (1.0, 0)
 
 
-def test_it_has_no_memory(renderer: Renderer) -> None:
+def test_exposure_does_not_depend_on_earlier_frames(renderer: Renderer) -> None:
     """The exposure is the same after other scenes, and nearly the same at another size."""
     scene = scene_of(FLAT, frontal(2.0))
     first = metered(renderer, scene)
@@ -114,7 +114,7 @@ def test_it_has_no_memory(renderer: Renderer) -> None:
     assert metered(renderer, dark) == 1.0
 
 
-def test_the_picture_is_that_of_the_same_exposure_by_hand(renderer: Renderer) -> None:
+def test_metered_picture_equals_one_with_that_exposure(renderer: Renderer) -> None:
     scene = scene_of(FLAT, frontal(0.7))
     auto = renderer.draw(scene, settings_of(exposure="auto", background="gradient"))
     bytes_, exposure = auto.srgb8(), auto.exposure

@@ -66,7 +66,9 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
 
 
 @pytest.mark.parametrize("moment", range(0, 21, 5))
-def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: Atlas, moment: int) -> None:
+def test_uniform_light_stays_uniform_in_every_pose(
+    device: Device, head: Head, atlas: Atlas, moment: int
+) -> None:
     moving = with_test_rig(head, 12)
     motion = pose_at_moment(moving, moment).motion(moving.control)
     held = MotionBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
@@ -77,7 +79,7 @@ def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: 
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.8, 1.25, 2.0])
-def test_light_on_a_scaled_ball_widens_as_on_a_ball_of_that_size(
+def test_scaled_ball_spreads_light_as_a_ball_of_that_size(
     device: Device, head: Head, atlas: Atlas, scale: float
 ) -> None:
     """A Gaussian of variance v reduces light that is linear in x by exp(-v / r^2)."""
@@ -114,14 +116,12 @@ def test_a_posed_head_looks_like_one_loaded_in_that_shape(
     assert apart(posed, picture(renderer, head, technique=technique)) > 10 * POSED
 
 
-def test_a_pose_at_rest_is_no_pose(renderer: Renderer, head: Head) -> None:
+def test_rest_pose_equals_no_pose(renderer: Renderer, head: Head) -> None:
     moving = with_test_rig(head, 4)
     assert np.array_equal(picture(renderer, moving, Pose()), picture(renderer, moving))
 
 
-def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
-    renderer: Renderer, head: Head
-) -> None:
+def test_pose_reruns_dependent_stages_and_returning_is_exact(renderer: Renderer, head: Head) -> None:
     moving = with_test_rig(head, 4)
     first = picture(renderer, moving, pose_at_moment(moving, 1))
     picture(renderer, moving, pose_at_moment(moving, 2))
@@ -132,7 +132,7 @@ def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
     assert renderer.graph.executed_stages == []
 
 
-def test_people_in_turn_each_keep_their_gutters(head: Head) -> None:
+def test_alternating_people_keep_their_gutters(head: Head) -> None:
     """Pairs of several people are cached, and the gutters that they share are rewritten for each."""
     alone, together = Renderer("cpu"), Renderer("cpu", cache_size=2)
     poses = [

@@ -64,7 +64,7 @@ def on_floor(head: Head) -> tuple[NDArray[np.bool_], Floats]:
 
 
 @pytest.mark.parametrize("seams", ["alpha", "stitch", "multi-uv"])
-def test_a_head_that_does_not_move_keeps_its_occlusion(renderer: Renderer, head: Head, seams: str) -> None:
+def test_static_head_keeps_its_occlusion(renderer: Renderer, head: Head, seams: str) -> None:
     rest = open_maps(renderer, posed(head), seams=seams)
     moved = open_maps(renderer, posed(head, head.positions_mm.copy()), seams=seams)
     assert len(rest) == len(moved) == 1 + (seams == "multi-uv")
@@ -73,7 +73,7 @@ def test_a_head_that_does_not_move_keeps_its_occlusion(renderer: Renderer, head:
 
 
 @pytest.mark.parametrize("degrees", [30.0, 60.0, 135.0, 179.0])
-def test_a_wall_that_turns_about_its_foot(renderer: Renderer, head: Head, degrees: float) -> None:
+def test_rotated_wall_changes_occlusion_as_computed(renderer: Renderer, head: Head, degrees: float) -> None:
     middle, d = on_floor(head)
     (made,) = open_maps(renderer, posed(head, hinged(head, degrees)))
     error = np.abs(made[:SIDE][middle] - open_beside(d, degrees))
@@ -103,7 +103,7 @@ def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: i
     return found
 
 
-def test_a_moved_wall_occludes_as_one_baked_anew(renderer: Renderer, head: Head) -> None:
+def test_moved_wall_occludes_like_a_newly_baked_one(renderer: Renderer, head: Head) -> None:
     """Compare all triangles but those with a corner in the crease, which sees both sides of the wall."""
     points, (places, _) = hinged(head, 45.0), surface(cached_atlas(head.mesh, SIDE), head)
     away = (places[..., 0] > FOOT_MM + 10) | (places[..., 2] > 4)
@@ -111,7 +111,7 @@ def test_a_moved_wall_occludes_as_one_baked_anew(renderer: Renderer, head: Head)
     assert found["baked"] < FOLLOWED < found["rest"] / 2
 
 
-def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer) -> None:
+def test_open_mouth_occludes_like_a_newly_baked_one(renderer: Renderer) -> None:
     human = Human().head(subdivide=0)
     scene = replace(scene_of(human), environment=SKY, pose=Pose(weights={"jawOpen": 1.0}))
     assert scene.motion is not None
@@ -120,7 +120,7 @@ def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer) -> None:
     assert found["baked"] < FOLLOWED < found["rest"]  # which is the mean person's
 
 
-def test_vertices_follow_too(renderer: Renderer, head: Head) -> None:
+def test_vertex_occlusion_follows_the_motion(renderer: Renderer, head: Head) -> None:
     """The rows of vertices are updated too, for surfaces without texels."""
     points = hinged(head, 45.0)
     anew, (made,) = (
@@ -133,13 +133,13 @@ def test_vertices_follow_too(renderer: Renderer, head: Head) -> None:
     assert np.sqrt(np.mean((made_at - anew_at)[floor] ** 2)) < FOLLOWED
 
 
-def test_a_head_that_turns_as_a_whole_keeps_its_occlusion(renderer: Renderer, head: Head) -> None:
+def test_rigidly_rotated_head_keeps_its_occlusion(renderer: Renderer, head: Head) -> None:
     (rest,) = open_maps(renderer, posed(head))
     (turned,) = open_maps(renderer, posed(head, head.positions_mm @ TURN.T))
     assert np.sqrt(np.mean((turned - rest) ** 2)) < STILL and np.abs(turned - rest).max() < OCCLUSION / 2
 
 
-def test_both_ways_to_depth_maps_agree(
+def test_both_depth_map_methods_agree(
     renderer: Renderer, head: Head, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = posed(head, hinged(head, 60.0))
@@ -151,7 +151,7 @@ def test_both_ways_to_depth_maps_agree(
     assert np.sqrt(np.mean((computed - usual) ** 2)) < 2 * STILL
 
 
-def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: Head) -> None:
+def test_occlusion_runs_only_when_the_shape_changes(renderer: Renderer, head: Head) -> None:
     settings, first = settings_of(), hinged(head, 60.0)
     scene = posed(head, first)
 
@@ -168,7 +168,7 @@ def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: H
     assert not ran(replace(scene, environment=None))
 
 
-def test_a_turn_is_found_from_points_and_bones() -> None:
+def test_rotation_is_derived_from_points_and_bones() -> None:
     human = Human().head(subdivide=0)
     anchors, rig = make_anchors(human), human.control
     assert np.abs(head_rotation(anchors, rig.rest) - np.eye(3)).max() < 1e-6
@@ -180,7 +180,7 @@ def test_a_turn_is_found_from_points_and_bones() -> None:
     assert 30.0 < np.degrees(np.arccos((np.trace(neck) - 1) / 2)) < 50.0
 
 
-def test_views_hold_the_whole_shape(head: Head) -> None:
+def test_views_cover_the_deformed_shape(head: Head) -> None:
     points = np.random.default_rng(3).normal(scale=(80.0, 120.0, 60.0), size=(500, 3))
     look = sky_views(Outline(points), TURN)
     whole = np.concatenate([points, np.ones((500, 1))], axis=1)

@@ -61,7 +61,7 @@ def chosen(text: str, settings: Settings) -> Settings:
     ],
     ids=["atlas", "size"],
 )
-def test_what_is_told_to_fit_does(
+def test_suggested_settings_fit_in_memory(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any], what: str, option: str
 ) -> None:
     settings = settings_of(**({"transmission": "none"} | asked))
@@ -75,7 +75,7 @@ def test_what_is_told_to_fit_does(
     assert renderer.draw(LIT, smaller).linear().max() > 0.1
 
 
-def test_what_others_of_the_process_hold_is_no_room(
+def test_memory_of_other_allocations_counts_as_used(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, "allocated_bytes", lambda: 10**9)
@@ -88,7 +88,7 @@ def test_what_others_of_the_process_hold_is_no_room(
     assert renderer.draw(LIT, chosen(said["options"], settings)).linear().max() > 0.1
 
 
-def test_buffers_over_the_limit_are_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_buffers_over_the_limit_are_reported(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(renderer.device, "max_storage_bytes", 4000)
     with pytest.raises(
         DermisError, match=r"expected room for the list, 4\.0 MB, but it takes at most 0\.0 MB"
@@ -96,7 +96,9 @@ def test_buffers_over_the_limit_are_told(renderer: Renderer, monkeypatch: pytest
         renderer.device.storage_buffer(4_000_000, "list")
 
 
-def test_what_a_driver_says_of_a_texture_is_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_driver_errors_about_textures_are_reported(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A texture of the largest side exceeds any memory: the error of the library is reported."""
     device = renderer.device
     if device.adapter.kind != "CPU":

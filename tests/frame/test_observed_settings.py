@@ -11,7 +11,7 @@ from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Scene, Settings
 
 
-def test_each_scene_is_drawn_with_its_own() -> None:
+def test_each_scene_is_drawn_with_its_settings() -> None:
     scene = Scene(Head("ball", uv_sphere(100.0, 24, 12), Maps()))
     usual = Settings(size=(24, 24), atlas=64, samples=1, shadow_size=64, exposure=0.3)
     each = [usual, usual.replace(exposure=0.1), usual.replace(size=(16, 8)), usual]

@@ -36,7 +36,7 @@ def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> N
     )
 
 
-def test_directions_share_the_sphere() -> None:
+def test_directions_are_distributed_uniformly_on_the_sphere() -> None:
     towards = fibonacci_sphere(128)
     assert np.allclose(np.linalg.norm(towards, axis=1), 1)
     assert np.abs(towards.mean(axis=0)).max() < 0.01
@@ -45,12 +45,12 @@ def test_directions_share_the_sphere() -> None:
         assert np.maximum(towards @ unit, 0).mean() == pytest.approx(0.25, rel=0.02)
 
 
-def test_a_ball_sees_all_of_its_sky(renderer: Renderer) -> None:
+def test_ball_is_unoccluded(renderer: Renderer) -> None:
     made = baked(renderer, head_of(uv_sphere(60.0, 48, 24)))
     assert np.nanmin(made) > 1 - 10 * LIT and np.nanmax(made) <= 1
 
 
-def test_a_floor_beside_a_wall(renderer: Renderer) -> None:
+def test_floor_beside_a_wall_matches_the_closed_form(renderer: Renderer) -> None:
     """A long wall of height h at distance d hides (1 - d / sqrt(d^2 + h^2)) / 2."""
     head = corner()
     made = baked(renderer, head)[:SIDE]
@@ -64,7 +64,7 @@ def test_a_floor_beside_a_wall(renderer: Renderer) -> None:
     assert np.abs(made[middle] - exact)[near].mean() < OCCLUSION / 3
 
 
-def test_vertices_follow_the_atlas(renderer: Renderer) -> None:
+def test_vertex_occlusion_agrees_with_the_atlas(renderer: Renderer) -> None:
     """All vertices follow the texels, row by row."""
     head = corner()
     made = baked(renderer, head)
@@ -119,7 +119,7 @@ def test_opaque_parts_are_occluded_by_their_vertices(renderer: Renderer) -> None
     assert dark[32, 60, 0] > 0.97 * bright[32, 60, 0]
 
 
-def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_occlusion_is_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second bake is read from disk, by a key of mesh, atlas and directions."""
     head = corner()
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))

@@ -71,15 +71,13 @@ def seen(found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
     return mask
 
 
-def test_each_has_its_shape_and_kind(found: dict[str, NDArray[Any]]) -> None:
+def test_each_output_has_its_shape_and_dtype(found: dict[str, NDArray[Any]]) -> None:
     for name, output in ((name, OUTPUTS[name]) for name in NAMES):
         shape = SIZE[::-1] if output.channels == 1 else (*SIZE[::-1], output.channels)
         assert found[name].shape == shape and found[name].dtype == output.kind
 
 
-def test_where_nothing_is_seen_is_the_background(
-    found: dict[str, NDArray[Any]], seen: NDArray[np.bool_]
-) -> None:
+def test_empty_pixels_have_background_values(found: dict[str, NDArray[Any]], seen: NDArray[np.bool_]) -> None:
     for name, output in ((name, OUTPUTS[name]) for name in NAMES):
         assert (found[name][~seen] == output.background).all(), name
 
@@ -91,7 +89,7 @@ def test_positions_project_to_the_centres_of_their_pixels(
     assert np.abs(off).max() < PIXEL
 
 
-def test_triangles_seen_along_their_plane_are_met_where_they_look_nearest(renderer: Renderer) -> None:
+def test_edge_on_triangles_are_hit_at_their_nearest_point(renderer: Renderer) -> None:
     """At the rim of a ball rasterisers hit triangles slightly outside, and rays their plane far away."""
     fine, size = head_of(uv_sphere(30.0, 200, 100)), (256, 256)
     scene = scene_of(fine, frontal(), camera=CAMERA)
@@ -107,7 +105,7 @@ def test_depth_is_along_the_optical_axis(found: dict[str, NDArray[Any]], seen: N
     assert found["depth"][seen] == pytest.approx(along[seen], abs=1e-3)
 
 
-def test_barycentrics_are_of_the_triangles_corners(
+def test_barycentrics_refer_to_the_triangle_corners(
     found: dict[str, NDArray[Any]], seen: NDArray[np.bool_]
 ) -> None:
     corners, weights = BALL.mesh.triangles[found["triangle"][seen]], found["barycentric"][seen]
@@ -142,7 +140,7 @@ def test_relief_bends_one_normal_only(renderer: Renderer, found: dict[str, NDArr
 
 
 @pytest.mark.parametrize("change", [{}, {"samples": 2}, {"samples": 7}, {"atlas": 128, "exposure": 3.0}])
-def test_a_frame_is_the_same_to_the_bit(
+def test_equal_frames_have_identical_outputs(
     renderer: Renderer, found: dict[str, NDArray[Any]], change: dict[str, Any]
 ) -> None:
     """Outputs do not depend on the samples of the picture, except for coverage."""
@@ -151,7 +149,7 @@ def test_a_frame_is_the_same_to_the_bit(
         assert rendered.output(name).tobytes() == found[name].tobytes(), name
 
 
-def test_alpha_is_that_of_the_picture_hair_and_all(renderer: Renderer) -> None:
+def test_alpha_equals_that_of_the_picture_with_hair(renderer: Renderer) -> None:
     head = hairy([[-10, 0, 5], [0, -10, 30]], [[30, 30, 40], [-60, 60, 50]], 1.0)
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=200.0))
     rendered = drawn(renderer, scene, samples=4)
@@ -203,14 +201,14 @@ def test_motion_is_that_of_projected_points(renderer: Renderer, now: Scene, befo
     assert (rendered.output("motion")[~seen] == 0).all()
 
 
-def test_what_stands_still_does_not_move(renderer: Renderer) -> None:
+def test_static_points_have_zero_motion(renderer: Renderer) -> None:
     for before in (None, turned(7.0), SCENE.replace(camera=NEARER.model_copy())):
         scene = before or SCENE
         assert not drawn(renderer, scene, before).output("motion").any()
         assert drawn(renderer, turned(3.0), before).output("motion").any() == (before is not None)
 
 
-def test_a_clip_is_observed_as_it_is_drawn(renderer: Renderer) -> None:
+def test_outputs_of_a_clip_match_single_frames(renderer: Renderer) -> None:
     """Pictures, outputs and motion of a clip are the same with frames in flight and without."""
     clip = [turned(4.0 * k, lights=[frontal(1.0 + k)]) for k in range(5)]
     names, settings = ("depth", "motion", "triangle"), settings_of(size=SIZE)
@@ -225,7 +223,7 @@ def test_a_clip_is_observed_as_it_is_drawn(renderer: Renderer) -> None:
     assert [bool(one.outputs["motion"].any()) for one in found] == [False, True, True, True, True]
 
 
-def test_pictures_are_observed_as_they_are_asked(renderer: Renderer) -> None:
+def test_outputs_follow_the_order_of_requests(renderer: Renderer) -> None:
     settings = settings_of(size=SIZE, samples=4)
     for given in ({"alpha": True}, {"linear": True}, {"linear": True, "alpha": True}):
         (one,) = renderer.observe([SCENE], settings, outputs=["alpha"], **given)
@@ -235,7 +233,7 @@ def test_pictures_are_observed_as_they_are_asked(renderer: Renderer) -> None:
     assert plain.outputs == {} and "uint8[36, 44, 3]" in repr(plain)
 
 
-def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
+def test_motion_restarts_when_the_head_changes(renderer: Renderer) -> None:
     other = head_of(uv_sphere(25.0, 24, 12))
     cut = scene_of(other, frontal(), camera=front_camera(other))
     clip, settings = [turned(5.0), cut, turned(9.0)], settings_of()
@@ -250,7 +248,7 @@ def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
             list(renderer.observe([SCENE], settings_of(), outputs=["motion"], previous=fewer))
 
 
-def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
+def test_unrequested_outputs_run_no_passes(renderer: Renderer) -> None:
     """Outputs add passes after those of a frame without outputs, and change none of them."""
 
     def passes(**given: Any) -> list[str]:
@@ -266,14 +264,16 @@ def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
     assert one_sample is not None and one_sample.centres is None
 
 
-def test_what_is_known_is_not_made_again(renderer: Renderer) -> None:
+def test_unchanged_outputs_are_not_recomputed(renderer: Renderer) -> None:
     shapes = ["depth", "uv", "normal_geometric", "motion"]
     renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
     renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
     assert renderer.graph.executed_stages == []
 
 
-def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_of_outputs_counts_towards_the_limit(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Outputs count as memory of the frame: 24 bytes per pixel for a normal and its copy."""
     asked: list[FrameRequest] = []
     monkeypatch.setattr(allocation, "check_limits", lambda _, one: asked.append(one))
@@ -284,7 +284,7 @@ def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: 
 
 
 @pytest.mark.parametrize("names", ["depth", ["depth", "colour"], [3], None])
-def test_names_that_are_none_are_refused(renderer: Renderer, names: Any) -> None:
+def test_unknown_output_names_are_refused(renderer: Renderer, names: Any) -> None:
     with pytest.raises(DermisError, match="output") as refused:
         renderer.observe([SCENE], settings_of(), outputs=names)
     with pytest.raises(DermisError, match="output"):
@@ -293,7 +293,7 @@ def test_names_that_are_none_are_refused(renderer: Renderer, names: Any) -> None
         assert "depth, position, normal" in str(refused.value)
 
 
-def test_an_output_that_was_not_asked_is_refused(renderer: Renderer) -> None:
+def test_unrequested_output_is_refused(renderer: Renderer) -> None:
     rendered = renderer.draw(SCENE, settings_of(), outputs=["depth", "uv"])
     with pytest.raises(DermisError, match=r"output normal: expected .* drawn with depth, uv"):
         rendered.output("normal")
@@ -304,7 +304,9 @@ def test_an_output_that_was_not_asked_is_refused(renderer: Renderer) -> None:
         rendered.output("depth")
 
 
-def test_more_than_buffers_hold_is_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outputs_over_the_buffer_limit_are_refused(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     settings = settings_of(size=(30, 31))
     renderer.draw(SCENE, settings)  # what a frame takes otherwise
     with monkeypatch.context() as patch:

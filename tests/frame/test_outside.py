@@ -80,7 +80,7 @@ def from_file(folder: Path) -> GlowLight:
 
 @pytest.mark.usefixtures("glow")
 @pytest.mark.parametrize("shadows", [False, True])
-def test_a_light(renderer: Renderer, tmp_path: Path, shadows: bool) -> None:
+def test_plugin_light_matches_its_formula(renderer: Renderer, tmp_path: Path, shadows: bool) -> None:
     """Compare with E cos^(power + 3), with E at the middle of an unoccluded floor."""
     light = from_file(tmp_path).model_copy(update={"shadows": shadows})
     made = picture(renderer, light, specular="none")
@@ -91,21 +91,21 @@ def test_a_light(renderer: Renderer, tmp_path: Path, shadows: bool) -> None:
 
 
 @pytest.mark.usefixtures("glow")
-def test_a_light_beside_others(renderer: Renderer, tmp_path: Path) -> None:
+def test_plugin_light_is_drawn_with_other_lights(renderer: Renderer, tmp_path: Path) -> None:
     light, other = from_file(tmp_path), frontal(1.0)
     apart = picture(renderer, light, specular="none") + picture(renderer, other, specular="none")
     assert np.abs(picture(renderer, other, light, specular="none") - apart).max() < TWIN * apart.max()
 
 
 @pytest.mark.usefixtures("glow")
-def test_what_else_knows_the_light(tmp_path: Path) -> None:
+def test_plugin_light_is_cited_and_refused_by_cycles(tmp_path: Path) -> None:
     light = from_file(tmp_path)
     assert "Phong1975" in picture_sources(Skin(specular="none"), Settings(), [light])
     with pytest.raises(DermisError, match=r"light of Cycles: expected one of point, .*got 'after-glow'"):
         cycles_lamp(light, 1)
 
 
-def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
+def test_plugin_name_is_unknown_without_the_plugin(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=r"a kind of point, .*got 'after-glow'"):
         from_file(tmp_path)
     with pytest.raises(DermisError, match=r"one of two-lobe, kelemen, .*none, but got 'blue-chalk'"):
@@ -113,7 +113,7 @@ def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("chalk")
-def test_a_lobe(renderer: Renderer) -> None:
+def test_plugin_lobe_matches_its_formula(renderer: Renderer) -> None:
     """The lobe reflects half of rho_s at every angle; the rest of the light enters and leaves again."""
     irradiance, rho_s = 3.0, 0.4
     skin = {"specular": "blue-chalk", "rho_s": rho_s}
@@ -126,13 +126,13 @@ def test_a_lobe(renderer: Renderer) -> None:
 
 
 @pytest.mark.usefixtures("chalk")
-def test_what_else_knows_the_lobe() -> None:
+def test_plugin_lobe_is_known_to_other_modules() -> None:
     assert field_choices(Skin, "specular")[-2:] == ("blue-chalk", "none")
     assert "Phong1975" in picture_sources(Skin(specular="blue-chalk"), Settings())
     assert directional_albedo([0.2, 0.9], 0.3, MODELS["blue-chalk"].lobe) == pytest.approx(ALBEDO, rel=1e-4)
 
 
-def test_a_technique_from_outside(renderer: Renderer) -> None:
+def test_plugin_technique_is_drawn(renderer: Renderer) -> None:
     """The technique is rendered, cited and offered like the package's own, with frames of its own."""
 
     def below(technique: str) -> Floats:

@@ -27,7 +27,7 @@ CLI = (
     [(), FRAME, EXPORT, REFERENCE, CLI, (*CLI, *REFERENCE, *EXPORT, *FRAME)],
     ids=["nothing", "frame", "export", "reference", "cli", "all"],
 )
-def test_a_light_a_lobe_a_technique_and_an_output(before: tuple[str, ...]) -> None:
+def test_plugins_register_in_any_order(before: tuple[str, ...]) -> None:
     """Entries are rendered, exported to pbrt with a note, refused by a truth and cited by a command."""
     path = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
     command = [sys.executable, str(HERE / "outside" / "registered.py"), *before]

@@ -59,7 +59,7 @@ def bits(device: Device, made: RestMaps, animated: bool) -> list[Any]:
 
 
 @pytest.mark.parametrize("animated", [False, True])
-def test_what_is_found_is_what_was_painted(
+def test_cached_maps_equal_the_painted_ones(
     new: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch, animated: bool
 ) -> None:
     log, given = counted(monkeypatch), paint_inputs(surface, LOOK, SIDE)
@@ -71,7 +71,7 @@ def test_what_is_found_is_what_was_painted(
     assert all(a.dtype == b.dtype and np.array_equal(a, b) for a, b in zip(painted, found, strict=True))
 
 
-def test_all_that_changes_the_paint_is_in_the_key(
+def test_cache_key_contains_everything_that_changes_the_paint(
     new: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another look, size or surface, expression deltas, and a damaged file lead to painting again."""
@@ -91,7 +91,7 @@ def test_all_that_changes_the_paint_is_in_the_key(
     assert len(log) == 6
 
 
-def test_a_damaged_file_is_painted_over(
+def test_damaged_cache_file_is_repainted(
     new: Device, surface: PaintedSurface, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, given = counted(monkeypatch), paint_inputs(surface, LOOK, SIDE)
@@ -103,7 +103,7 @@ def test_a_damaged_file_is_painted_over(
     assert len(log) == 2
 
 
-def test_one_person_is_kept_by_a_device(new: Device, surface: PaintedSurface, tmp_path: Path) -> None:
+def test_device_keeps_maps_of_one_person(new: Device, surface: PaintedSurface, tmp_path: Path) -> None:
     for seed in range(3):
         cached_rest_maps(new, paint_inputs(surface, replace(LOOK, seed=seed), SIDE), SIDE)
     assert len(list((tmp_path / "painted").iterdir())) == 1

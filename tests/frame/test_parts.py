@@ -57,9 +57,7 @@ def test_opacity_cuts_a_part_out(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("compute", [False, True])
-def test_both_ways_to_find_the_nearest_surface_leave_the_same_holes(
-    renderer: Renderer, compute: bool
-) -> None:
+def test_both_visibility_methods_cut_the_same_holes(renderer: Renderer, compute: bool) -> None:
     head = card(opacity_cutoff=0.5)
     inputs = renderer.prepare(
         scene_of(head, frontal(), camera=front_camera(head)), settings_of(size=(64, 64), atlas=64)
@@ -85,7 +83,7 @@ def test_metal_has_no_diffuse_light_and_colours_its_reflection(renderer: Rendere
     assert metal[32, 24, 1] < 0.05 * metal[32, 24, 0] + 1e-3
 
 
-def test_emission_adds_to_a_part_without_light(renderer: Renderer) -> None:
+def test_emission_is_visible_without_light(renderer: Renderer) -> None:
     head = card(emission=(0.0, 0.25, 0.0), has_maps=False)
     scene = scene_of(head, frontal(0.0), camera=front_camera(head))
     picture = renderer.draw(scene, settings_of(size=(64, 64), atlas=64)).linear()

@@ -62,14 +62,14 @@ def test_a_ball_is_lit_past_its_terminator(renderer: Renderer) -> None:
     assert made[past].mean() == pytest.approx(wanted[past].mean(), rel=0.05)
 
 
-def test_lambertian_skin_is_dark_there(renderer: Renderer) -> None:
+def test_lambertian_skin_is_dark_past_the_terminator(renderer: Renderer) -> None:
     made = entered(renderer, head_of(BALL), LIGHT, direction="lambertian")
     atlas = cached_atlas(BALL, SIZE)
     _, normals = twins.surface(atlas, head_of(BALL))
     assert not made[atlas.lit & (normals[..., 0] < -0.05)].any()
 
 
-def test_even_light_on_a_plane_stays(renderer: Renderer) -> None:
+def test_uniform_light_on_a_plane_is_unchanged(renderer: Renderer) -> None:
     head = head_of(FLAT)
     light = DirectionalLight(direction=(-1.0, 0.0, -0.5), irradiance=(1.0, 1.0, 1.0), shadows=False)
     made = entered(renderer, head, light)
@@ -91,7 +91,7 @@ def test_a_chart_of_few_texels_is_lit(renderer: Renderer) -> None:
     assert made[lit].min() > 0.3
 
 
-def test_a_stripe_stays_where_it_is(renderer: Renderer) -> None:
+def test_stripe_is_not_displaced(renderer: Renderer) -> None:
     """Most of the light of a narrow stripe leaves where it enters."""
     head = head_of(FLAT)
     light = StripeLight(direction=(-1.0, 0.0, -1.0), position=place(head, (0, 0, 0)), shadows=False)

@@ -37,7 +37,7 @@ def values(seed: int) -> Floats:
 
 
 @pytest.mark.parametrize("exposure", [1.0, 0.37, 8.0])
-def test_bytes_are_numpys(device: Device, exposure: float) -> None:
+def test_encoded_bytes_match_numpy(device: Device, exposure: float) -> None:
     radiance = values(1)
     exposed, encoded = finished(device, radiance, exposure)
     assert np.array_equal(exposed[..., :3], radiance[..., :3] * np.float32(exposure))
@@ -61,14 +61,14 @@ def test_every_grey_level_survives(device: Device) -> None:
     assert np.array_equal(encoded[..., :3], levels[..., :3])
 
 
-def test_ends_of_the_range(device: Device) -> None:
+def test_values_at_the_ends_of_the_range_are_exact(device: Device) -> None:
     radiance = np.array([[[-1.0, 0.0, 1e-8, 1], [1.0, 1.5, 1e30, 1], [3e38, 1e-30, 0.5, 0]]], np.float32)
     _, encoded = finished(device, radiance, 1.0)
     assert encoded[0].tolist() == [[0, 0, 0, 255], [255, 255, 255, 255], [255, 0, 188, 0]]
 
 
 @pytest.mark.parametrize("tone", ["filmic", "neutral"])
-def test_tone_curves_are_the_published_ones(device: Device, tone: str) -> None:
+def test_tone_curves_match_their_publications(device: Device, tone: str) -> None:
     radiance = 6.0 * values(2) ** 2
     exposed, encoded = finished(device, radiance, 1.5, tone=tone)
     # the curve is for bytes alone; what is too small for a normal float may become 0
@@ -78,7 +78,7 @@ def test_tone_curves_are_the_published_ones(device: Device, tone: str) -> None:
     assert np.abs(encoded[..., :3] - exact).max() < 0.5 + 0.01
 
 
-def test_tone_curves_end_where_they_should(device: Device) -> None:
+def test_tone_curves_map_their_end_points(device: Device) -> None:
     ends = np.array([[[0, 0, 0, 1], [11.2 / 2, 11.2 / 2, 11.2 / 2, 1], [1e30, 1e30, 1e30, 1]]], np.float32)
     _, film = finished(device, ends, 1.0, tone="filmic")
     assert film[0, :, 0].tolist() == [0, 255, 255]
@@ -87,7 +87,7 @@ def test_tone_curves_end_where_they_should(device: Device) -> None:
     assert np.array_equal(plain[0, 0, :3], encode_srgb8(np.array([0.46, 0.26, 0.16])))
 
 
-def test_wrong_gamma_leaves_the_encoding_out(device: Device) -> None:
+def test_wrong_gamma_skips_the_encoding(device: Device) -> None:
     radiance = values(3)
     _, encoded = finished(device, radiance, 1.0, gamma="wrong")
     assert np.abs(encoded[..., :3] - 255.0 * np.clip(radiance[..., :3], 0, 1)).max() <= 0.5 + 1e-4

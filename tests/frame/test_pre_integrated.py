@@ -50,7 +50,7 @@ def on_sphere(cosine: float, radius_mm: float, profile: GaussianSum) -> Floats:
 
 
 @pytest.mark.parametrize("radius_mm", [2.0, 8.0, 64.0])
-def test_sphere_by_quadrature(radius_mm: float) -> None:
+def test_sphere_table_matches_quadrature(radius_mm: float) -> None:
     """Each Gaussian is normalised on its own."""
     for cosine in (-0.6, -0.1, 0.0, 0.05, 0.3, 0.9, 1.0):
         for variance in (0.0064, 0.187, 7.41):
@@ -70,13 +70,13 @@ def test_first_curved_row_follows_from_the_flat_one() -> None:
     assert np.allclose(rows, CURVATURES[:4] / np.sqrt(2 * np.pi), rtol=0.01)
 
 
-def test_energy_of_each_sphere() -> None:
+def test_each_sphere_conserves_energy() -> None:
     """The mean over a sphere, half the integral over N.L, is 1/4."""
     mean = 0.5 * np.trapezoid(SPHERES, COSINES, axis=1)
     assert np.abs(mean / 0.25 - 1).max() < 1e-4
 
 
-def test_more_curved_is_softer() -> None:
+def test_higher_curvature_is_softer() -> None:
     assert (np.diff(SPHERES[:, COSINES <= 0], axis=0) >= 0).all()
     assert (np.diff(SPHERES[:, -1], axis=0) < 0).all()
     assert (np.diff(SPHERES, axis=1) >= 0).all()
@@ -84,7 +84,7 @@ def test_more_curved_is_softer() -> None:
 
 
 @pytest.mark.parametrize("half_width_mm", [0.0, 1.0])
-def test_shadow_edge(half_width_mm: float) -> None:
+def test_shadow_edge_matches_quadrature(half_width_mm: float) -> None:
     """Compare with a step blurred by the line profile: odd about its centre, from 0 to 1."""
     radius = penumbra_width_mm(PROFILE)
     made = shadow_edge_row(PROFILE, radius, half_width_mm)
@@ -140,7 +140,7 @@ def ball_cosines(scene: Scene, size: int, direction: Floats) -> tuple[Floats, Fl
 
 
 @pytest.mark.parametrize("shadows", [False, True])
-def test_ball_twin(renderer: Renderer, shadows: bool) -> None:
+def test_shaded_ball_matches_numpy(renderer: Renderer, shadows: bool) -> None:
     """Every pixel of a ball lit from the side equals the table; its own shadow hardly changes that."""
     direction = np.array([-2.0, -1.0, -1.0])
     light = DirectionalLight(direction=tuple(direction), irradiance=(3.0, 2.0, 1.0), shadows=shadows)
@@ -173,7 +173,7 @@ def test_flat_skin_under_even_light_is_dry_skin(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("down", [0.0, 1.5])
-def test_straight_shadow(renderer: Renderer, down: float) -> None:
+def test_straight_shadow_matches_numpy(renderer: Renderer, down: float) -> None:
     """The shadow of a plate on a wall has the profile of the table, for normal and oblique light."""
     mesh = joined((plane(60.0), (-30, 0, 20), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)
@@ -196,7 +196,7 @@ def test_straight_shadow(renderer: Renderer, down: float) -> None:
     assert off.max() < 0.06 and off.mean() < 0.004
 
 
-def test_long_way_to_the_horizon(renderer: Renderer) -> None:
+def test_grazing_light_is_handled(renderer: Renderer) -> None:
     """On skin that is curved across the light but hardly along it, no light comes from beyond the horizon."""
     ball = uv_sphere(10.0, 96, 48)
     mesh = build_mesh(

@@ -45,7 +45,9 @@ def moved(k: int) -> Scene:
     return scene(lights=(lamp,), camera=plain.camera.model_copy(update={"position": (x + k, y, z)}))
 
 
-def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_camera_and_light_changes_do_not_prepare_again(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log, settings = made(monkeypatch), settings_of()
     found = [renderer.prepare(moved(k), settings) for k in range(3)]
     assert len(log) == 1
@@ -67,7 +69,7 @@ def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pyte
     ],
     ids=lambda changed: next(iter(changed)),
 )
-def test_all_else_is_seen(
+def test_all_other_changes_prepare_again(
     renderer: Renderer, changed: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, settings = made(monkeypatch), settings_of()
@@ -78,7 +80,7 @@ def test_all_else_is_seen(
     assert len(log) == 4
 
 
-def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
+def test_unused_results_are_released(renderer: Renderer) -> None:
     """A frame of a still scene counts towards the lifetime of unused resources."""
     two = Renderer(renderer.device.adapter.name, cache_size=2)
     settings = settings_of()
@@ -89,7 +91,7 @@ def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
     assert {of for make, of in two.memo._results if make is blurred_levels._make_levels} == {""}
 
 
-def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> None:
+def test_moving_frames_equal_first_frames(renderer: Renderer) -> None:
     settings = settings_of()
     for k in range(3):
         last = renderer.draw(moved(k), settings).linear()
@@ -97,7 +99,7 @@ def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> 
     assert np.array_equal(renderer.draw(moved(2), settings).linear(), last)
 
 
-def test_a_light_of_the_same_kind_elsewhere_shines(renderer: Renderer) -> None:
+def test_moved_light_of_the_same_type_is_updated(renderer: Renderer) -> None:
     settings = settings_of()
     front = renderer.draw(scene(lights=(frontal(),)), settings).linear()
     dark = renderer.draw(scene(lights=(frontal(0.01),)), settings).linear()

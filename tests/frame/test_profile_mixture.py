@@ -100,7 +100,9 @@ def mixed(renderer: Renderer, scene: Scene, name: Path, others: int) -> tuple[Fl
 
 
 @pytest.mark.parametrize("others", [("skin2",), ("skin2", "gpu-gems-3")])
-def test_full_sum_over_the_plane(renderer: Renderer, maps: dict[str, Path], others: tuple[str, ...]) -> None:
+def test_mixture_matches_the_sum_over_the_plane(
+    renderer: Renderer, maps: dict[str, Path], others: tuple[str, ...]
+) -> None:
     name = maps["one" if len(others) == 1 else "two"]
     light, made, shares = mixed(renderer, lit_scene(**mixed_by(name, *others)), name, len(others))
     parts = np.dstack([1.0 - shares.sum(axis=-1), shares])[..., : 1 + len(others)]
@@ -110,7 +112,7 @@ def test_full_sum_over_the_plane(renderer: Renderer, maps: dict[str, Path], othe
     assert np.sqrt((off**2).mean()) < MIXED_RMS[len(others)]
 
 
-def test_energy_is_kept(renderer: Renderer, maps: dict[str, Path]) -> None:
+def test_mixture_conserves_energy(renderer: Renderer, maps: dict[str, Path]) -> None:
     """All uniform light leaves again for any map, and patches of light lose or gain little."""
     even = scene_of(head_of(plane(SIZE_MM)), frontal(), **DIFFUSE, **mixed_by(maps["one"], "skin2"))
     entered, left, _ = mixed(renderer, even, maps["one"], 1)
@@ -131,7 +133,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("seams", ["stitch", "multi-uv"])
-def test_alike_or_alone(
+def test_mixture_of_equal_profiles_or_one_profile_is_that_profile(
     renderer: Renderer, maps: dict[str, Path], tables: tuple[str, str], seams: str
 ) -> None:
     """A mixture of equal profiles is that profile, and a map of ones gives the other profile."""
@@ -145,7 +147,7 @@ def test_alike_or_alone(
         assert np.abs(made - alone).max() < 1e-6 * alone.max()
 
 
-def test_other_techniques_take_the_first(renderer: Renderer, maps: dict[str, Path]) -> None:
+def test_other_techniques_use_the_first_profile(renderer: Renderer, maps: dict[str, Path]) -> None:
     plain, mixed = (
         pictured(renderer, lit_scene(**one), technique="screen-space")
         for one in ({}, mixed_by(maps["one"], "skin2"))
@@ -162,6 +164,6 @@ def test_other_techniques_take_the_first(renderer: Renderer, maps: dict[str, Pat
         ({"other_profiles": ("no such",), "profile_map": "mask.png"}, "no such"),
     ],
 )
-def test_refused(renderer: Renderer, skin: dict[str, Any], told: str) -> None:
+def test_invalid_mixtures_are_refused(renderer: Renderer, skin: dict[str, Any], told: str) -> None:
     with pytest.raises(DermisError, match=told):
         pictured(renderer, lit_scene(**skin))

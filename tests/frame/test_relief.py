@@ -53,7 +53,7 @@ TILTS = [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3), (0.2, -0.4)]
 
 
 @pytest.mark.parametrize("tilt", TILTS)
-def test_height_map_of_a_tilted_plane(renderer: Renderer, tilt: tuple[float, float]) -> None:
+def test_height_map_of_a_tilted_plane_gives_its_normal(renderer: Renderer, tilt: tuple[float, float]) -> None:
     x, y = xy(SIZE)
     normal, roughness = relief(renderer, head_of(plane(SIDE), height=tilt[0] * x + tilt[1] * y))
     assert np.abs(normal - normal_of(*tilt))[INNER, INNER].max() < MAP_NORMAL
@@ -61,7 +61,7 @@ def test_height_map_of_a_tilted_plane(renderer: Renderer, tilt: tuple[float, flo
 
 
 @pytest.mark.parametrize("tilt", TILTS)
-def test_normal_map_of_a_tilted_plane(renderer: Renderer, tilt: tuple[float, float]) -> None:
+def test_normal_map_of_a_tilted_plane_gives_its_normal(renderer: Renderer, tilt: tuple[float, float]) -> None:
     slopes = np.broadcast_to(np.array(tilt), (SIZE, SIZE, 2))
     normal, roughness = relief(renderer, head_of(plane(SIDE), normal=slopes))
     assert np.abs(normal - normal_of(*tilt)).max() < MAP_NORMAL
@@ -77,7 +77,7 @@ def waves(size: int, side: float = SIDE) -> tuple[Floats, Floats, Floats]:
 
 
 @pytest.mark.parametrize("map_size", [SIZE, 4 * SIZE])
-def test_height_map_of_a_sine(renderer: Renderer, map_size: int) -> None:
+def test_height_map_of_a_sine_gives_its_normals(renderer: Renderer, map_size: int) -> None:
     height, _, _ = waves(map_size)
     _, slope_x, slope_y = waves(SIZE)
     normal, _ = relief(renderer, head_of(plane(SIDE), height=height))
@@ -88,7 +88,7 @@ def test_height_map_of_a_sine(renderer: Renderer, map_size: int) -> None:
     assert off < MAP_NORMAL + wide * np.abs(slope_x).max()
 
 
-def test_normal_map_of_a_sine(renderer: Renderer) -> None:
+def test_normal_map_of_a_sine_gives_its_normals(renderer: Renderer) -> None:
     _, slope_x, slope_y = waves(SIZE)
     normal, _ = relief(renderer, head_of(plane(SIDE), normal=np.stack([slope_x, slope_y], axis=-1)))
     assert np.abs(normal - normal_of(slope_x, slope_y)).max() < MAP_NORMAL
@@ -103,7 +103,7 @@ LAYOUTS: dict[str, Mesh] = {
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_height_map_under_any_layout(renderer: Renderer, name: str) -> None:
+def test_height_map_works_under_any_uv_layout(renderer: Renderer, name: str) -> None:
     """A hill in the map is a hill on the surface: its normal is that of h(uv(x, y))."""
     mesh = LAYOUTS[name]
     v, u = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE
@@ -152,7 +152,7 @@ def test_fine_height_adds_to_a_coarse_normal_map(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("slope", [0.1, 0.4])
-def test_slopes_too_fine_to_see_are_roughness(renderer: Renderer, slope: float, axis: int) -> None:
+def test_subpixel_slopes_become_roughness(renderer: Renderer, slope: float, axis: int) -> None:
     """Stripes of +s and -s under a footprint of two texels: no tilt, and a lobe wider by s."""
     stripes = np.zeros((SIZE, SIZE, 2))
     stripes[..., axis] = slope * (1 - 2 * (np.indices((SIZE, SIZE))[1 - axis] % 2))
@@ -165,7 +165,7 @@ def test_slopes_too_fine_to_see_are_roughness(renderer: Renderer, slope: float, 
     assert np.median(narrow) < wide[INNER, INNER].min()
 
 
-def test_height_too_fine_to_see_is_roughness(renderer: Renderer) -> None:
+def test_subpixel_height_becomes_roughness(renderer: Renderer) -> None:
     """Ridges of 4 texels have slopes of +s, 0, -s, 0, whose variance widens the lobe."""
     ridges = np.tile([0.0, 0.1, 0.0, -0.1], (4 * SIZE, SIZE))
     texel_mm = SIDE / (4 * SIZE)

@@ -22,7 +22,7 @@ SETTINGS = Settings(size=(24, 24), atlas=64, samples=1, technique="none", occlus
 
 
 @pytest.mark.parametrize("degrees", [0.0, 90.0])
-def test_relit_is_rendered(renderer: Renderer, tmp_path: Path, degrees: float) -> None:
+def test_relit_picture_equals_a_rendered_one(renderer: Renderer, tmp_path: Path, degrees: float) -> None:
     """In a sky that is brightest towards +X; the opposite rotation has ten times the error."""
     sky = 1.0 + 0.9 * directions(256, 512) @ np.array([[0.9, 0.3, 0.0], [0.2, 0.8, 0.0], [-0.4, 0.1, 0.9]]).T
     write_exr(tmp_path / "sky.exr", sky.astype(np.float32))

@@ -53,7 +53,7 @@ def test_the_same_scene_gives_the_same_bytes(renderer: Renderer) -> None:
     assert one.linear().max() > 0.1
 
 
-def test_an_older_image_is_not_mistaken_for_the_newest(renderer: Renderer) -> None:
+def test_older_image_keeps_its_pixels(renderer: Renderer) -> None:
     older = renderer.draw(scene(), settings_of())
     renderer.draw(scene(), settings_of(exposure=2.0))
     with pytest.raises(RuntimeError, match="newer frame"):
@@ -77,7 +77,7 @@ def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyP
     assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()
 
 
-def test_maps_that_failed_are_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_map_reads_are_retried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Maps are read on another thread, and the result is cached."""
     renderer = Renderer(ADAPTER)
 
@@ -134,7 +134,7 @@ def fresh(other: Renderer, what: Scene, **settings: Any) -> Image:
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_no_change_leaves_a_trace(renderer: Renderer, other: Renderer, name: str) -> None:
+def test_reverted_changes_restore_the_picture(renderer: Renderer, other: Renderer, name: str) -> None:
     """After any other frame, the picture is that of a fresh renderer."""
     make, settings = CHANGES[name]
     what = make()
@@ -144,7 +144,7 @@ def test_no_change_leaves_a_trace(renderer: Renderer, other: Renderer, name: str
     assert plain.tobytes() == drawn(renderer, scene()).tobytes()
 
 
-def test_changes_are_changes(renderer: Renderer) -> None:
+def test_each_change_alters_the_picture(renderer: Renderer) -> None:
     """The changes give different pictures, else the tests above would prove nothing."""
     images = [drawn(renderer, make(), **settings).tobytes() for make, settings in CHANGES.values()]
     assert len(set(images)) == len(images) - 1  # "albedo back" is "head" once more
@@ -190,7 +190,7 @@ def test_any_size_and_samples(renderer: Renderer, size: tuple[int, int], samples
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 1), (13, 7), (64, 40)])
-def test_bytes_arrive_as_they_were_made(renderer: Renderer, size: tuple[int, int]) -> None:
+def test_downloaded_bytes_equal_those_on_the_device(renderer: Renderer, size: tuple[int, int]) -> None:
     rendered = renderer.draw(scene(), settings_of(size=size))
     assert np.array_equal(rendered.srgb8(), download(renderer.device, rendered.picture.bytes)[..., :3])
 
@@ -202,7 +202,7 @@ def moving(count: int) -> list[Scene]:
     return [scene_of(BALL, light, camera=one) for light, one in zip(lights, camera, strict=True)]
 
 
-def test_many_images_are_the_images_one_by_one(renderer: Renderer) -> None:
+def test_sequence_equals_single_images(renderer: Renderer) -> None:
     scenes = moving(7)
     one_by_one = [renderer.draw(one, settings_of()).srgb8() for one in scenes]
     linear = [renderer.draw(one, settings_of()).linear() for one in scenes]
@@ -224,7 +224,7 @@ def test_more_floats_than_a_buffer_holds_are_refused(
         next(renderer.render_many(moving(1), linear=True, **settings))
 
 
-def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
+def test_sequence_may_be_stopped_early(renderer: Renderer) -> None:
     """Pictures that are not read are harmless, and other frames may come in between."""
     scenes, chosen = moving(5), settings_of()
     expected = [renderer.draw(one, chosen).srgb8().tobytes() for one in scenes]
@@ -245,7 +245,7 @@ def test_the_image_does_not_depend_on_its_width(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("option", ["atlas", "size"])
-def test_sizes_over_the_devices_limit(
+def test_sizes_over_the_device_limit_are_refused(
     renderer: Renderer, option: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(renderer.device, "max_texture_size", 100)
@@ -254,7 +254,7 @@ def test_sizes_over_the_devices_limit(
         renderer.draw(scene(), settings_of(**over))
 
 
-def test_too_many_lights(renderer: Renderer) -> None:
+def test_too_many_lights_are_refused(renderer: Renderer) -> None:
     assert drawn(renderer, scene(BALL, *[frontal(0.1)] * 64)).max() > 0.1
     with pytest.raises(DermisError, match=r"lights: expected at most 64.*65"):
         drawn(renderer, scene(BALL, *[frontal()] * 65))
@@ -273,7 +273,7 @@ def test_exposure_scales_the_image(renderer: Renderer) -> None:
     assert np.abs(bright - 2.5 * plain).max() < 1e-6 * bright.max()
 
 
-def test_what_a_frame_reports(renderer: Renderer) -> None:
+def test_frame_statistics_are_reported(renderer: Renderer) -> None:
     rendered = renderer.draw(scene(), settings_of(), force=True)
     assert rendered.gaussians == 6
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
@@ -283,7 +283,7 @@ def test_what_a_frame_reports(renderer: Renderer) -> None:
         assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "total"}
 
 
-def test_one_call_is_enough(renderer: Renderer) -> None:
+def test_render_function_draws_in_one_call(renderer: Renderer) -> None:
     image = render(
         scene(), adapter=renderer.device.adapter.name, size=(24, 16), atlas=64, samples=1, shadow_size=64
     )

@@ -17,7 +17,7 @@ SIZES["interreflection"] = False  # whose cells lie otherwise on each technique'
 
 
 @pytest.mark.samples
-def test_scan(renderer: Renderer) -> None:
+def test_techniques_agree_on_a_scan(renderer: Renderer) -> None:
     """Each technique is much nearer to the atlas than dry skin is, and as bright."""
     head = load_head("lee_perry_smith", subdivide=0)
     scene = Scene(head, lights=load_lights("studio"), camera=FACE)

@@ -116,7 +116,7 @@ def rough_depth(size: tuple[int, int]) -> Floats:
 
 
 @pytest.mark.parametrize("width_mm", [4.0, 24.0, 150.0])
-def test_twin(device: Device, width_mm: float) -> None:
+def test_screen_space_blur_matches_numpy(device: Device, width_mm: float) -> None:
     """Compare close by, where taps are far apart; at a portrait's distance; and far away."""
     view = View((0.5 * width_mm / 400, 0.5 * width_mm / 400 * 20 / 28), (28, 20))
     depth = rough_depth(view.size)
@@ -135,7 +135,7 @@ def test_even_light_stays_even(device: Device, width_mm: float) -> None:
         assert not made[depth == 0].any()
 
 
-def test_table_is_the_kernel() -> None:
+def test_sample_table_matches_the_kernel() -> None:
     """Interpolated values agree too; the light beyond the reach, less than 0.1 %, is added within it."""
     for distance in np.geomspace(1e-3, REACH, 40):
         assert np.abs(share_within(distance) - KERNEL.half_line_integral(distance)).max() < 6e-4
@@ -151,7 +151,7 @@ def across(kernel: SeparableKernel, pixel_mm: float, side: int) -> Floats:
 
 
 @pytest.mark.parametrize("pixel_mm", [0.45, 1.0])
-def test_point_of_light(device: Device, pixel_mm: float) -> None:
+def test_point_of_light_spreads_as_the_profile(device: Device, pixel_mm: float) -> None:
     """With taps on neighbouring pixels each gets the light of the kernel, and nothing is lost."""
     side = 63
     view = View.over(side * pixel_mm, 500.0, side)
@@ -164,7 +164,7 @@ def test_point_of_light(device: Device, pixel_mm: float) -> None:
 
 
 @pytest.mark.parametrize("pixel_mm", [0.05, 0.1, 0.2])
-def test_spot_of_light_seen_closely(device: Device, pixel_mm: float) -> None:
+def test_close_spot_of_light_spreads_as_the_profile(device: Device, pixel_mm: float) -> None:
     """A spot of sigma 1 mm under taps up to 0.8 mm apart: energy and shape against the analytic sum."""
     side = int(20.0 / pixel_mm) | 1
     view = View.over(side * pixel_mm, 500.0, side)
@@ -182,7 +182,7 @@ def test_spot_of_light_seen_closely(device: Device, pixel_mm: float) -> None:
     assert np.abs(made.sum(axis=(0, 1)) / exact.sum(axis=(0, 1)) - 1).max() < 0.01
 
 
-def test_one_line_of_light_is_the_profile_itself(device: Device) -> None:
+def test_line_of_light_follows_the_line_profile(device: Device) -> None:
     """The separable kernel is exact for a line of light."""
     profile, pixel_mm, side = load_profile("gpu-gems-3"), 0.45, 63
     light = np.zeros((side, side, 3))
@@ -245,7 +245,7 @@ def test_light_passes_a_slit(device: Device, gap_mm: float) -> None:
     assert np.abs(open_ - closed)[dark].max() < 0.01
 
 
-def test_other_materials_neither_give_nor_take(device: Device) -> None:
+def test_other_materials_do_not_exchange_light(device: Device) -> None:
     """Pixels without skin (depth 0) may hold anything."""
     side = 48
     view = View.over(side * 0.25, 500.0, side)

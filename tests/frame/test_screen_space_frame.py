@@ -36,7 +36,7 @@ def narrow(folder: Path) -> str:
 
 @pytest.mark.parametrize("albedo", ["map", "profile"])
 @pytest.mark.parametrize("samples", [1, 4])
-def test_what_does_not_spread_is_dry_skin(
+def test_profile_without_spread_equals_unblurred_skin(
     renderer: Renderer, tmp_path: Path, samples: int, albedo: str
 ) -> None:
     """Light that is separated and recombined equals dry skin; colour is applied once."""
@@ -48,7 +48,7 @@ def test_what_does_not_spread_is_dry_skin(
     assert np.abs(apart - dry).max() < 10 * TWIN * dry.max()
 
 
-def test_even_light_is_dry_skin(renderer: Renderer) -> None:
+def test_uniform_light_equals_unblurred_skin(renderer: Renderer) -> None:
     head = head_of(plane(100.0), colour=np.broadcast_to([0.5, 0.25, 0.75], (8, 8, 3)))
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=50.0), roughness=0.5, mix=0.3)
     dry, spread = (image(renderer, scene, technique) for technique in ("none", "screen-space"))
@@ -80,7 +80,7 @@ def test_plain_materials_stay_as_they_are(renderer: Renderer) -> None:
     assert np.abs(spread - dry)[:, :31].max() < 0.01 * dry.max()
 
 
-def test_a_lit_plate_before_a_shaded_wall(renderer: Renderer) -> None:
+def test_lit_plate_does_not_bleed_onto_a_shaded_wall(renderer: Renderer) -> None:
     """Dark skin behind lit skin: no light leaks over the antialiased edge."""
     mesh = joined((plane(40.0), (-20, 0, 30), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)
@@ -98,7 +98,7 @@ def test_a_lit_plate_before_a_shaded_wall(renderer: Renderer) -> None:
     assert np.abs(spread - dry)[row, 8:24, :3].max() < 0.01 * dry.max()
 
 
-def test_a_step_within_a_pixel(renderer: Renderer) -> None:
+def test_step_within_a_pixel_leaves_no_dark_line(renderer: Renderer) -> None:
     """A step of a millimetre in skin beside a stripe of light is no dark line."""
     mesh = joined((plane(40.0), (-20, 0, 1), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
     head = head_of(mesh)

@@ -57,13 +57,13 @@ def test_stitched_light_has_no_seams(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("seams", [name for name in SEAM_METHODS if name != "stitch"])
-def test_remedies_leave_seams(renderer: Renderer, seams: str) -> None:
+def test_gutters_alone_leave_seams(renderer: Renderer, seams: str) -> None:
     """The methods look less bad than black beside each chart, but leave seams."""
     assert np.percentile(jumps(renderer, seams), 90) > 3 * SEAM
 
 
 @pytest.mark.parametrize("technique", ["texture-space", "gpu-gems-3"])
-def test_black_bleeds_in_without_a_remedy(renderer: Renderer, technique: str) -> None:
+def test_black_bleeds_in_without_gutters(renderer: Renderer, technique: str) -> None:
     """Compare the darkest light at the seams: each method is lighter than none."""
     darkest = {}
     for seams in ("none", "clear-colour", "stretch-map", "alpha"):

@@ -78,7 +78,7 @@ LIGHTS = {
 
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", LIGHTS)
-def test_dry_plane(renderer: Renderer, name: str, mix: float) -> None:
+def test_plane_without_scattering_matches_the_closed_form(renderer: Renderer, name: str, mix: float) -> None:
     """With technique "none" all light leaves where it enters, in every pixel."""
     scene = scene_of(
         FLAT, LIGHTS[name], camera=front_camera(FLAT, frame_mm=50.0), mix=mix, roughness=0.5, rho_s=0.4
@@ -91,7 +91,9 @@ def test_dry_plane(renderer: Renderer, name: str, mix: float) -> None:
 
 @pytest.mark.parametrize("technique", ["texture-space", "none"])
 @pytest.mark.parametrize("albedo", ["map", "profile"])
-def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique: str, close: float) -> None:
+def test_uniform_light_is_unchanged_by_scattering(
+    renderer: Renderer, albedo: str, technique: str, close: float
+) -> None:
     """Diffusion does not change uniform light, and the weights of a profile are its colour."""
     scene = scene_of(
         FLAT, LIGHTS["directional"], camera=front_camera(FLAT, frame_mm=50.0), albedo=albedo, roughness=0.5
@@ -121,7 +123,7 @@ def test_a_profile_keeps_its_own_colour(renderer: Renderer, tmp_path: Any) -> No
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.3, 1.0])
-def test_colour_map_and_its_shares(renderer: Renderer, mix: float) -> None:
+def test_colour_map_is_applied_once_for_any_mix(renderer: Renderer, mix: float) -> None:
     """A uniform colour is applied once, however it is divided between entry and exit."""
     scene = scene_of(
         CREAM, LIGHTS["directional"], camera=front_camera(CREAM, frame_mm=50.0), mix=mix, roughness=0.5
@@ -136,7 +138,7 @@ BALL = head_of(uv_sphere(30.0, 48, 24))
 
 @pytest.mark.parametrize("background", [(0.0, 0.0, 0.0), (0.25, 0.5, 2.0)])
 @pytest.mark.parametrize("exposure", [1.0, 0.25])
-def test_silhouette(renderer: Renderer, background: Any, exposure: float) -> None:
+def test_silhouette_is_antialiased(renderer: Renderer, background: Any, exposure: float) -> None:
     """Coverage is the fraction of samples on the ball, and the background is independent of exposure."""
     scene = scene_of(BALL, frontal(), camera=front_camera(BALL, frame_mm=80.0))
     made = image(renderer, scene, samples=8, background=background, exposure=exposure, size=(40, 40))
@@ -161,7 +163,7 @@ def test_more_samples_change_only_edges(renderer: Renderer) -> None:
     assert np.array_equal(one[~inner & ~edge], many[~inner & ~edge])
 
 
-def test_opaque_material(renderer: Renderer) -> None:
+def test_opaque_material_does_not_scatter(renderer: Renderer) -> None:
     """An opaque material has its own colour and a wet surface, without diffusion."""
     mesh = joined((plane(100.0), (0, 0, 0), (0, 0, 1)), kinds=["opaque"])
     head = head_of(mesh, colour=np.full((8, 8, 3), 0.9))
@@ -228,7 +230,7 @@ def test_software_adapters_get_the_picture_of_gpus(
     assert made[0].max() > 0.1 and np.array_equal(*made)
 
 
-def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
+def test_strip_is_released_after_its_last_pixel(renderer: Renderer) -> None:
     """A strip ends at its last pixel even if that shows nothing."""
     head = head_of(plane(20.0))
     camera = front_camera(head, (0, 10.0, 0), frame_mm=40.0)  # its upper edge is in the middle of the picture

@@ -34,7 +34,7 @@ def squares(depth: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 
 @pytest.mark.parametrize("size", [128, 320])
-def test_each_level_holds_the_nearest_of_its_squares(renderer: Renderer, size: int) -> None:
+def test_each_level_stores_the_nearest_depth_of_its_cells(renderer: Renderer, size: int) -> None:
     maps = run_frame(
         renderer, scene_of(BALLS, LIGHTS["sun"]), atlas=64, shadow_size=size
     ).resources.shadow_maps
@@ -50,7 +50,7 @@ def test_each_level_holds_the_nearest_of_its_squares(renderer: Renderer, size: i
 
 @pytest.mark.parametrize("shadow_size", [256, 1000])
 @pytest.mark.parametrize("name", LIGHTS)
-def test_what_is_passed_over_hides_nothing(renderer: Renderer, name: str, shadow_size: int) -> None:
+def test_skipped_cells_contain_no_occluder(renderer: Renderer, name: str, shadow_size: int) -> None:
     """Bounds without any empty square give the same light, bit for bit."""
     inputs = run_frame(renderer, scene_of(BALLS, LIGHTS[name]), atlas=256, shadow_size=shadow_size)
 

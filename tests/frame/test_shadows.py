@@ -54,7 +54,7 @@ OVERHEAD = {"position": place(PLATE, (-15, 0, 220)), "target": place(PLATE, (-15
 
 @pytest.mark.parametrize("softness", [0.5, 1.5, 6.0])
 @pytest.mark.parametrize("shadow_size", [256, 1024])
-def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness: float) -> None:
+def test_shadow_edges_of_a_plate_are_exact(renderer: Renderer, shadow_size: int, softness: float) -> None:
     """A plate at x from -30 to 0, 20 mm high, in light at 45 degrees along +x."""
     light = SLANTED.model_copy(update={"softness_mm": softness})
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=shadow_size)
@@ -71,7 +71,7 @@ def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness
 
 
 @pytest.mark.parametrize("light", [PointLight(**OVERHEAD), SpotLight(**OVERHEAD)], ids=["point", "spot"])
-def test_a_point_lights_shadow_is_larger_than_the_plate(renderer: Renderer, light: AnyLight) -> None:
+def test_point_light_shadow_is_larger_than_the_plate(renderer: Renderer, light: AnyLight) -> None:
     """From 220 mm, a plate of 30 mm at 20 mm casts a shadow of 33 mm."""
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=512)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
@@ -81,7 +81,7 @@ def test_a_point_lights_shadow_is_larger_than_the_plate(renderer: Renderer, ligh
     assert crossing(x[right], profile[right]) == pytest.approx(1.5, abs=1.5 + 0.6)
 
 
-def test_wide_edges_fade_over_their_softness(renderer: Renderer) -> None:
+def test_soft_edges_fade_over_their_width(renderer: Renderer) -> None:
     """Under a tent, 2 to 98 % take 0.8 of the width; steps of a shadow texel limit the accuracy."""
     light = frontal(shadows=True).model_copy(update={"softness_mm": 2.0})
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=512)
@@ -152,7 +152,7 @@ def stages_of(renderer: Renderer, *lights: AnyLight, **draw: Any) -> bool:
     return "shadows" in renderer.graph.executed_stages
 
 
-def test_only_what_moved_is_drawn_again(renderer: Renderer) -> None:
+def test_only_moved_lights_are_redrawn(renderer: Renderer) -> None:
     turned = DirectionalLight(direction=(1, 0.1, -1))
     brighter = SLANTED.model_copy(update={"irradiance": (9.0, 9.0, 9.0)})
     assert stages_of(renderer, turned)

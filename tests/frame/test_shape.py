@@ -14,7 +14,7 @@ from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas import gutters
-from dermis.frame.features.atlas.gutters import make_gutter_tracing, with_own_gutters
+from dermis.frame.features.atlas.gutters import make_gutter_tracing, with_separate_gutters
 from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import AtlasMip, halve_mip, upload_atlas
 from dermis.frame.features.shape import shape
@@ -65,7 +65,7 @@ def head() -> Head:
     return head_of(cut_sphere(30.0, 20))
 
 
-def test_vertices_are_those_of_a_mesh_built_anew(device: Device, head: Head) -> None:
+def test_vertices_equal_those_of_a_rebuilt_mesh(device: Device, head: Head) -> None:
     """Normals and tangents follow the surface."""
     moved = bent(head.positions_mm.astype(float))
     _, table = evaluated(device, head, MotionBytes(words(moved)))
@@ -76,7 +76,7 @@ def test_vertices_are_those_of_a_mesh_built_anew(device: Device, head: Head) -> 
         assert np.abs(table[:, first : first + 3] - tangent).max() < SHAPE * np.abs(tangent).max()
 
 
-def test_a_files_own_normals_rest_and_turn_with_the_surface(device: Device, head: Head) -> None:
+def test_normals_of_a_file_are_kept_and_rotate_with_the_surface(device: Device, head: Head) -> None:
     tilted = head.mesh.normals + RNG.uniform(-0.4, 0.4, head.mesh.normals.shape)
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
     own = replace(head, mesh=replace(head.mesh, normals=tilted.astype(np.float32)))
@@ -110,7 +110,7 @@ def rigged(head: Head) -> Head:
     return replace(head, rig=Rig(head.positions_mm, targets, skeleton, stencils))
 
 
-def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: Head) -> None:
+def test_targets_bones_and_stencils_match_the_rig(device: Device, head: Head) -> None:
     moving, weights = rigged(head), np.array([0.6, -0.3])
     rig = moving.control
     assert rig.skeleton is not None and rig.stencils is not None
@@ -137,7 +137,7 @@ def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArr
 
 
 @pytest.mark.parametrize("layout", ["mesh", "stitched"])
-def test_the_map_is_stretched_as_at_rest(device: Device, head: Head, layout: str) -> None:
+def test_stretch_at_rest_equals_the_atlas(device: Device, head: Head, layout: str) -> None:
     atlas = build_atlas(head.mesh, 256, layout)
     made = stretched(device, head, atlas, head.positions_mm)
     for k, expected in enumerate((atlas.stretch[..., 0], atlas.stretch[..., 1], atlas.shear)):
@@ -146,7 +146,7 @@ def test_the_map_is_stretched_as_at_rest(device: Device, head: Head, layout: str
     assert not made[~atlas.coverage].any()
 
 
-def test_the_map_is_stretched_as_one_made_for_the_moved_surface(device: Device, head: Head) -> None:
+def test_stretch_equals_that_of_an_atlas_of_the_moved_surface(device: Device, head: Head) -> None:
     moved = bent(head.positions_mm.astype(float))
     made = stretched(device, head, build_atlas(head.mesh, 256), moved)
     atlas = build_atlas(rebuilt(head.mesh, moved), 256)
@@ -169,7 +169,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     made = make_shape(device, shape_tables(device, head))
     walks, walked = (
         make_gutter_tracing(device, head.mesh, atlas, textures),
-        with_own_gutters(device, textures),
+        with_separate_gutters(device, textures),
     )
     shape.draw(frame, made, MotionBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
@@ -181,7 +181,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     return [one.view(np.float32).reshape(-1, 4)[:, :2].astype(float) for one in found]
 
 
-def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> None:
+def test_gutter_sources_at_rest_equal_the_atlas(device: Device, head: Head) -> None:
     """Scale and rotation of the whole head do not change the gutters."""
     atlas = build_atlas(head.mesh, 256, "stitched")
     sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
@@ -194,7 +194,7 @@ def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> N
         assert np.percentile(away, 97) < WALKED
 
 
-def test_gutters_of_another_shape_are_as_far_from_their_edge_as_on_it(device: Device, head: Head) -> None:
+def test_gutter_distances_match_the_deformed_surface(device: Device, head: Head) -> None:
     """On a ball twice as large the texels beyond an edge are twice as many mm away: the same points."""
     atlas = build_atlas(head.mesh, 256, "stitched")
     fine, *_ = sources(device, head, atlas, 2 * head.positions_mm)

@@ -42,7 +42,7 @@ def drawn(renderer: Renderer, settings: dict[str, Any], **draw: Any) -> bytes:
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
+def test_reused_light_does_not_change_pictures(keeping: Renderer, name: str) -> None:
     fresh = []
     for settings in SEQUENCES[name]:
         keeping.clear_cache()
@@ -53,7 +53,7 @@ def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
     assert drawn(keeping, SEQUENCES[name][-1], force=True) == fresh[-1]
 
 
-def test_what_is_there_is_left_as_it_is(keeping: Renderer) -> None:
+def test_only_affected_stages_run_again(keeping: Renderer) -> None:
     """Check the stages that run after a change of exposure, camera or light only."""
     keeping.clear_cache()
     plain, near = scene(), scene(60.0)

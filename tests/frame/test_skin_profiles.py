@@ -19,7 +19,7 @@ def skin(**pigments: float) -> Skin:
     return Skin(profile="light", pigments=Pigments(**pigments))
 
 
-def test_pigments_are_fitted_near_what_a_fresh_fit_finds() -> None:
+def test_incremental_pigment_fit_matches_a_new_fit() -> None:
     profiles = SkinProfiles()
     profiles.profile(skin(melanin=0.02))
     near, fresh = profiles.profile(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
@@ -50,7 +50,7 @@ def test_the_same_pigments_are_not_fitted_again() -> None:
     assert profiles.profile(skin(melanin=0.02).model_copy(update={"mix": 1.0})) is first
 
 
-def test_skins_in_turn_are_fitted_once() -> None:
+def test_alternating_skins_are_fitted_once() -> None:
     """Two skins that alternate, as on both sides of the viewer's divider, are fitted once."""
     profiles = SkinProfiles()
     first = [profiles.profile(skin(melanin=share)) for share in (0.02, 0.05)]
@@ -58,7 +58,7 @@ def test_skins_in_turn_are_fitted_once() -> None:
     assert [a is b for a, b in zip(again, [*first, first[0]], strict=True)] == [True] * 3
 
 
-def test_a_file_that_changes_is_read_again_for_another_skin(tmp_path: Path) -> None:
+def test_changed_profile_file_is_read_again(tmp_path: Path) -> None:
     path, profiles = tmp_path / "own.csv", SkinProfiles()
 
     def written(green: float) -> None:
@@ -79,6 +79,6 @@ def test_a_table_has_no_pigments() -> None:
         SkinProfiles().profile(Skin(pigments=Pigments(melanin=0.1)))
 
 
-def test_widths_that_differ_little_are_one() -> None:
+def test_nearly_equal_widths_are_merged() -> None:
     assert rounded_width(2.0) == rounded_width(2.1) == pytest.approx(2.0)
     assert all(0.84 <= rounded_width(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))

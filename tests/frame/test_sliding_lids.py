@@ -33,7 +33,7 @@ def bare(levels: int = 0) -> Head:
     return subdivide_head(build_head(Human().weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
 
 
-def test_the_device_slides_lids_as_the_twin_does(device: Device) -> None:
+def test_lid_sliding_matches_numpy(device: Device) -> None:
     head = bare()
     rig = head.control
     pose = Pose({"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.3, "eyeLookDownLeft": 0.6}, {"head": (5, 20, 0)})
@@ -52,7 +52,7 @@ def test_the_device_slides_lids_as_the_twin_does(device: Device) -> None:
     assert np.abs(free - expected)[rig.contact.point].max() > 0.3  # it matters here
 
 
-def test_edges_of_lids_are_those_of_the_surface() -> None:
+def test_lid_edges_lie_on_the_surface() -> None:
     for levels in (0, 1):
         head = bare(levels)
         motion = Pose({"eyeWideLeft": 0.8, "jawOpen": 0.3}, {"head": (0, 15, 0)}).motion(head.control)

@@ -120,7 +120,7 @@ def picture(renderer: Renderer, scene: Scene, settings: Settings) -> bytes:
 
 
 @pytest.mark.parametrize(("model", "name"), [*model_fields(Skin), *model_fields(Settings)])
-def test_each_dial(renderer: Renderer, model: type[FrozenModel], name: str) -> None:
+def test_each_setting_reruns_its_stages(renderer: Renderer, model: type[FrozenModel], name: str) -> None:
     if model is Skin:
         before = base(model, name)
         frames = [(replace(BASE, skin=skin), SETTINGS) for skin in (before, changed(before, name))]
@@ -136,7 +136,7 @@ def test_each_dial(renderer: Renderer, model: type[FrozenModel], name: str) -> N
     ("kind", "name"),
     [(kind, name) for kind in LIGHTS for _, name in model_fields(LIGHTS[kind]) if (kind, name) not in FIXED],
 )
-def test_each_light(renderer: Renderer, kind: str, name: str) -> None:
+def test_each_light_change_reruns_its_stages(renderer: Renderer, kind: str, name: str) -> None:
     given = GIVEN.get(kind, {"position": (60.0, 80.0, 300.0)})
     light = LIGHTS[kind](**given)
     lights = [(one, LAMP) for one in (light, changed(light, name))]
@@ -145,14 +145,14 @@ def test_each_light(renderer: Renderer, kind: str, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for _, name in model_fields(Camera)])
-def test_each_field_of_the_camera(renderer: Renderer, name: str) -> None:
+def test_each_camera_field_reruns_its_stages(renderer: Renderer, name: str) -> None:
     cameras = BASE.camera, changed(BASE.camera, name)
     kept, fresh = kept_and_fresh(renderer, *((replace(BASE, camera=one), SETTINGS) for one in cameras))
     assert kept == fresh
 
 
 @pytest.mark.parametrize("name", [name for _, name in model_fields(Environment) if name != "name"])
-def test_each_field_of_the_environment(renderer: Renderer, name: str) -> None:
+def test_each_environment_field_reruns_its_stages(renderer: Renderer, name: str) -> None:
     environment = Environment(name="uniform")
     both = environment, changed(environment, name)
     kept, fresh = kept_and_fresh(renderer, *((replace(BASE, environment=one), SETTINGS) for one in both))
@@ -170,7 +170,7 @@ SCENES: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("name", [one.name for one in fields(Scene)])
-def test_each_part_of_a_scene(renderer: Renderer, name: str) -> None:
+def test_each_scene_part_reruns_its_stages(renderer: Renderer, name: str) -> None:
     both = BASE, replace(BASE, **{name: SCENES[name]})
     for order in (both, both[::-1]):
         kept, fresh = kept_and_fresh(renderer, *((scene, SETTINGS) for scene in order))
@@ -213,14 +213,14 @@ RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = 
 
 
 @pytest.mark.parametrize("change", RUNS)
-def test_only_what_a_change_makes_stale_runs(renderer: Renderer, change: str) -> None:
+def test_only_stale_stages_run(renderer: Renderer, change: str) -> None:
     renderer.draw(BASE, SETTINGS)
     make, expected = RUNS[change]
     renderer.draw(*make())
     assert tuple(dict.fromkeys(renderer.graph.executed_stages)) == expected
 
 
-def test_everything_runs_when_asked(renderer: Renderer) -> None:
+def test_all_stages_run_when_forced(renderer: Renderer) -> None:
     renderer.clear_cache()
     renderer.draw(BASE, SETTINGS)
     first = list(renderer.graph.executed_stages)
@@ -228,7 +228,7 @@ def test_everything_runs_when_asked(renderer: Renderer) -> None:
     assert renderer.graph.executed_stages == first and "shade" in first
 
 
-def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
+def test_frame_listing_names_stages_and_shaders(renderer: Renderer) -> None:
     """Each stage is listed with its shader, in order; stages that a camera move leaves valid are marked."""
     renderer.draw(BASE, SETTINGS)
     listing = renderer.graph.listing = FrameListing()

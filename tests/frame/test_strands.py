@@ -56,7 +56,7 @@ def tangle(count: int, absorption: float = 0.0, radius_mm: float = 0.2) -> Head:
     return hairy(begins, ends, radius_mm, absorption)
 
 
-def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
+def test_strand_lobe_matches_numpy(renderer: Renderer) -> None:
     rng = np.random.default_rng(0)
     sines = rng.uniform(-0.98, 0.98, (24, 24, 2))
     drawn = np.dstack([sines, rng.uniform(-np.pi, np.pi, (24, 24)), rng.uniform(0, 2, (24, 24))])
@@ -79,7 +79,7 @@ def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("slope", [0.0, 0.3, 2.5])
 @pytest.mark.parametrize("radius_mm", [0.04, 0.3, 1.4])
-def test_a_hair_covers_what_it_is_wide(renderer: Renderer, radius_mm: float, slope: float) -> None:
+def test_hair_coverage_equals_its_width(renderer: Renderer, radius_mm: float, slope: float) -> None:
     """Compare the coverage of columns of pixels beside the sheet with the width of a strand."""
     ends = np.array([[-12.0, -12.0 * slope + 80.2, 0.0], [12.0, 12.0 * slope + 80.2, 0.0]])
     head = hairy(ends[:1], ends[1:], radius_mm, BLACK)
@@ -147,7 +147,7 @@ def test_hairs_behind_the_skin_are_hidden(renderer: Renderer) -> None:
     assert np.array_equal(made, bare)
 
 
-def test_hairs_beyond_the_sheet_cover_nothing_else(renderer: Renderer) -> None:
+def test_hairs_outside_the_head_count_as_coverage(renderer: Renderer) -> None:
     """Over an empty background strands count as coverage."""
     head = hairy([[-90, 0, 1]], [[90, 0, 1]], 3.0, BLACK)
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=160.0))
@@ -213,7 +213,7 @@ def test_hairs_are_drawn_again_only_when_they_change(renderer: Renderer) -> None
     assert "strands" in ran[3] and not ran[3] & {"shape", "shadows"}
 
 
-def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
+def test_picture_parts_with_strands_add_up(renderer: Renderer) -> None:
     """Light that strands scatter counts as reflected; they only cover diffuse light."""
     scene = lit(tangle(40, absorption=2.0))
     parts = ("all", "diffuse", "specular")
@@ -228,7 +228,7 @@ def test_hairs_of_another_mesh_are_refused(renderer: Renderer) -> None:
         picture(renderer, lit(alone))
 
 
-def test_strands_are_a_setting() -> None:
+def test_strands_can_be_switched_off() -> None:
     assert Settings().strands and not Settings(strands=False).strands
 
 

@@ -53,7 +53,9 @@ def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tupl
 @pytest.mark.parametrize("energy", ENERGY_SCHEMES)
 @pytest.mark.parametrize("fresnel", FRESNEL)
 @pytest.mark.parametrize("model", MODELS)
-def test_every_choice_reaches_the_picture(renderer: Renderer, model: str, fresnel: str, energy: str) -> None:
+def test_every_surface_option_changes_the_picture(
+    renderer: Renderer, model: str, fresnel: str, energy: str
+) -> None:
     chosen = {"specular": model, "fresnel": fresnel, "energy": energy}
     below, mirrored = parts(0.4, 0.9, model, fresnel, energy)
     assert mirrored > 20 * TWIN * below.max()  # or the lobe would not be tested
@@ -61,7 +63,7 @@ def test_every_choice_reaches_the_picture(renderer: Renderer, model: str, fresne
     assert np.abs(made - below - mirrored).max() < TWIN * made.max()
 
 
-def test_skin_without_reflection_takes_all_the_light(renderer: Renderer) -> None:
+def test_skin_without_reflection_receives_all_light(renderer: Renderer) -> None:
     made = pixel(renderer, specular="none", rho_s=0.9)
     assert np.abs(made - 2.0 / np.sqrt(1.36) * COLOUR / np.pi).max() < TWIN * made.max()
 
@@ -73,7 +75,9 @@ def test_the_wrong_reflection_has_the_colour_of_the_map(renderer: Renderer) -> N
 
 
 @pytest.mark.parametrize(("oiliness", "m", "rho_s"), [(0.0, 0.4, 0.2), (0.5, 0.32, 0.3), (1.0, 0.24, 0.4)])
-def test_oil_is_strength_and_smoothness(renderer: Renderer, oiliness: float, m: float, rho_s: float) -> None:
+def test_oiliness_changes_strength_and_roughness(
+    renderer: Renderer, oiliness: float, m: float, rho_s: float
+) -> None:
     oily = pixel(renderer, roughness=0.4, rho_s=0.2, oiliness=oiliness)
     assert np.abs(oily - pixel(renderer, roughness=m, rho_s=rho_s)).max() < TWIN * oily.max()
 
@@ -104,7 +108,7 @@ def skin_struct(tmp_path: Path, renderer: Renderer, *members: str) -> ComputePro
     return ComputeProgram(renderer.device, path, shader_folders())
 
 
-def test_a_new_dial_reaches_the_struct_by_its_name(tmp_path: Path, renderer: Renderer) -> None:
+def test_new_skin_field_fills_the_struct_member_of_its_name(tmp_path: Path, renderer: Renderer) -> None:
     program = skin_struct(tmp_path, renderer, "wax: f32,")
     record = surface.skin_record(program, WaxedSkin(), PATCH.maps, PROFILE, 1)
     assert record["wax"] == 0.25 and record["mix"] == 0.5
@@ -116,7 +120,7 @@ def test_every_member_of_the_struct_is_filled_in(tmp_path: Path, renderer: Rende
     assert [name for name in record.dtype.names if not record[name].any()] == []
 
 
-def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:
+def test_only_non_default_models_need_another_pipeline() -> None:
     assert surface.surface_constants(Skin()) == surface.surface_constants(Skin(specular="none")) == ()
     assert surface.surface_constants(Skin(specular="phong")) == (("MODEL", 6),)
     assert surface.surface_constants(Skin(fresnel="exact")) == (("EXACT_FRESNEL", 1),)

@@ -41,7 +41,7 @@ def packed(renderer: Renderer) -> tuple[Floats, Floats, list[Floats]]:
     return directions[..., :3], colours, made
 
 
-def test_directions(packed: tuple[Floats, Floats, list[Floats]]) -> None:
+def test_packed_directions_are_decoded(packed: tuple[Floats, Floats, list[Floats]]) -> None:
     """Directions have 16 bits along each side of the octahedron."""
     directions, _, (normal, bent, _, places) = packed
     assert np.abs(normal[..., :3] - directions).max() < 6e-5
@@ -49,7 +49,7 @@ def test_directions(packed: tuple[Floats, Floats, list[Floats]]) -> None:
     assert np.abs(places[..., :3] - 100.0 * directions[..., [1, 2, 0]]).max() < 1e-4
 
 
-def test_colours_and_heights(packed: tuple[Floats, Floats, list[Floats]]) -> None:
+def test_packed_colours_and_heights_are_decoded(packed: tuple[Floats, Floats, list[Floats]]) -> None:
     directions, colours, (normal, bent, colour, places) = packed
     most = colours[..., :3].max(axis=-1, keepdims=True)
     assert (np.abs(colour[..., :3] - colours[..., :3]) <= 1.01 / 65535 * most).all()
@@ -68,7 +68,7 @@ def drawn(renderer: Renderer, *scenes: Scene, atlas: int = SIZE) -> list[int]:
     return found
 
 
-def test_drawn_only_when_it_changes(renderer: Renderer) -> None:
+def test_surface_texels_are_drawn_only_on_change(renderer: Renderer) -> None:
     renderer.clear_cache()
     assert drawn(renderer, SCENE, SCENE) == [1, 0]
     multiplied = scene_of(HEAD, frontal(2.0), mix=0.2), scene_of(HEAD, energy="none")
@@ -78,7 +78,7 @@ def test_drawn_only_when_it_changes(renderer: Renderer) -> None:
     assert drawn(renderer, SCENE, atlas=2 * SIZE) == [1]
 
 
-def test_what_changed_is_seen(renderer: Renderer) -> None:
+def test_changed_surface_texels_are_redrawn(renderer: Renderer) -> None:
     """A head rendered again after others looks as it did at first."""
     coloured = head_of(HEAD.mesh, colour=np.full((4, 4, 3), 0.25))
     changed = [scene_of(coloured, frontal(), mix=1.0), scene_of(HEAD, frontal(), mix=1.0, rho_s=0.9)]
@@ -90,7 +90,7 @@ def test_what_changed_is_seen(renderer: Renderer) -> None:
     assert not any(np.array_equal(first, other) for other in found[1:-1])
 
 
-def test_gone_with_its_atlas(renderer: Renderer) -> None:
+def test_surface_texels_are_freed_with_the_atlas(renderer: Renderer) -> None:
     inputs = run_frame(renderer, SCENE, atlas=SIZE)
     texture = inputs.layouts[0].surfaces
     assert texture.size == (SIZE, SIZE, 2) and SURFACE_TEXEL_BYTES == 2 * 16

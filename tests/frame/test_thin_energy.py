@@ -54,7 +54,7 @@ def left(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, around: Any 
 
 
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
-def test_a_white_sheet_in_a_furnace(renderer: Renderer, direction: str) -> None:
+def test_white_slab_passes_the_furnace_test(renderer: Renderer, direction: str) -> None:
     """In uniform light it emits what it receives, without the light that half-spaces transmit unscattered."""
     uniform = Environment(name="uniform")
     thick, thin = (
@@ -67,7 +67,9 @@ def test_a_white_sheet_in_a_furnace(renderer: Renderer, direction: str) -> None:
 
 
 @pytest.mark.parametrize("degrees", [0.0, 60.0])
-def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, degrees: float) -> None:
+def test_thin_half_space_skin_transmits_like_its_medium(
+    renderer: Renderer, skin1: str, degrees: float
+) -> None:
     """Compare red and green light on both faces with the exact slab."""
     angle = np.radians(degrees)
     way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
@@ -107,9 +109,7 @@ def test_flesh_that_scatters_forward_lets_more_through(
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
-def test_a_colour_that_nothing_blurs_passes_nowhere(
-    renderer: Renderer, tmp_path: Path, direction: str
-) -> None:
+def test_unscattered_colour_is_not_transmitted(renderer: Renderer, tmp_path: Path, direction: str) -> None:
     """All blue light is in the relit Gaussian, so that thin parts lose none of it."""
     weight = np.array([[0.2, 0.2, 0.3], [0.2, 0.1, 0.0], [0.2, 0.1, 0.0]])
     write_profile(tmp_path / "red.toml", GaussianSum("red", np.array([1e-4, 0.5, 4.0]), weight), {})

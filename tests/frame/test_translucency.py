@@ -121,7 +121,7 @@ def read(device: Device, buffer: Any) -> NDArray[np.uint32]:
     return np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
 
 
-def test_the_places_stand_for_all_of_the_surface(device: Device, thin: Thin) -> None:
+def test_cells_represent_the_whole_surface(device: Device, thin: Thin) -> None:
     corners = thin.mesh.positions[thin.mesh.triangles].astype(float)
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -132,7 +132,7 @@ def test_the_places_stand_for_all_of_the_surface(device: Device, thin: Thin) -> 
         assert len(np.unique(kind)) == count > 100
 
 
-def test_twin_of_the_places(device: Device, thin: Thin) -> None:
+def test_cells_match_numpy(device: Device, thin: Thin) -> None:
     """Compare the positions, areas, normals and the metric of cells."""
     words = read(device, thin.pairs.pairs).reshape(-1, 3)
     taken, given = (np.zeros(count, np.int64) for count in (thin.pairs.receivers[1], thin.pairs.sources[1]))
@@ -154,7 +154,7 @@ def test_twin_of_the_places(device: Device, thin: Thin) -> None:
     assert np.abs(square / twin - 1).max() < 5e-3  # halves in the stretch map
 
 
-def test_twin_of_the_pairs(thin: Thin) -> None:
+def test_pairs_match_numpy(thin: Thin) -> None:
     """Compare with a search by brute force: all relevant pairs are found once."""
     light = passes(thin.lie, thin.given.area_mm2, thin.cells)
     made = np.zeros(light.shape, np.int64)
@@ -166,7 +166,7 @@ def test_twin_of_the_pairs(thin: Thin) -> None:
     assert 1000 < made.sum() < 0.5 * made.size
 
 
-def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
+def test_surface_distances_match_numpy(thin: Thin) -> None:
     """Compare the distances to the nearest copy in a chart or gutter."""
     by = (np.stack([thin.offset & 0xFFFF, thin.offset >> 16]).astype(np.uint16)).view(np.int16) / 8.0
     made = far_of(thin.atlas, thin.taken.chosen(thin.receiver), *by)
@@ -183,7 +183,7 @@ def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
     assert closer.max() < 2.0 and (closer < 0.25).mean() > 0.995  # middles of patches, and not their edges
 
 
-def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
+def test_transmitted_light_matches_numpy(device: Device, thin: Thin) -> None:
     words = read(device, thin.translucency.weights).reshape(-1, 2)
     assert (words[:, 0] == read(device, thin.pairs.pairs).reshape(-1, 3)[:, 0]).all()
     by = (np.stack([thin.offset & 0xFFFF, thin.offset >> 16]).astype(np.uint16)).view(np.int16) / 8.0
@@ -198,7 +198,7 @@ def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
     assert (error <= twin.max(axis=1, keepdims=True) / 400 + 2e-5)[near].all()
 
 
-def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
+def test_equal_searches_give_equal_pairs(device: Device, thin: Thin) -> None:
     surface = surface_of(device, thin.mesh, thin.atlas)
     again = pairs_on(device, surface, thin.atlas, divide_into_cells(thin.atlas, SIGMA))
     for name in ("pairs", "receiver_ranges"):
@@ -227,7 +227,7 @@ def test_a_ball_smaller_than_the_profile_spreads_has_pairs(device: Device, layou
     assert len(np.unique(cell)) == len(cell) and (end - first).sum() == pairs.count
 
 
-def test_cells_are_coarser_where_memory_does_not_hold_the_pairs(
+def test_cells_are_enlarged_when_pairs_exceed_memory(
     device: Device, thin: Thin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(device, "max_storage_bytes", 12 * thin.pairs.count - 1)
@@ -287,7 +287,7 @@ def front(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, **given: An
 
 
 @pytest.mark.parametrize("thickness", [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 20.0])
-def test_a_slab_lets_through_what_the_profile_says(renderer: Renderer, thickness: float) -> None:
+def test_slab_transmits_as_the_profile_states(renderer: Renderer, thickness: float) -> None:
     """Far from its rim, a slab transmits exp(-d^2 / 2v) of each Gaussian."""
     points, light = front(renderer, wedge(60.0, thickness, thickness))
     inner = light[np.abs(points[:, :2]).max(axis=1) < 14.0]
@@ -326,7 +326,7 @@ def test_a_wedge_fades_without_a_step(renderer: Renderer) -> None:
     assert bins[-1] < 1e-3
 
 
-def test_a_sphere_lets_nothing_through(renderer: Renderer) -> None:
+def test_sphere_transmits_no_light(renderer: Renderer) -> None:
     """Light is not counted twice at the terminator."""
     ball = uv_sphere(20.0, 48, 24)
     on, off = (scattered(renderer, ball, transmission=t)[2] for t in ("thin", "none"))
@@ -340,7 +340,7 @@ def test_nothing_comes_through_when_it_is_switched_off(renderer: Renderer) -> No
     assert light[np.abs(points[:, :2]).max(axis=1) < 5.0].max() < 1e-3
 
 
-def test_light_counts_once_where_both_sides_meet(renderer: Renderer) -> None:
+def test_light_counts_once_at_the_rim_of_a_slab(renderer: Renderer) -> None:
     """A thin slab in uniform light has no bright line along its rim."""
     mesh = wedge(40.0, 0.4, 0.4)
     everywhere = (BEHIND, DirectionalLight(direction=(0, 0, -1), irradiance=(1, 1, 1), shadows=False))
@@ -363,7 +363,7 @@ def test_a_rolled_rim_glows_evenly(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("angle", [10.0, 45.0])
-def test_a_wedge_lets_through_what_straight_lines_bring(renderer: Renderer, angle: float) -> None:
+def test_wedge_transmits_light_along_straight_lines(renderer: Renderer, angle: float) -> None:
     mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
     points, normals, light = scattered(renderer, mesh, atlas=512)
     half = np.radians(angle / 2)

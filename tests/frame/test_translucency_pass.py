@@ -104,7 +104,7 @@ def summed(
 
 @pytest.mark.parametrize("row", [1, 1024])
 @pytest.mark.parametrize(("team", "at_once"), [(1, 1), (1, 4), (8, 2), (32, 4), (128, 1)])
-def test_twin_of_what_comes_through(
+def test_transmitted_light_matches_numpy(
     device: Device,
     weighed: Weighed,
     team: int,
@@ -120,7 +120,7 @@ def test_twin_of_what_comes_through(
     assert ((made[..., 3] == 1) == weighed.thin.pairs.cells.receiver_mask).all()
 
 
-def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -> None:
+def test_bright_and_dim_light_have_equal_precision(device: Device, weighed: Weighed) -> None:
     """Sources from 1e-6 to 1e6 keep a relative precision of 14 bits."""
     powers = np.random.default_rng(9).uniform(-6, 6, (2, 64, 64, 3))
     twin, made = summed(device, weighed, (10**powers).astype(np.float32), ALONE)
@@ -128,7 +128,7 @@ def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -
     assert (np.abs(made[..., :3] - twin) <= 2.0**-14 * twin * 1.01).all()
 
 
-def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
+def test_head_without_thin_parts_transmits_nothing(device: Device) -> None:
     ball = weighed_of(device, uv_sphere(30.0, 24, 12))
     assert ball.thin.pairs.count == 0
     frame = CommandList(device)
@@ -140,7 +140,7 @@ def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     assert light[..., 3].any()
 
 
-def test_the_view_of_thickness_shows_the_least_depth(device: Device, weighed: Weighed) -> None:
+def test_thickness_view_shows_the_smallest_depth(device: Device, weighed: Weighed) -> None:
     thin = weighed.thin
     side, radius = thin.pairs.cells.side, thin.pairs.cells.radius_mm
     into = make_texture(device, (side, side), "r32float")

@@ -92,7 +92,9 @@ def nearest(
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("name", HEADS)
 @pytest.mark.parametrize("compute", [False, True])
-def test_triangles_by_ray(renderer: Renderer, compute: bool, name: str, turned: bool, samples: int) -> None:
+def test_visible_triangles_match_ray_casting(
+    renderer: Renderer, compute: bool, name: str, turned: bool, samples: int
+) -> None:
     scene = view_of(HEADS[name], turned)
     made = nearest(renderer, scene, triangles=True, compute=compute, samples=samples)
     for layer, offset in zip(made, pixel_samples(samples), strict=True):
@@ -103,7 +105,7 @@ def test_triangles_by_ray(renderer: Renderer, compute: bool, name: str, turned: 
 
 
 @pytest.mark.parametrize("name", HEADS)
-def test_both_ways_find_the_same_depth(renderer: Renderer, name: str) -> None:
+def test_both_methods_give_the_same_depth(renderer: Renderer, name: str) -> None:
     scene = view_of(HEADS[name], True)
     by_raster, by_compute = (
         nearest(renderer, scene, triangles=False, compute=way, samples=1)[0] for way in (False, True)
@@ -115,7 +117,7 @@ def test_both_ways_find_the_same_depth(renderer: Renderer, name: str) -> None:
 
 
 @pytest.mark.parametrize("compute", [False, True])
-def test_a_frame_holds_no_holes(renderer: Renderer, compute: bool) -> None:
+def test_frame_has_no_holes(renderer: Renderer, compute: bool) -> None:
     """All pixels of a closed ball are covered, those on shared edges too."""
     head = head_of(uv_sphere(30.0, 64, 32))
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=24.0))
@@ -124,7 +126,7 @@ def test_a_frame_holds_no_holes(renderer: Renderer, compute: bool) -> None:
 
 
 @pytest.mark.parametrize("compute", [False, True])
-def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) -> None:
+def test_triangles_crossing_the_camera_plane_are_clipped(renderer: Renderer, compute: bool) -> None:
     """A floor below the camera is visible in front of it."""
     floor = plane(400.0)
     head = head_of(
@@ -140,7 +142,7 @@ def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) 
 
 
 @pytest.mark.parametrize("triangles", [False, True])
-def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool) -> None:
+def test_previous_view_leaves_no_trace(renderer: Renderer, triangles: bool) -> None:
     """Layers that are drawn again hold only the new view."""
     options = {"triangles": triangles, "compute": True}
     used, fresh = (make_layers(renderer.device, SIZE, 2, **options) for _ in range(2))

@@ -90,7 +90,7 @@ TURNED = Camera(position=(60, 50, 280), target=(3, 2, 0), up=(0.2, 1, 0), frame_
 @pytest.mark.parametrize("samples", [1, 4, 5])
 @pytest.mark.parametrize("groups", [1, 4096])
 @pytest.mark.parametrize("what", ["depth", "triangle", "triangle after depth"])
-def test_triangles_of_all_sizes(
+def test_triangles_of_all_sizes_are_drawn(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, what: str, groups: int, samples: int
 ) -> None:
     """Workgroups of few and of many triangles agree, with one or two words per sample."""
@@ -108,7 +108,9 @@ def test_triangles_of_all_sizes(
             assert np.array_equal(layer[truth.sure], truth.triangle[truth.sure])
 
 
-def test_more_blocks_than_a_workgroup_lists(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_blocks_than_a_workgroup_list_are_drawn(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A workgroup of 128 triangles with 11 blocks each exceeds its list of 1024."""
     monkeypatch.setattr(visibility_buffer, "_TARGET_GROUPS", 1)
     monkeypatch.setattr(visibility_buffer, "_RUN_TRIANGLES", 128)
@@ -123,7 +125,7 @@ BALL = head_of(uv_sphere(12.0, 24, 12))
 
 @pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("triangles", [False, True])
-def test_tiles_hold_only_the_last_view(
+def test_tiles_are_cleared_between_views(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, triangles: bool, apart: bool
 ) -> None:
     """A ball that leaves tiles and returns leaves no trace, nor do layers that are no longer drawn."""
@@ -138,7 +140,7 @@ def test_tiles_hold_only_the_last_view(
         assert np.array_equal(left, right)
 
 
-def test_steps_of_depth() -> None:
+def test_depth_is_quantised_as_stated() -> None:
     """The depth range follows from the coarsest step of depth."""
     near, far = 250.0, 640.0
     scale = near / (far - near)
@@ -153,7 +155,7 @@ def test_steps_of_depth() -> None:
 
 @pytest.mark.filterwarnings("ignore:camera. expected a position outside the head")
 @pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
-def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: Any) -> None:
+def test_corners_on_the_camera_plane_are_handled(renderer: Renderer, eye: Any, ahead: Any) -> None:
     """Compare with the silhouettes of the rasteriser for triangles with a corner beside the eye."""
     ball = head_of(uv_sphere(60.0, 24, 12))
     target = tuple(np.add(eye, ahead).tolist())

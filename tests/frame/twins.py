@@ -10,9 +10,9 @@ from scipy.ndimage import map_coordinates
 
 from dermis.atlas.atlas import Atlas
 from dermis.frame.features.diffusion.kernels import (
+    CHAINED_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    SUMMED_TRUNCATION_SIGMAS,
     kernel_table,
 )
 from dermis.mesh.head import Head
@@ -33,7 +33,7 @@ DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
 
 def _table_ratio(relative: Floats) -> Floats:
     """Interpolate the kernel table between its rows."""
-    taps = np.ceil(SUMMED_TRUNCATION_SIGMAS * np.sqrt(relative)).astype(int)
+    taps = np.ceil(CHAINED_TRUNCATION_SIGMAS * np.sqrt(relative)).astype(int)
     row = relative * ROWS_PER_UNIT
     table = kernel_table().astype(np.float64)
     low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
@@ -52,7 +52,7 @@ class Kernel(NamedTuple):
         """Return the kernel of a variance [texel^2]."""
         relative = variance / step**2
         wide = relative > MAX_TABLE_VARIANCE
-        taps = np.ceil(np.where(wide, WIDE_TRUNCATION, SUMMED_TRUNCATION_SIGMAS) * np.sqrt(relative)).astype(
+        taps = np.ceil(np.where(wide, WIDE_TRUNCATION, CHAINED_TRUNCATION_SIGMAS) * np.sqrt(relative)).astype(
             int
         )
         narrow = _table_ratio(np.minimum(relative, MAX_TABLE_VARIANCE))

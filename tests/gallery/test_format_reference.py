@@ -11,13 +11,13 @@ from dermis.base import citations as cite
 
 
 @pytest.mark.parametrize("key", sorted(cite.citation_keys()))
-def test_every_work_can_be_read(key: str) -> None:
+def test_every_bibliography_entry_is_parsed(key: str) -> None:
     text = format_reference(key)
     assert re.search(r"^.+\. .+\. \d{4}$", text), text
     assert not set(text) & set("{}\\$`"), text
 
 
-def test_fields_go_over_lines_and_letters_have_their_accents() -> None:
+def test_multiline_fields_and_accents_are_parsed() -> None:
     authors = "Andersson, Pontus; Nilsson, Jim; Akenine-Möller, Tomas; "
     assert format_reference("Andersson2020").startswith(authors)
     assert "László" in format_reference("Kelemen2001")

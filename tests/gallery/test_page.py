@@ -39,7 +39,7 @@ def page(tmp_path: Path) -> Path:
     return path
 
 
-def test_page_needs_nothing_else_and_escapes_what_it_says(page: Path) -> None:
+def test_page_is_self_contained_and_escapes_text(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert "a &lt;head&gt;" in text and "See &amp; believe." in text
     assert "http://" not in text and "https://" not in text
@@ -52,7 +52,7 @@ def test_equations_have_indices_and_powers() -> None:
     assert shown == "E<sub>k</sub> = a<sup>1−mix</sup> &amp; x<sup>2</sup>"
 
 
-def test_a_fault_is_shown_and_the_others_are_drawn(tmp_path: Path) -> None:
+def test_failed_sections_show_an_error_and_others_are_drawn(tmp_path: Path) -> None:
     from dermis.base.errors import refuse
 
     class Faulty(Script):
@@ -70,7 +70,7 @@ def test_a_fault_is_shown_and_the_others_are_drawn(tmp_path: Path) -> None:
     assert second.fault == "" and second.size == (64, 64)
 
 
-def test_sheet_stands_in_rows_over_captions() -> None:
+def test_contact_sheet_has_rows_with_captions() -> None:
     page_file = panel_sheet(
         {"a": plain(255, 0, 0), "b": plain(0, 255, 0), "film": [plain(0, 0, 255)]}, columns=2
     )
@@ -90,7 +90,7 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_in_a_browser(page: Path, browser: Any, width: int) -> None:
+def test_page_works_in_a_browser(page: Path, browser: Any, width: int) -> None:
     view = browser.new_page(viewport={"width": width, "height": 800})
     content: list[str] = []
     view.on("console", lambda message: content.append(message.text))

@@ -45,7 +45,7 @@ def coarse_people(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.samples
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
-def test_script(script: Script, studio: Studio, coarse_people: None) -> None:
+def test_script_runs(script: Script, studio: Studio, coarse_people: None) -> None:
     panels = script.draw(studio)
     for caption, panel in panels.items():
         picture = to_srgb8(first_frame(panel))
@@ -55,7 +55,7 @@ def test_script(script: Script, studio: Studio, coarse_people: None) -> None:
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
-def test_description(script: Script) -> None:
+def test_script_has_a_description(script: Script) -> None:
     assert script.title and len(script.caption) > 40
     assert set(script.sources) <= cite.citation_keys()
     assert set(script.deck) <= set(ROWS)
@@ -76,20 +76,20 @@ def test_docstring_is_read_without_running_the_script(tmp_path: Path) -> None:
     assert (script.deck, script.slider, script.sources) == (("S1", "S2"), ("a", "b"), ())
 
 
-def test_names_that_no_script_has_are_refused() -> None:
+def test_unknown_script_names_are_refused() -> None:
     with pytest.raises(DermisError, match=r"--only.*got 'nothing'.*01_portrait"):
         find_scripts(["nothing"])
     assert [script.name for script in find_scripts(["seams", "01"])] == ["01_portrait", "17_seams"]
 
 
-def test_a_number_means_one_picture() -> None:
+def test_figure_numbers_are_unique() -> None:
     assert [script.name for script in find_scripts(["1", "01"])] == ["01_portrait"]
     for nothing in ("", "99"):
         with pytest.raises(DermisError, match="--only"):
             find_scripts([nothing])
 
 
-def test_pages_show_pictures_that_scripts_draw() -> None:
+def test_pages_show_only_pictures_drawn_by_scripts() -> None:
     """Pages may also show other pictures of that folder, such as the viewer's."""
     root = Path(__file__).parents[2]
     drawn = {script.name for script in SCRIPTS}

@@ -59,7 +59,7 @@ PLAIN_GPU = fake("Old", "DiscreteGPU", features=())
         ((CPU, fake("Odd", "SomethingNew")), "Odd"),
     ],
 )
-def test_auto_takes_the_best(machine: Any, handles: tuple[Any, ...], chosen: str) -> None:
+def test_auto_selects_the_best_adapter(machine: Any, handles: tuple[Any, ...], chosen: str) -> None:
     machine(*handles)
     assert select_adapters("auto")[0][0].name == chosen
 
@@ -72,12 +72,12 @@ def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
 
 
 @pytest.mark.parametrize("wanted", ["gefo", "GEFORCE", "GeForce driver"])
-def test_part_of_a_name_is_enough(machine: Any, wanted: str) -> None:
+def test_adapters_match_part_of_a_name(machine: Any, wanted: str) -> None:
     machine(CPU, GPU)
     assert select_adapters(wanted)[0][0].name == "GeForce"
 
 
-def test_adapters_of_one_name_are_told_apart_by_their_numbers(machine: Any) -> None:
+def test_equal_adapter_names_are_distinguished_by_numbers(machine: Any) -> None:
     first, second = fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")
     machine(CPU, first, second)
     assert [one.number for one in list_adapters()] == [0, 1, 2]
@@ -100,7 +100,7 @@ def test_only_optional_features_are_listed() -> None:
 
 
 @pytest.mark.parametrize("wanted", ["auto", "cpu", "GeForce"])
-def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
+def test_missing_adapter_is_refused(machine: Any, wanted: str) -> None:
     machine()
     with pytest.raises(DermisError, match="Vulkan") as caught:
         select_adapters(wanted)
@@ -116,14 +116,14 @@ def test_opengl_alone_is_taken_only_by_its_name(machine: Any, wanted: str) -> No
     assert select_adapters("mesa")[0][0].backend == "OpenGL"
 
 
-def test_no_software_adapter(machine: Any) -> None:
+def test_missing_software_adapter_is_refused(machine: Any) -> None:
     machine(GPU)
     with pytest.raises(DermisError, match="GeForce") as caught:
         select_adapters("cpu")
     assert INSTALL_HINT in str(caught.value)
 
 
-def test_a_name_that_is_none_lists_those_that_are() -> None:
+def test_unknown_adapter_name_lists_known_ones() -> None:
     with pytest.raises(DermisError, match="nonsense") as caught:
         open_device("nonsense")
     assert all(adapter.name in str(caught.value) for adapter in list_adapters())
@@ -141,13 +141,13 @@ def broken(**limits: int) -> Any:
     return made
 
 
-def test_a_driver_that_fails_to_open_is_told(machine: Any) -> None:
+def test_driver_failure_is_reported(machine: Any) -> None:
     machine(broken())
     with pytest.raises(DermisError, match=r"GeForce.*out of everything.*--adapter cpu"):
         open_device("auto")
 
 
-def test_small_textures_are_no_reason_to_refuse_an_adapter(machine: Any) -> None:
+def test_adapter_with_small_texture_limit_is_accepted(machine: Any) -> None:
     machine(broken(max_texture_dimension_2d=2048, max_buffer_size=1 << 20))
     with pytest.raises(DermisError, match="out of everything"):
         open_device("auto")

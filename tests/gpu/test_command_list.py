@@ -84,7 +84,7 @@ def test_a_frame_timed_as_a_whole_is_not_divided(
     assert times is not None and set(times) == {"one", "two", "total"} and stamps == 4
 
 
-def test_software_adapters_time_stages_even_so(device: Device, scale: ComputeProgram) -> None:
+def test_software_adapters_time_stages(device: Device, scale: ComputeProgram) -> None:
     if device.adapter.kind != "CPU":
         pytest.skip("a GPU")
     times, _ = staged_times(device, scale, "whole")
@@ -102,14 +102,14 @@ def record_of(scale: ComputeProgram, value: float) -> Any:
     return scale.record("Factor", value=value)
 
 
-def test_a_record_keeps_its_place_and_no_other_one_gets_it(device: Device, scale: ComputeProgram) -> None:
+def test_uniform_records_keep_distinct_offsets(device: Device, scale: ComputeProgram) -> None:
     uniforms, record = Uniforms(device), record_of(scale, 1.25)
     first, same = (uniforms.position(record) for _ in range(2))
     others = [uniforms.position(record_of(scale, 1.5)) for _ in range(4)]  # each released before the next
     assert first == same and len({first, *others}) == 5
 
 
-def test_memory_for_records_is_used_again(device: Device, scale: ComputeProgram) -> None:
+def test_uniform_memory_is_reused(device: Device, scale: ComputeProgram) -> None:
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     spare = []
     for value in range(3):
@@ -147,7 +147,7 @@ def test_frames_in_flight_keep_their_uniforms(device: Device, scale: ComputeProg
     assert [float(download(device, into).min()) for into in made] == list(range(20))
 
 
-def test_bind_groups_are_kept(device: Device, scale: ComputeProgram) -> None:
+def test_bind_groups_are_cached(device: Device, scale: ComputeProgram) -> None:
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     bound = [{"factor": record_of(scale, value), "image": image, "scaled": into} for value in (1, 2)]
     uniforms = Uniforms(device)
@@ -155,7 +155,7 @@ def test_bind_groups_are_kept(device: Device, scale: ComputeProgram) -> None:
     assert first is second  # other numbers, the same group
 
 
-def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
+def test_bind_groups_are_dropped_with_their_resources(device: Device) -> None:
     """Check that bind groups do not keep textures alive."""
     program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
     uniforms, image = Uniforms(device), make_texture(device, SIZE, "r32float")
@@ -170,7 +170,7 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
     assert program.bind_groups.resource_count <= 2  # the image and the uniforms
 
 
-def test_what_goes_before_the_submit_is_still_read(device: Device, scale: ComputeProgram) -> None:
+def test_resources_dropped_before_submission_are_still_read(device: Device, scale: ComputeProgram) -> None:
     """Check that the library keeps a bound texture alive until the submission."""
     into, frame = make_texture(device, SIZE, "r32float"), CommandList(device, timed=False)
     image = texture_from_array(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
@@ -187,7 +187,7 @@ class Resource:
     """An object that can be bound."""
 
 
-def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
+def test_dropped_resources_are_no_longer_tracked() -> None:
     """Check that a new resource at the same address cannot be mistaken for a released one."""
     groups, first, second = ResourceCache[str](), Resource(), Resource()
     groups.add(resource_key([first, second]), [first, second], "group")
@@ -197,12 +197,12 @@ def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
     assert groups.resource_count == 0
 
 
-def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) -> None:
+def test_resource_missing_from_the_list_is_named(device: Device, scale: ComputeProgram) -> None:
     with pytest.raises(KeyError, match=r"scale\.wgsl declares 'image'"):
         scale.bind_group({"factor": record_of(scale, 1)}, Uniforms(device))
 
 
-def test_untimed_frames_tell_no_times(device: Device, scale: ComputeProgram) -> None:
+def test_untimed_frames_report_no_times(device: Device, scale: ComputeProgram) -> None:
     frame = CommandList(device, timed=False)
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     frame.compute("one", scale, {"factor": record_of(scale, 2), "image": image, "scaled": into}, SIZE)
@@ -210,12 +210,12 @@ def test_untimed_frames_tell_no_times(device: Device, scale: ComputeProgram) -> 
     assert frame.stage_ms() is None
 
 
-def test_what_the_driver_says_becomes_our_error(device: Device) -> None:
+def test_driver_messages_become_package_errors(device: Device) -> None:
     import wgpu
 
     with pytest.raises(DermisError, match=r"out of memory.*--adapter cpu"), gpu_failures(device):
         raise wgpu.GPUOutOfMemoryError("out of memory")
 
 
-def test_half_stores_round_in_a_known_way(device: Device) -> None:
+def test_half_precision_stores_round_as_expected(device: Device) -> None:
     assert half_store_rounding(device) in {"nearest", "toward zero", "other"}

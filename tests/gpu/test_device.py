@@ -53,7 +53,7 @@ def test_programs_beyond_the_limits_are_refused(device: Device, tmp_path: Path, 
         assert ComputeProgram(device, shader).pipeline
 
 
-def test_a_device_that_is_dropped_begins_nothing_more(device: Device) -> None:
+def test_dropped_device_starts_no_more_work(device: Device) -> None:
     """Check that no compilation starts after the device is dropped, which would delay exit."""
     gate = threading.Event()
     dropped = open_device(device.adapter.name)

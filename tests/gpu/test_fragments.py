@@ -11,7 +11,7 @@ from dermis.gpu import CommandList, Device, RenderProgram, download, make_textur
 SIZE = (37, 21)
 
 
-def test_every_texel_of_all_targets_is_drawn_at_its_place(device: Device) -> None:
+def test_fragments_fill_every_texel_of_all_targets(device: Device) -> None:
     program = RenderProgram(
         device,
         Path(__file__).parent / "places.wgsl",

@@ -42,7 +42,7 @@ class Chain:
         return float(download(self.graph.device, self.textures[index])[0, 0])
 
 
-def test_what_is_there_does_not_run_again(device: Device, scale: ComputeProgram) -> None:
+def test_valid_stages_do_not_run_again(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale, 3)
     assert chain.frame((0, 1, 2.0), (1, 2, 3.0), (2, 3, 5.0)) == ["0-1", "1-2", "2-3"]
     assert chain.frame((0, 1, 2.0), (1, 2, 3.0), (2, 3, 5.0)) == []
@@ -51,7 +51,7 @@ def test_what_is_there_does_not_run_again(device: Device, scale: ComputeProgram)
     assert chain.value(3) == 4.0 * 3.0 * 7.0
 
 
-def test_who_forgets_runs_everything(device: Device, scale: ComputeProgram) -> None:
+def test_clearing_the_cache_runs_everything(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale, 2)
     passes = (0, 1, 2.0), (1, 2, 3.0)
     for _ in range(2):
@@ -60,7 +60,7 @@ def test_who_forgets_runs_everything(device: Device, scale: ComputeProgram) -> N
     assert chain.frame(*passes) == []
 
 
-def test_what_another_frame_left_there_is_replaced(device: Device, scale: ComputeProgram) -> None:
+def test_results_of_other_frames_are_replaced(device: Device, scale: ComputeProgram) -> None:
     """Check that a pass runs again after another frame has overwritten its output.
 
     This includes the case in which the output of a later pass is still valid.
@@ -72,7 +72,7 @@ def test_what_another_frame_left_there_is_replaced(device: Device, scale: Comput
     assert (chain.value(1), chain.value(2), chain.value(3)) == (2.0, 6.0, 15.0)
 
 
-def test_scratch_may_hold_anything(device: Device, scale: ComputeProgram) -> None:
+def test_scratch_resources_may_have_any_content(device: Device, scale: ComputeProgram) -> None:
     """Check that no pass runs only to update a scratch texture."""
     chain = Chain(device, scale, 3)
     mark_scratch(device, chain.textures[1])
@@ -83,9 +83,7 @@ def test_scratch_may_hold_anything(device: Device, scale: ComputeProgram) -> Non
     assert (chain.value(2), chain.value(3)) == (8.0, 15.0)
 
 
-def test_what_is_written_twice_in_a_frame_is_read_as_it_was_then(
-    device: Device, scale: ComputeProgram
-) -> None:
+def test_resource_written_twice_is_read_in_order(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale, 3)
     passes = (0, 1, 2.0), (1, 2, 1.0), (0, 1, 3.0), (1, 3, 1.0)
     assert chain.frame(*passes) == ["0-1", "1-2", "0-1", "1-3"]
@@ -94,7 +92,7 @@ def test_what_is_written_twice_in_a_frame_is_read_as_it_was_then(
     assert (chain.value(1), chain.value(2), chain.value(3)) == (3.0, 10.0, 3.0)
 
 
-def test_a_pass_is_the_same_after_however_many_others(device: Device, scale: ComputeProgram) -> None:
+def test_pass_result_does_not_depend_on_preceding_passes(device: Device, scale: ComputeProgram) -> None:
     """Check a pass at many positions of its record, in more kinds of frames than are cached."""
     chain = Chain(device, scale, 20)
     for _ in range(2):
@@ -105,7 +103,9 @@ def test_a_pass_is_the_same_after_however_many_others(device: Device, scale: Com
 
 
 @pytest.mark.parametrize("looks_at_view", [True, False])
-def test_a_view_and_its_texture_are_one(device: Device, scale: ComputeProgram, looks_at_view: bool) -> None:
+def test_view_and_texture_share_their_state(
+    device: Device, scale: ComputeProgram, looks_at_view: bool
+) -> None:
     """Check that writes to a texture are seen through its view, and vice versa, in later frames too."""
     graph, image = Graph(device), texture_from_array(device, np.ones(SIZE[::-1], np.float32), "r32float")
     whole, copy = (make_texture(device, SIZE, "r32float") for _ in range(2))
@@ -131,13 +131,13 @@ def test_a_view_and_its_texture_are_one(device: Device, scale: ComputeProgram, l
         assert frame((read, copy, 1.0)) == 0
 
 
-def test_what_nobody_needs_does_not_run(device: Device, scale: ComputeProgram) -> None:
+def test_unneeded_stages_do_not_run(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale, 1)
     assert chain.frame((0, 1, 2.0), (0, 1, 3.0)) == ["0-1"]
     assert chain.value(1) == 3.0
 
 
-def test_layers_are_kept_apart_and_their_texture_is_all_of_them(device: Device) -> None:
+def test_layers_are_tracked_separately_and_together(device: Device) -> None:
     whole = make_texture(device, SIZE, "r32float", layers=2)
     options = {"dimension": "2d", "array_layer_count": 1}
     layers = [whole.create_view(base_array_layer=k, **options) for k in range(2)]
@@ -173,7 +173,7 @@ def test_a_frame_that_failed_is_run_again(
     assert chain.frame(*passes) == ["0-1", "1-2"]
 
 
-def test_bytes_that_are_fetched_are_those_after_all_passes(device: Device) -> None:
+def test_downloaded_bytes_are_those_after_all_passes(device: Device) -> None:
     graph, buffer = Graph(device), device.buffer(np.arange(4, dtype=np.uint32), "STORAGE")
     graph.begin()
     fetched = graph.read_back(buffer)

@@ -33,7 +33,7 @@ def run(device: Device, image: NDArray[np.float64], places: NDArray[np.float64])
     return download(device, read).astype(float), download(device, encoded).astype(float)
 
 
-def test_bilinear_reading(device: Device) -> None:
+def test_bilinear_sampling_matches_numpy(device: Device) -> None:
     rng = np.random.default_rng(3)
     image, places = rng.random((11, 17, 4)), rng.uniform(-0.2, 1.2, (40, 30, 2))
     read, _ = run(device, image, places)
@@ -45,7 +45,7 @@ def test_bilinear_reading(device: Device) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.004, 1.0, 3.0])
-def test_srgb_encoding(device: Device, scale: float) -> None:
+def test_srgb_encoding_matches_numpy(device: Device, scale: float) -> None:
     """Check dark values (the linear part), display values, and values above white, which become white."""
     values = np.linspace(-0.1, 1.0, 4 * 256).reshape(16, 16, 4) * scale
     centres = (np.mgrid[:16, :16][::-1].transpose(1, 2, 0) + 0.5) / 16

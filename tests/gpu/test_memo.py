@@ -35,11 +35,11 @@ class Log:
     ("depth", "keys", "expected"),
     [(1, "aabba", "aba"), (2, "abab", "ab"), (2, "abcab", "abcab"), (2, "abacab", "abcb")],
 )
-def test_the_things_used_last_are_kept(depth: int, keys: str, expected: str) -> None:
+def test_most_recently_used_results_are_kept(depth: int, keys: str, expected: str) -> None:
     assert Log().asked(Memo(depth), keys) == expected
 
 
-def test_room_is_made_before_a_thing_is() -> None:
+def test_memory_is_freed_before_a_new_result_is_computed() -> None:
     """Check that an old result is dropped before a new one is computed, to limit memory."""
     memo, log, left = Memo(2), Log(), list[Any]()
 
@@ -54,7 +54,7 @@ def test_room_is_made_before_a_thing_is() -> None:
 
 
 @pytest.mark.parametrize(("depth", "asked", "rounds"), [(1, 1, 1), (2, 1, 4), (1, 3, 3), (2, 3, 4)])
-def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, asked: int, rounds: int) -> None:
+def test_unused_results_expire(depth: int, asked: int, rounds: int) -> None:
     memo, log = Memo(depth, asked), Log()
     for more, expected in ((0, ""), (rounds, "a")):
         log.asked(memo, "a")
@@ -63,7 +63,7 @@ def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, asked: int, rou
         assert log.asked(memo, "a") == expected
 
 
-def test_parts_of_what_is_asked_for_stay() -> None:
+def test_inputs_of_used_results_are_kept() -> None:
     """Check that nested results stay cached while only the outer result is requested."""
     memo, log = Memo(), Log()
 
@@ -76,7 +76,7 @@ def test_parts_of_what_is_asked_for_stay() -> None:
     assert log.asked(memo, "a") == ""
 
 
-def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
+def test_inputs_of_used_results_count_as_recently_used() -> None:
     """Check that using a result marks its nested results as recently used."""
     memo, log = Memo(2), Log()
 
@@ -88,21 +88,21 @@ def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
     assert log.asked(memo, "acb") == "b"
 
 
-def test_forgetting_makes_everything_again() -> None:
+def test_clearing_recomputes_everything() -> None:
     memo, log = Memo(3), Log()
     log.asked(memo, "abc")
     memo.clear()
     assert log.asked(memo, "abc") == "abc"
 
 
-def test_owners_keep_their_own() -> None:
+def test_owners_have_separate_results() -> None:
     memo, log = Memo(), Log()
     for owner, key in (("left", "a"), ("right", "b"), ("left", "a"), ("right", "b")):
         assert memo.get(log.make, key, owner=owner) == key.upper()
     assert log.made == "ab"
 
 
-def test_what_makes_no_other_result_is_not_compared() -> None:
+def test_arguments_without_effect_are_not_compared() -> None:
     memo = Memo()
     assert [memo.get(max, 1, untracked=(more,)) for more in (5, 7)] == [5, 5]
 
@@ -120,7 +120,7 @@ class Thing:
     number: int = 0
 
 
-def test_arguments_are_the_same_by_what_they_say() -> None:
+def test_arguments_are_compared_by_value() -> None:
     thing = Thing()
     ones = np.ones(3)
     alike: list[tuple[Any, Any]] = [
@@ -153,7 +153,7 @@ def executor() -> Iterator[ThreadPoolExecutor]:
         yield made
 
 
-def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
+def test_failures_are_not_cached(executor: ThreadPoolExecutor) -> None:
     memo, tries = Memo(), list[int]()
 
     def fail() -> int:
@@ -169,7 +169,7 @@ def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
     assert len(tries) == 3
 
 
-def test_equal_arguments_are_compared_by_what_they_say_only_once() -> None:
+def test_equal_arguments_are_compared_by_value_once() -> None:
     """Check that an equal copy of an argument is compared by value only the first time."""
 
     class Counted:

@@ -30,7 +30,7 @@ ASKED = (
 )
 
 
-def test_types_are_cffis_own() -> None:
+def test_types_equal_those_of_cffi() -> None:
     told, plain = cffi.FFI(), cffi.FFI()
     for ffi in (told, plain):
         ffi.cdef(HEADER)
@@ -52,7 +52,7 @@ def test_types_are_cffis_own() -> None:
     assert told.typeof("Colour []") is told.typeof("Colour[]")
 
 
-def test_wgpu_is_told_what_it_asks_for() -> None:
+def test_wgpu_receives_the_types_it_requests() -> None:
     """Check that all names are registered that wgpu looks up."""
     from wgpu.backends.wgpu_native import ffi
 
@@ -67,5 +67,5 @@ def test_wgpu_is_told_what_it_asks_for() -> None:
 
 
 @pytest.mark.parametrize("broken", [object(), None])
-def test_another_cffi_is_left_alone(broken: object) -> None:
+def test_other_cffi_instances_are_unchanged(broken: object) -> None:
     assert register_types(broken) == 0

@@ -64,7 +64,7 @@ def test_a_picture_under_a_limit_is_drawn_or_refused(folder: Path, limit: float)
 
 
 @pytest.mark.parametrize("limit", [1.0, 1.8])
-def test_a_machine_under_a_limit_is_not_healthy(folder: Path, limit: float) -> None:
+def test_doctor_reports_a_memory_limit(folder: Path, limit: float) -> None:
     ended = limited(limit * GB, folder, "doctor", "--adapter", "cpu")
     said = ended.stdout + ended.stderr  # as adapters are listed, or as one is opened
     assert ended.returncode == 2 and "Traceback" not in said
@@ -72,12 +72,12 @@ def test_a_machine_under_a_limit_is_not_healthy(folder: Path, limit: float) -> N
 
 
 @pytest.mark.parametrize("words", [["--help"], ["cite"], ["lights", "window"], ["profile", "skin1"]])
-def test_what_takes_no_device_works_under_a_limit(folder: Path, words: list[str]) -> None:
+def test_commands_without_device_work_under_a_limit(folder: Path, words: list[str]) -> None:
     ended = limited(0.6 * GB, folder, *words)
     assert ended.returncode == 0 and ended.stdout, ended.stderr[-1000:]
 
 
-def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_grows_with_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "_address_space_limit", lambda: 3.0 * GB)
     monkeypatch.setattr(memory, "_address_space_used", lambda: 0.5 * GB)
     monkeypatch.setenv("LP_NUM_THREADS", "2")
@@ -88,7 +88,7 @@ def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
         memory.check_software_address_space()
 
 
-def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_control_group_limit_is_below_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Check the memory limit of a control group, as in containers."""
     machine, group = memory.main_memory(), tmp_path / "job"
     group.mkdir()

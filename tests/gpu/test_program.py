@@ -15,12 +15,12 @@ from dermis.gpu import ComputeProgram, Device, cached_program, program
 SHADER = Path(__file__).parent / "scale.wgsl"
 
 
-def test_a_pipeline_is_the_same_each_time(device: Device) -> None:
+def test_pipelines_are_cached(device: Device) -> None:
     program = ComputeProgram(device, SHADER)
     assert program.pipeline is program.pipeline
 
 
-def test_what_does_not_compile_is_told_to_who_needs_it(device: Device) -> None:
+def test_compile_error_reaches_the_caller(device: Device) -> None:
     """Check that a compilation error is raised whenever the pipeline is used."""
     program = ComputeProgram(device, SHADER, constants={"NO_SUCH_SWITCH": 1})
     for _ in range(2):
@@ -53,13 +53,13 @@ def made(device: Device, monkeypatch: pytest.MonkeyPatch) -> Made:
     return Made()
 
 
-def test_going_back_and_forth_compiles_nothing(device: Device, made: Made) -> None:
+def test_switching_back_compiles_nothing(device: Device, made: Made) -> None:
     first = made.found(device, (1, 2, 3))
     assert made.found(device, (1, 2, 3, 1)) == [*first, first[0]]
     assert made.constants == [{"MODEL": 1}, {"MODEL": 2}, {"MODEL": 3}]
 
 
-def test_the_one_used_longest_ago_goes(device: Device, made: Made) -> None:
+def test_least_recently_used_pipeline_is_dropped(device: Device, made: Made) -> None:
     made.found(device, (1, 2, 3, 1, 4, 1, 3, 2))
     assert [one["MODEL"] for one in made.constants] == [1, 2, 3, 4, 2]
 

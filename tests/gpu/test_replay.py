@@ -49,20 +49,20 @@ class Chain:
         return download(self.graph.device, self.textures[2])
 
 
-def test_later_frames_do_the_same_with_other_light(device: Device, scale: ComputeProgram) -> None:
+def test_replayed_frames_use_new_light(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     for value in (1.0, 2.0, 5.0):
         assert np.array_equal(chain.drawn(value), np.full(SIZE[::-1], 9 * value))
     assert chain.recorded == 1
 
 
-def test_other_arguments_are_recorded_anew(device: Device, scale: ComputeProgram) -> None:
+def test_changed_arguments_are_recorded_again(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     assert [chain.drawn(1.0, factor)[0, 0] for factor in (3.0, 3.0, 2.0)] == [9.0, 9.0, 4.0]
     assert chain.recorded == 2
 
 
-def test_going_back_and_forth_records_each_once(device: Device, scale: ComputeProgram) -> None:
+def test_alternating_arguments_are_recorded_once_each(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     for _ in range(3):
         for factor in (2.0, 3.0, 4.0):
@@ -70,19 +70,19 @@ def test_going_back_and_forth_records_each_once(device: Device, scale: ComputePr
     assert chain.recorded == 3
 
 
-def test_those_used_long_ago_are_recorded_anew(device: Device, scale: ComputeProgram) -> None:
+def test_expired_recordings_are_recorded_again(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     for factor in (0.0, 1.0, 0.0, 2.0, 3.0, 4.0, 0.0, 1.0):  # 1 has gone when 4 came
         chain.drawn(1.0, factor)
     assert chain.recorded == 6
 
 
-def test_what_the_recording_returned_comes_again(device: Device, scale: ComputeProgram) -> None:
+def test_replay_returns_the_recorded_result(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     assert [chain.repeated(factor) for factor in (2.0, 3.0, 2.0)] == [10.0, 20.0, 10.0]
 
 
-def test_numbers_of_other_frames_do_not_come_in_between(device: Device, scale: ComputeProgram) -> None:
+def test_uniforms_of_other_frames_do_not_interfere(device: Device, scale: ComputeProgram) -> None:
     chain, other = Chain(device, scale), Chain(device, scale)
     chain.drawn(1.0)
     frame = CommandList(device)
@@ -91,7 +91,7 @@ def test_numbers_of_other_frames_do_not_come_in_between(device: Device, scale: C
     assert chain.drawn(1.0)[0, 0] == 9.0
 
 
-def test_a_recording_keeps_nothing_alive(device: Device, scale: ComputeProgram) -> None:
+def test_recording_does_not_keep_arguments_alive(device: Device, scale: ComputeProgram) -> None:
     chain = Chain(device, scale)
     chain.drawn(1.0)
     gone = weakref.ref(chain.textures[1])
@@ -101,7 +101,7 @@ def test_a_recording_keeps_nothing_alive(device: Device, scale: ComputeProgram) 
     assert chain.recorded == 2
 
 
-def test_a_recording_whose_arguments_live_may_be_void_too(device: Device, scale: ComputeProgram) -> None:
+def test_recording_may_be_void_while_its_arguments_live(device: Device, scale: ComputeProgram) -> None:
     """Check that a recording becomes invalid when a resource is released that is not among its arguments."""
     chain, graph, held = Chain(device, scale), Graph(device), [make_texture(device, SIZE, "r32float")]
 

@@ -40,7 +40,7 @@ struct S {
         (NESTED, {"count": 0, "inner": 16, "weight": 64, "last": 96}, 112),
     ],
 )
-def test_offsets(text: str, offsets: dict[str, int], size: int) -> None:
+def test_member_offsets_follow_wgsl_rules(text: str, offsets: dict[str, int], size: int) -> None:
     dtype = struct_dtype(text, "S")
     assert {name: dtype.fields[name][1] for name in dtype.names or ()} == offsets
     assert dtype.itemsize == size
@@ -52,7 +52,7 @@ def test_nested_elements_are_records() -> None:
     assert inner.base.fields["k"][1] == 12
 
 
-def test_unknown_struct() -> None:
+def test_unknown_struct_is_refused() -> None:
     with pytest.raises(DermisError, match="struct Gone"):
         struct_dtype(TIGHT, "Gone")
 
@@ -118,7 +118,7 @@ def fill(record: Any, member: str, numbers: Any) -> list[int]:
         ),
     ],
 )
-def test_binding_entries(declaration: str, entry: dict[str, Any]) -> None:
+def test_bindings_give_layout_entries(declaration: str, entry: dict[str, Any]) -> None:
     (found,) = shader_bindings(f"@group(0) @binding(7) {declaration}")
     assert (found.index, found.name, found.entry) == (7, "x", entry)
 
@@ -129,7 +129,7 @@ def test_bindings_come_in_order() -> None:
 
 
 @pytest.mark.parametrize("path", SHADERS, ids=lambda p: p.stem)
-def test_every_binding_of_the_package_is_understood(path: Path) -> None:
+def test_every_binding_of_the_package_is_parsed(path: Path) -> None:
     """Check that the parser skips no declaration."""
     text = path.read_text(encoding="utf-8")
     assert len(shader_bindings(text)) == text.count("@binding(")

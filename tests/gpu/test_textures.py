@@ -22,7 +22,7 @@ def noise(shape: tuple[int, int], texel: str, seed: int = 0) -> NDArray[np.gener
 
 @pytest.mark.parametrize("texel", MAPS)
 @pytest.mark.parametrize("size", [(64, 4), (67, 5), (1, 1), (3, 70)])
-def test_round_trip(device: Device, texel: str, size: tuple[int, int]) -> None:
+def test_upload_and_download_round_trip(device: Device, texel: str, size: tuple[int, int]) -> None:
     array = noise(size[::-1], texel)
     back = download(device, texture_from_array(device, array, texel))
     assert back.dtype == array.dtype
@@ -30,7 +30,7 @@ def test_round_trip(device: Device, texel: str, size: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("texel", ["rgba32float", "r16float", "rgba8unorm"])
-def test_every_mip(device: Device, texel: str) -> None:
+def test_every_mip_is_uploaded(device: Device, texel: str) -> None:
     texture = make_texture(device, (37, 10), texel, mips=6, use="map")
     sizes = [(10, 37), (5, 18), (2, 9), (1, 4), (1, 2), (1, 1)]
     levels = [noise(size, texel, seed) for seed, size in enumerate(sizes)]
@@ -39,7 +39,7 @@ def test_every_mip(device: Device, texel: str) -> None:
     assert all(np.array_equal(download(device, texture, mip=m), level) for m, level in enumerate(levels))
 
 
-def test_every_layer(device: Device) -> None:
+def test_every_layer_is_uploaded(device: Device) -> None:
     texture = make_texture(device, (13, 7), "rgba16float", layers=3, use="map")
     layers = [noise((7, 13), "rgba16float", seed) for seed in range(3)]
     for k in (2, 0, 1):
@@ -47,7 +47,7 @@ def test_every_layer(device: Device) -> None:
     assert all(np.array_equal(download(device, texture, layer=k), layers[k]) for k in range(3))
 
 
-def test_a_view_of_an_array_uploads_its_own_values(device: Device) -> None:
+def test_view_of_an_array_uploads_only_its_values(device: Device) -> None:
     array = noise((20, 22), "r32float")[::2, 1::2]
     assert np.array_equal(download(device, texture_from_array(device, array, "r32float")), array)
 

@@ -17,20 +17,20 @@ def write(folder: Path, **files: str) -> Path:
     return folder
 
 
-def test_each_line_knows_its_file(tmp_path: Path) -> None:
+def test_each_line_has_its_source_file(tmp_path: Path) -> None:
     write(tmp_path, main='// a\n//#include "part.wgsl"\n// b', part="// one\n// two")
     source = compose(tmp_path / "main.wgsl", ())
     assert source.text.splitlines() == ["// a", "// one", "// two", "// b"]
     assert source.origin == (("main.wgsl", 1), ("part.wgsl", 1), ("part.wgsl", 2), ("main.wgsl", 3))
 
 
-def test_an_include_comes_once_even_in_a_circle(tmp_path: Path) -> None:
+def test_cyclic_include_is_inserted_once(tmp_path: Path) -> None:
     circle = '//#include "a.wgsl"\n//#include "b.wgsl"\n// '
     write(tmp_path, a=f"{circle}a", b=f"{circle}b", main=f"{circle}main")
     assert compose(tmp_path / "main.wgsl", ()).text.splitlines() == ["// b", "// a", "// main"]
 
 
-def test_beside_the_asker_comes_before_the_folders(tmp_path: Path) -> None:
+def test_neighbouring_file_precedes_include_folders(tmp_path: Path) -> None:
     for name in ("near", "far"):
         (tmp_path / name).mkdir()
         write(tmp_path / name, part=f"// {name}")
@@ -48,7 +48,7 @@ def test_missing_include_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "lines"), [((), "cd"), (("A",), "a"), (("A", "B"), "ab"), (("B",), "cd")]
 )
-def test_lines_of_options(tmp_path: Path, options: tuple[str, ...], lines: str) -> None:
+def test_lines_of_options_are_selected(tmp_path: Path, options: tuple[str, ...], lines: str) -> None:
     text = '//#if A\na\n//#if B\nb\n//#end\n//#else\nc\n//#include "part.wgsl"\n//#end'
     write(tmp_path, main=text, part="d")
     folder = ShaderFolder(tmp_path, options=frozenset(options))
@@ -71,7 +71,7 @@ def test_only_whole_lines_include(tmp_path: Path) -> None:
     assert compose(tmp_path / "main.wgsl", ()).text == text
 
 
-def test_a_list_is_included_and_repeated_as_it_grows(tmp_path: Path) -> None:
+def test_growing_list_of_includes_is_repeated(tmp_path: Path) -> None:
     write(
         tmp_path,
         main="//#include <pets>\n    //#each pets: {name} {NAME} {number} {legs}",
@@ -90,7 +90,7 @@ def test_a_list_is_included_and_repeated_as_it_grows(tmp_path: Path) -> None:
     assert source.origin[-2:] == (("main.wgsl", 2), ("main.wgsl", 2))
 
 
-def test_numbers_of_python_are_filled_in(tmp_path: Path) -> None:
+def test_python_constants_are_substituted(tmp_path: Path) -> None:
     write(tmp_path, main="//#fill const A: f32 = {a}; // {b} of them")
     folder = ShaderFolder(tmp_path, numbers=lambda: {"a": 0.25, "b": 3})
     assert compose(tmp_path / "main.wgsl", (folder,)).text == "const A: f32 = 0.25; // 3 of them"
@@ -105,7 +105,7 @@ def test_numbers_of_python_are_filled_in(tmp_path: Path) -> None:
         ("//#each pets: {gone}", "a word of name, NAME, number, but got {gone}"),
     ],
 )
-def test_what_nobody_gives_is_named(tmp_path: Path, text: str, error: str) -> None:
+def test_missing_constant_is_named(tmp_path: Path, text: str, error: str) -> None:
     write(tmp_path, main=text)
     pets = [ShaderListMember("cat", tmp_path / "cat.wgsl")]
     folder = ShaderFolder(tmp_path, {"pets": lambda: pets}, lambda: {"a": 1})
@@ -124,7 +124,7 @@ def test_compile_error_names_file_and_line_of_an_include(device: Device, tmp_pat
         ComputeProgram(device, tmp_path / "main.wgsl")
 
 
-def test_lines_of_other_files_stay_as_they_are(tmp_path: Path) -> None:
+def test_lines_of_other_files_are_unchanged(tmp_path: Path) -> None:
     write(tmp_path, main="// only")
     source = compose(tmp_path / "main.wgsl", ())
     assert source.locate("wgsl:1:4 and wgsl:99:1") == "main.wgsl:1:4 and wgsl:99:1"

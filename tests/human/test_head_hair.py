@@ -60,7 +60,7 @@ def test_the_same_seed_has_the_same_hair() -> None:
     assert len(another) != len(one) or not np.array_equal(another.roots.position, one.roots.position)
 
 
-def test_roots_are_as_dense_as_is_said() -> None:
+def test_root_density_is_as_given() -> None:
     mesh, rng = Human().head(subdivide=0).mesh, np.random.default_rng(0)
     found = density.sample_roots(mesh, density.HairDensity(everywhere, ALL), 40.0, rng)
     quads, count = np.unique(found.quad, return_counts=True)
@@ -71,7 +71,7 @@ def test_roots_are_as_dense_as_is_said() -> None:
 
 
 @pytest.mark.parametrize("relative", [0.3, 1.0])
-def test_fewer_hairs_stand_for_all_there_are(relative: float) -> None:
+def test_fewer_hairs_are_widened_to_represent_all(relative: float) -> None:
     """Check that the total width per cm2 of the crown is that of 200 hairs times the density."""
     head = Human(hair=HairLook(style="cropped", density=relative)).head(subdivide=0)
     strands, place = hair(head), knots(head)[:, 0]
@@ -84,7 +84,7 @@ def test_fewer_hairs_stand_for_all_there_are(relative: float) -> None:
     )
 
 
-def test_a_share_of_hairs_covers_as_much_as_all() -> None:
+def test_fraction_of_hairs_keeps_the_coverage() -> None:
     all_of_them, few = (hair(Human(hair=HairLook(style="short")).head(hairs=share)) for share in (1.0, 0.25))
     assert len(few) == pytest.approx(0.25 * len(all_of_them), rel=0.03)
     assert few.radius_mm.mean() == pytest.approx(4 * all_of_them.radius_mm.mean(), rel=0.03)
@@ -115,7 +115,7 @@ def test_no_hair_enters_the_head(style: str) -> None:
     assert (over[:, 1:] > -0.5).mean() > 0.995 and np.percentile(over[:, 1:], 0.1) > -1.0
 
 
-def test_hair_is_as_long_as_is_said() -> None:
+def test_hair_has_the_given_length() -> None:
     for millimetres in (4.0, 9.0):
         head = Human(hair=HairLook(style="cropped", length_mm=millimetres)).head(subdivide=0)
         length = np.linalg.norm(np.diff(knots(head), axis=1), axis=2).sum(axis=1)
@@ -123,7 +123,7 @@ def test_hair_is_as_long_as_is_said() -> None:
         assert np.percentile(length, 99.9) < 2.2 * millimetres
 
 
-def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
+def test_hair_moves_with_the_head_and_not_with_expressions() -> None:
     head = grown("short")
     still, open_ = knots(head), knots(head, jawOpen=1.0)
     chin = (still[:, 0, 1] < -85) & (still[:, 0, 2] > -20)
@@ -134,7 +134,7 @@ def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
 @pytest.mark.parametrize(
     "where", [density.scalp_density(0.0), density.scalp_density(0.8), density.beard_density()]
 )
-def test_no_hair_is_lost_where_none_is_looked_for(where: density.HairDensity) -> None:
+def test_sparse_search_loses_no_hair(where: density.HairDensity) -> None:
     mesh = Human().head(subdivide=0).mesh
     both = where, where._replace(candidates=ALL)
     some, every = (density.sample_roots(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
@@ -143,7 +143,7 @@ def test_no_hair_is_lost_where_none_is_looked_for(where: density.HairDensity) ->
 
 
 @pytest.mark.parametrize("seed", [2, 11, 30])
-def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+def test_hair_lies_on_all_skin(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     def every(root_finder: RootFinder, _: bool) -> NDArray[np.int64]:
         return np.arange(len(root_finder.subdivided_mesh.positions))
 
@@ -163,7 +163,7 @@ def test_recession_bares_temples_and_crown() -> None:
     assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
 
 
-def test_who_has_which_hair() -> None:
+def test_hair_depends_on_the_person() -> None:
     people = [Human.drawn(seed) for seed in range(200)]
     men, women = ([one for one in people if (one.sex > 0.5) == man] for man in (True, False))
     bald = [np.mean([one.hairdo.style == "none" for one in group]) for group in (men, women)]
@@ -188,7 +188,7 @@ def test_grey_hair_is_grey_and_fair_hair_is_not() -> None:
 
 
 @pytest.mark.parametrize("bad", [{"style": "bob"}, {"length_mm": 100.0}, {"density": -1.0}, {"seed": 0.5}])
-def test_what_is_no_hair_is_refused(bad: dict[str, object]) -> None:
+def test_invalid_hair_is_refused(bad: dict[str, object]) -> None:
     with pytest.raises(DermisError):
         HairLook(**bad)  # type: ignore[arg-type]
 

@@ -14,13 +14,13 @@ DATA = Path(__file__).parents[2] / "src" / "dermis" / "human" / "data"
 MOST_BYTES = 2_500_000
 
 
-def test_it_is_small_and_says_whose_it_is() -> None:
+def test_data_is_small_and_states_its_licence() -> None:
     assert (DATA / "human.npz").stat().st_size < MOST_BYTES
     assert "CC0 1.0" in (DATA / "LICENCE.md").read_text("utf-8")
 
 
 @pytest.mark.samples
-def test_it_is_what_the_tool_makes(
+def test_data_equals_the_output_of_the_tool(
     sample_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(TOOLS))
@@ -38,7 +38,7 @@ def test_it_is_what_the_tool_makes(
 
 
 @pytest.mark.samples
-def test_the_average_person_is_what_the_tool_measures(
+def test_average_person_equals_the_output_of_the_tool(
     sample_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(TOOLS))
@@ -52,7 +52,7 @@ def test_the_average_person_is_what_the_tool_measures(
         assert np.abs(made["fields"].astype(int) - kept["fields"]).max() <= 20  # hundredths of a mm
 
 
-def test_the_tile_of_detail_is_what_the_tool_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_detail_tile_equals_the_output_of_the_tool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(TOOLS))
     import human_detail
     from PIL import Image
@@ -65,7 +65,7 @@ def test_the_tile_of_detail_is_what_the_tool_makes(tmp_path: Path, monkeypatch: 
     assert np.abs(made - kept).max() <= 1
 
 
-def test_the_tile_goes_on_over_its_edges() -> None:
+def test_detail_tile_is_periodic() -> None:
     """Check that slopes at the edges are not steeper than inside."""
     slopes = np.abs(detail_slopes()[..., 2:])
     edge = np.concatenate([slopes[0], slopes[-1], slopes[:, 0], slopes[:, -1]])

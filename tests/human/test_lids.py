@@ -62,7 +62,7 @@ def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Float
     return own, far - surface
 
 
-def test_the_ball_is_of_true_size() -> None:
+def test_eyeball_has_its_real_size() -> None:
     assert SCLERA_MM == 12.0 and 24.0 < SCLERA_MM + apex_mm() < 25.5  # an adult's eye is 24 to 25 mm long
 
 
@@ -95,7 +95,7 @@ def test_without_contact_a_lid_that_travels_straight_cuts_into_the_eye(seed: int
 
 
 @pytest.mark.parametrize("seed", [*PEOPLE, *range(30, 40)])
-def test_closed_lids_meet(seed: int | None) -> None:
+def test_closed_lids_touch(seed: int | None) -> None:
     """Check that the upper crest ends slightly below the lower one."""
     own, _ = rings(seed, {"eyeBlinkLeft": 1.0})
     lower = own[LOW, CREST][::-1]
@@ -126,7 +126,7 @@ def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
     assert edge.max() < 1.0
 
 
-def test_lids_follow_who_has_another_head() -> None:
+def test_lids_fit_other_people() -> None:
     """Check that contact uses the positions of that person's eyes."""
     head, other = head_of(None), Human.drawn(7)
     motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)

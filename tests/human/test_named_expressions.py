@@ -16,14 +16,14 @@ from dermis.human.movement import expression_targets
 ROOT = Path(__file__).parent.parent.parent
 
 
-def test_all_move_what_the_human_has() -> None:
+def test_all_expressions_move_existing_targets() -> None:
     known = set(expression_targets().names)
     for name, weights in EXPRESSIONS.items():
         assert expression(name).keys() == set(expand_targets(weights)) <= known
         assert all(0 < weight <= 1 for weight in weights.values())
 
 
-def test_a_name_without_a_side_is_both() -> None:
+def test_name_without_a_side_means_both_sides() -> None:
     assert expression("faint-smile") == {
         f"{name}{side}": 0.35 for name in ("mouthSmile", "cheekSquint") for side in ("Left", "Right")
     }
@@ -32,7 +32,7 @@ def test_a_name_without_a_side_is_both() -> None:
         expression("simle")
 
 
-def test_one_from_outside_is_known_to_data_sets() -> None:
+def test_plugin_expression_is_usable_in_data_sets() -> None:
     with EXPRESSIONS.including("sly", {"mouthSmileLeft": 0.3}):
         assert dermis.Pose(expression("sly")).weights == {"mouthSmileLeft": 0.3}
         parse_spec({"count": 10, "expression": {"name": "sly"}})
@@ -41,7 +41,7 @@ def test_one_from_outside_is_known_to_data_sets() -> None:
 
 
 @pytest.mark.parametrize("folder", ["src", "gallery", "tools", "benchmarks"])
-def test_no_other_file_states_an_expression(folder: str) -> None:
+def test_expressions_are_defined_in_one_file(folder: str) -> None:
     """Find dictionaries and calls with weights of two ARKit shapes."""
     known = set(expression_targets().names)
     known |= {name.removesuffix(side) for name in known for side in ("Left", "Right")}

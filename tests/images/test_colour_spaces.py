@@ -117,7 +117,7 @@ def test_neutral_stays_neutral_in_every_space(levels: Levels) -> None:
         np.testing.assert_allclose(grey, 0.5, rtol=2e-4)
 
 
-def test_a_known_colour_of_display_p3() -> None:
+def test_known_display_p3_colour_is_converted() -> None:
     """Check P3's red in linear sRGB: (1.2249, -0.0420, -0.0197), as CSS Color 4 converts it."""
     space = coded_space(12, 13)
     assert space is not None and space.to_rec709 is not None
@@ -125,7 +125,7 @@ def test_a_known_colour_of_display_p3() -> None:
     np.testing.assert_array_equal(space.linear(np.uint8([[[255, 0, 0]]])), [[[1.0, 0.0, 0.0]]])
 
 
-def test_grey_and_its_profile(tmp_path: Path, levels: Levels) -> None:
+def test_grey_with_profile_is_converted(tmp_path: Path, levels: Levels) -> None:
     path = tmp_path / "a.png"
     path.write_bytes(encoded(levels[..., 0], "PNG", icc_profile=grey_profile("Grey 1.8", 1.8)))
     with pytest.warns(DermisWarning, match=r"from Grey 1\.8 to sRGB"):
@@ -137,7 +137,7 @@ def test_grey_and_its_profile(tmp_path: Path, levels: Levels) -> None:
     np.testing.assert_allclose(found, np.repeat(decode_srgb(levels[..., :1] / 255.0), 3, -1), atol=1e-6)
 
 
-def test_a_profile_of_tables_is_converted_at_8_bits(tmp_path: Path, levels: Levels) -> None:
+def test_table_based_profile_is_converted_at_8_bits(tmp_path: Path, levels: Levels) -> None:
     def lab(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
         r, g, b = rgb.T
         return np.stack([100.0 * (0.2 * r + 0.7 * g + 0.1 * b), 60.0 * (r - g), 60.0 * (g - b)], axis=-1)
@@ -171,7 +171,7 @@ def test_profiles_that_cannot_be_used_are_noted(
     np.testing.assert_array_equal(pixels, levels)
 
 
-def test_names_of_profiles_do_not_reach_the_terminal_as_they_are(tmp_path: Path, levels: Levels) -> None:
+def test_profile_names_are_escaped_in_notes(tmp_path: Path, levels: Levels) -> None:
     path = tmp_path / "a.png"
     path.write_bytes(
         encoded(levels, "PNG", icc_profile=rgb_profile("P3\x1b[31m" + 90 * "x", DISPLAY_P3, 2.2))
@@ -181,7 +181,7 @@ def test_names_of_profiles_do_not_reach_the_terminal_as_they_are(tmp_path: Path,
     assert "\x1b" not in str(notes[0].message) and len(str(notes[0].message)) < len(str(path)) + 120
 
 
-def test_maps_of_numbers_are_not_converted(tmp_path: Path, levels: Levels) -> None:
+def test_non_colour_maps_are_not_converted(tmp_path: Path, levels: Levels) -> None:
     path = tmp_path / "a.png"
     path.write_bytes(encoded(levels, "PNG", icc_profile=rgb_profile("P3", DISPLAY_P3, SRGB_CURVE)))
     np.testing.assert_array_equal(read_image(path), levels)
@@ -252,7 +252,7 @@ def test_avif_states_code_points(tmp_path: Path) -> None:
         np.testing.assert_allclose(linear(path), 128 / 255, atol=0.01)
 
 
-def test_levels_of_srgb_are_decoded_as_ever(levels: Levels) -> None:
+def test_srgb_levels_are_decoded_unchanged(levels: Levels) -> None:
     space = gamma_space("", None, None)
     assert space.is_default
     np.testing.assert_allclose(encode_srgb(space.linear(levels)) * 255, levels, atol=1e-3)

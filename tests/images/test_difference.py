@@ -9,7 +9,7 @@ import numpy as np
 from dermis.images.colour import delta_e_2000, lab
 
 
-def test_differences_are_those_of_the_library() -> None:
+def test_differences_match_the_library() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import colour
@@ -20,7 +20,7 @@ def test_differences_are_those_of_the_library() -> None:
     np.testing.assert_allclose(delta_e_2000(first, second), wanted, atol=1e-9)
 
 
-def test_white_is_white_and_a_colour_is_like_itself() -> None:
+def test_lab_values_match_and_equal_colours_do_not_differ() -> None:
     np.testing.assert_allclose(lab([1.0, 1.0, 1.0]), [100.0, 0.0, 0.0], atol=1e-4)
     assert delta_e_2000([0.4, 0.2, 0.1], [0.4, 0.2, 0.1]) == 0.0
     np.testing.assert_allclose(lab([0.18, 0.18, 0.18])[0], 49.496, atol=1e-3)

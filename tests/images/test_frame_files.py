@@ -23,20 +23,20 @@ def _files(folder: Path, name: str = "%03d.png") -> FrameFiles:
     return files
 
 
-def test_names() -> None:
+def test_frame_names_are_numbered() -> None:
     assert FrameFiles(Path("a/%05d.png")).path(7) == Path("a/00007.png")
     assert FrameFiles(Path("a%b/face-%d.exr")).path(12) == Path("a%b/face-12.exr")
 
 
 @pytest.mark.parametrize("name", ["%s.png", "%02d-%02d.png", "%5d.png", "100%-%d.png", "%d.jpg", "%d"])
-def test_patterns_that_are_none(tmp_path: Path, name: str) -> None:
+def test_invalid_patterns_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(DermisError):
         FrameFiles(tmp_path / "new" / name).prepare()
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["%03d.png", "%d.exr"])
-def test_whole_frames_of_the_same_are_kept(tmp_path: Path, name: str) -> None:
+def test_complete_frames_of_the_same_run_are_kept(tmp_path: Path, name: str) -> None:
     files = _files(tmp_path, name)
     files.start("a smile")
     assert files.missing(range(4), SIZE) == [0, 1, 2, 3]
@@ -53,7 +53,7 @@ def test_whole_frames_of_the_same_are_kept(tmp_path: Path, name: str) -> None:
     assert files.missing([1, 3], (4, 6)) == [1, 3]
 
 
-def test_frames_of_something_else_are_drawn_again(tmp_path: Path) -> None:
+def test_frames_of_other_runs_are_drawn_again(tmp_path: Path) -> None:
     files = _files(tmp_path)
     files.start("a smile")
     for k in range(2):
@@ -71,7 +71,7 @@ def test_frames_of_something_else_are_drawn_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["no text", "empty", "large", "a pipe"])
-def test_a_damaged_record_says_nothing(tmp_path: Path, damage: str) -> None:
+def test_damaged_record_is_ignored(tmp_path: Path, damage: str) -> None:
     files = _files(tmp_path)
     files.start("a smile")
     write_png(files.path(0), PICTURE)
@@ -87,7 +87,7 @@ def test_a_damaged_record_says_nothing(tmp_path: Path, damage: str) -> None:
     assert files.missing([0], SIZE) == [0]
 
 
-def test_a_pipe_is_no_frame(tmp_path: Path) -> None:
+def test_pipe_is_not_a_frame(tmp_path: Path) -> None:
     files = _files(tmp_path)
     files.start("a smile")
     os.mkfifo(files.path(0))

@@ -57,7 +57,7 @@ def exr(folder: Path, width: int, height: int, layers: int = 0) -> bytes:
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.hdr", "a.exr", "wide.exr"])
-def test_more_pixels_than_any_picture_has_are_refused_by_the_header(tmp_path: Path, name: str) -> None:
+def test_excessive_pixel_counts_are_refused_from_the_header(tmp_path: Path, name: str) -> None:
     files = {
         "a.png": png(16384, 16384, 8, 2, b""),
         "a.hdr": radiance(16384, 8192, b"\2\2\x40\0"),
@@ -79,13 +79,13 @@ def test_more_pixels_than_any_picture_has_are_refused_by_the_header(tmp_path: Pa
         ("scans.jpg", jpeg(100), "scans"),
     ],
 )
-def test_headers_that_mean_nothing_are_refused(tmp_path: Path, name: str, data: bytes, words: str) -> None:
+def test_invalid_headers_are_refused(tmp_path: Path, name: str, data: bytes, words: str) -> None:
     (tmp_path / name).write_bytes(data)
     with pytest.raises(DermisError, match=rf"{name}: .*({words})"):
         read_image(tmp_path / name)
 
 
-def test_layers_of_an_exr_file_count(tmp_path: Path) -> None:
+def test_exr_layers_count_towards_the_limit(tmp_path: Path) -> None:
     """The library decodes all layers, including unused ones."""
     (tmp_path / "a.exr").write_bytes(exr(tmp_path, 2048, 1024, layers=94))
     with pytest.raises(DermisError, match=r"a\.exr: .*all its channels have 203 million numbers"):
@@ -117,13 +117,13 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 / pix
     ],
     ids=["palette", "normals", "heights"],
 )
-def test_little_more_than_what_is_kept_is_in_memory(tmp_path: Path, kind: int, row: bytes, call: str) -> None:
+def test_decoding_needs_little_extra_memory(tmp_path: Path, kind: int, row: bytes, call: str) -> None:
     rows = (b"\0" + row * MAP_SIDE) * MAP_SIDE
     (tmp_path / "a.png").write_bytes(png(MAP_SIDE, MAP_SIDE, 8, kind, rows))
     assert peak_of(tmp_path, call) < MAX_MEMORY
 
 
-def test_coded_radiance_takes_one_call_a_run(tmp_path: Path) -> None:
+def test_run_length_decoding_is_linear_in_time(tmp_path: Path) -> None:
     """Runs of two pixels alternate with two literal pixels."""
     width, height = 4096, 32
     row = b"\2\2" + struct.pack(">H", width) + b"\x82\x82\2\1\3" * width
@@ -148,7 +148,7 @@ def test_infinite_heights_are_refused_after_they_are_scaled(tmp_path: Path) -> N
         load_maps(height=tmp_path / "a.tif", height_mm=0.02)
 
 
-def test_a_map_is_as_large_as_any_device_takes(tmp_path: Path) -> None:
+def test_map_size_is_limited_to_device_textures(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(8193, 16, 8, 2, b""))
     with pytest.raises(DermisError, match=r"a\.png: expected a colour map of at most 8192 texels a side"):
         load_maps(colour=tmp_path / "a.png")

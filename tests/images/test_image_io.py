@@ -41,7 +41,7 @@ def test_png_keeps_every_bit(tmp_path: Path, rng: np.random.Generator, dtype: ty
     np.testing.assert_array_equal(read, levels)
 
 
-def test_png_written_by_ffmpeg_is_what_the_standard_says(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_png_written_by_ffmpeg_is_decoded_by_the_standard(tmp_path: Path, rng: np.random.Generator) -> None:
     # Pillow reads 16-bit grey exactly: an independent witness of byte order.
     from PIL import Image
 
@@ -51,7 +51,7 @@ def test_png_written_by_ffmpeg_is_what_the_standard_says(tmp_path: Path, rng: np
         np.testing.assert_array_equal(np.asarray(picture), levels)
 
 
-def test_percent_sign_in_a_name_is_no_sequence(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_percent_sign_in_a_name_is_not_a_sequence(tmp_path: Path, rng: np.random.Generator) -> None:
     levels = rng.integers(0, 65536, (*SHAPE, 3)).astype(np.uint16)
     write_png(tmp_path / "a%03d.png", levels)
     np.testing.assert_array_equal(read_image(tmp_path / "a%03d.png"), levels)
@@ -110,7 +110,7 @@ def _radiance(rgbe: np.ndarray, exposure: str = "") -> bytes:
     return b"".join(rows)
 
 
-def test_radiance_is_decoded_by_its_definition(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_radiance_matches_its_definition(tmp_path: Path, rng: np.random.Generator) -> None:
     rgbe = rng.integers(100, 160, (*SHAPE, 4)).astype(np.uint8)
     rgbe[:, :8] = rgbe[:, :1]
     expected = rgbe[..., :3] * 2.0 ** (rgbe[..., 3:] - 136.0)

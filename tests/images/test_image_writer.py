@@ -22,7 +22,7 @@ def test_png_keeps_every_byte(shape: tuple[int, int, int], effort: int) -> None:
     assert np.array_equal(decoded.reshape(shape), levels)
 
 
-def test_smooth_pictures_become_small() -> None:
+def test_smooth_pictures_are_compressed() -> None:
     ramp = np.linspace(0, 255, 256).astype(np.uint8)
     assert len(encode_png(np.broadcast_to(ramp[:, None, None], (256, 256, 3)).copy())) < 3000
 
@@ -39,7 +39,7 @@ def test_many_pictures_are_all_written(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 41  # and nothing half-written
 
 
-def test_a_folder_is_tried_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_output_folder_is_checked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Checking a folder creates and deletes a file, which takes longer than a frame."""
     tried: list[Path] = []
     check = writing.check_output
@@ -53,7 +53,7 @@ def test_a_folder_is_tried_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert [path.name for path in tried] == ["a.png", "c.exr", "d.png"]
 
 
-def test_a_place_that_is_taken_is_told_later(tmp_path: Path) -> None:
+def test_occupied_path_is_reported_later(tmp_path: Path) -> None:
     picture = np.zeros((2, 2, 3), np.uint8)
     (tmp_path / "b.png").mkdir()
     with pytest.raises(DermisError, match=r"b\.png"), ImageWriter(threads=1) as writer:
@@ -62,7 +62,7 @@ def test_a_place_that_is_taken_is_told_later(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"a.png", "b.png"}  # and nothing half-written
 
 
-def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_write_errors_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.zeros((2, 2, 3), np.uint8)
     with ImageWriter(threads=1) as writer:
         with pytest.raises(DermisError, match=r"\.jpg: expected"):

@@ -30,7 +30,7 @@ def _write(path: Path, rate: Any = 30, crf: int = 18) -> Path:
 
 
 @pytest.mark.parametrize("rate", [30, "24000/1001", 12.5, 59.94])
-def test_frame_k_lies_at_k_over_the_rate(tmp_path: Path, rate: Any) -> None:
+def test_frame_times_are_multiples_of_the_frame_time(tmp_path: Path, rate: Any) -> None:
     exact = parse_frame_rate(rate)
     with av.open(str(_write(tmp_path / "a.mp4", rate))) as file:
         stream = file.streams.video[0]
@@ -39,7 +39,7 @@ def test_frame_k_lies_at_k_over_the_rate(tmp_path: Path, rate: Any) -> None:
     assert times == [k / exact for k in range(len(COLOURS))]
 
 
-def test_colours_come_back_and_are_tagged(tmp_path: Path) -> None:
+def test_colours_survive_and_are_tagged(tmp_path: Path) -> None:
     with av.open(str(_write(tmp_path / "a.mp4"))) as file:
         stream = file.streams.video[0]
         codec = stream.codec_context
@@ -50,7 +50,7 @@ def test_colours_come_back_and_are_tagged(tmp_path: Path) -> None:
         assert np.abs(image.astype(int) - colour).max() <= 5  # 8-bit YUV, and the encoder's own error
 
 
-def test_a_lower_factor_makes_a_better_movie(tmp_path: Path) -> None:
+def test_lower_quality_factor_gives_smaller_error(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
     for name, crf in (("good", 5), ("bad", 45)):
         with MovieWriter(tmp_path / f"{name}.mp4", SIZE, crf=crf) as movie:
@@ -77,12 +77,12 @@ def test_rates_are_ratios(given: Any, exact: Fraction) -> None:
 
 
 @pytest.mark.parametrize("given", ["", "0", "-30", "nan", "inf", "fast", "30/0", "1e9"])
-def test_what_is_no_rate(given: str) -> None:
+def test_invalid_rates_are_refused(given: str) -> None:
     with pytest.raises(DermisError, match=r"^--fps: expected frames a second .*24000/1001"):
         parse_frame_rate(given, "--fps")
 
 
-def test_an_error_leaves_what_was_there(tmp_path: Path) -> None:
+def test_error_leaves_the_existing_movie(tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
     path.write_bytes(b"yesterday's")
     for fault in (KeyboardInterrupt, ZeroDivisionError):
@@ -93,7 +93,7 @@ def test_an_error_leaves_what_was_there(tmp_path: Path) -> None:
     assert path.read_bytes() == b"yesterday's" and list(tmp_path.iterdir()) == [path]
 
 
-def test_a_disk_that_fills_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -103,7 +103,7 @@ def test_a_disk_that_fills_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_cannot_be_a_movie_is_told_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_invalid_movie_options_are_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.mp4"
     with pytest.raises(DermisError, match=r"--size: expected even width and height.*got 63x48\. Use 64x48"):
         check_movie(path, (63, 48))

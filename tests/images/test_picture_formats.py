@@ -67,7 +67,7 @@ def test_webp_keeps_its_alpha(tmp_path: Path, blocks: Bytes) -> None:
 
 
 @pytest.mark.parametrize("kind", ["WEBP", "AVIF"])
-def test_a_format_that_pillow_lacks_is_named(
+def test_format_missing_in_pillow_is_named(
     tmp_path: Path, blocks: Bytes, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from PIL import features
@@ -148,7 +148,7 @@ def tiff(photometric: int, pixels: NDArray[np.uint16], gap: bytes = b"") -> byte
     return head + bytes(4) + struct.pack(f"<{samples}H", *[16] * samples) + pixels.astype("<u2").tobytes()
 
 
-def test_cmyk_of_16_bits_is_not_taken_for_rgba(tmp_path: Path) -> None:
+def test_cmyk_of_16_bits_is_not_read_as_rgba(tmp_path: Path) -> None:
     inks = np.broadcast_to(np.uint16([0, 32768, 65535, 0]), (8, 8, 4))
     with pytest.warns(DermisWarning, match="without a profile.*; its 16 bits a channel are reduced to 8"):
         pixels = read_image(written(tmp_path / "a.tif", tiff(5, inks)))
@@ -167,7 +167,7 @@ def test_only_the_first_of_several_pictures_is_read(tmp_path: Path, blocks: Byte
         assert np.median(np.abs(pixels[..., :3].astype(int) - blocks)) <= 2
 
 
-def test_a_preview_of_a_camera_raw_file_is_not_taken_for_the_picture(tmp_path: Path, blocks: Bytes) -> None:
+def test_preview_of_a_camera_raw_file_is_not_used(tmp_path: Path, blocks: Bytes) -> None:
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
     data = tiff(2, np.zeros((8, 8, 3), np.uint16), b"CR\2\0\0\0\0\0")
@@ -191,12 +191,12 @@ def test_a_preview_of_a_camera_raw_file_is_not_taken_for_the_picture(tmp_path: P
         (b"\xff\x0a", "XL"),
     ],
 )
-def test_formats_that_are_not_read_are_named(tmp_path: Path, start: bytes, name: str) -> None:
+def test_unsupported_formats_are_named(tmp_path: Path, start: bytes, name: str) -> None:
     with pytest.raises(DermisError, match=rf"a\.png: expected .* but it is .*{name}.* Convert it to PNG"):
         read_image(written(tmp_path / "a.png", start + bytes(64)))
 
 
-def test_pixels_that_are_not_read_are_named(tmp_path: Path) -> None:
+def test_unsupported_pixel_types_are_named(tmp_path: Path) -> None:
     from PIL import Image
 
     Image.new("LAB", (16, 16)).save(tmp_path / "a.tif")
@@ -205,9 +205,7 @@ def test_pixels_that_are_not_read_are_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_photographs_are_turned_by_exif_and_textures_are_not(
-    tmp_path: Path, blocks: Bytes, orientation: int
-) -> None:
+def test_exif_rotation_applies_to_photographs_only(tmp_path: Path, blocks: Bytes, orientation: int) -> None:
     from PIL import Image, ImageOps
 
     exif = Image.Exif()

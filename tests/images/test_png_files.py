@@ -23,7 +23,7 @@ def rng() -> np.random.Generator:
 @pytest.mark.parametrize("use_isal", [False, True])
 @pytest.mark.parametrize("channels", [1, 3, 4])
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_what_was_written_comes_back(
+def test_png_round_trip_keeps_pixels(
     rng: np.random.Generator, kind: type, channels: int, use_isal: bool
 ) -> None:
     levels = rng.integers(0, np.iinfo(kind).max + 1, (7, 5, channels)).astype(kind)
@@ -32,7 +32,7 @@ def test_what_was_written_comes_back(
     np.testing.assert_array_equal(found, levels)
 
 
-def test_another_decoder_sees_the_same_16_bits(rng: np.random.Generator) -> None:
+def test_other_decoder_reads_equal_16_bit_pixels(rng: np.random.Generator) -> None:
     levels = rng.integers(0, 65536, (6, 9, 3)).astype(np.uint16)
     data = encode_png(levels, use_isal=True)
     with import_extra("av", "a test").open(io.BytesIO(data), format="png_pipe") as container:
@@ -41,7 +41,7 @@ def test_another_decoder_sees_the_same_16_bits(rng: np.random.Generator) -> None
     np.testing.assert_array_equal(decode_up_filtered_png(data), levels)
 
 
-def test_another_decoder_sees_the_same_8_bits(rng: np.random.Generator) -> None:
+def test_other_decoder_reads_equal_8_bit_pixels(rng: np.random.Generator) -> None:
     from PIL import Image
 
     levels = rng.integers(0, 256, (6, 9, 4)).astype(np.uint8)
@@ -49,7 +49,7 @@ def test_another_decoder_sees_the_same_8_bits(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(data))), levels)
 
 
-def test_the_quick_way_makes_noise_no_larger_than_the_usual_one_does() -> None:
+def test_fast_compression_of_noise_is_not_larger() -> None:
     noise = np.random.default_rng(3).normal(30000, 300, (64, 64, 3)).astype(np.uint16)
     assert len(encode_png(noise, use_isal=True)) < len(encode_png(noise, 1))
 
@@ -64,7 +64,7 @@ def test_the_quick_way_makes_noise_no_larger_than_the_usual_one_does() -> None:
     ],
     ids=["other filter", "palette", "colour that is clear", "JPEG"],
 )
-def test_other_forms_are_left_to_others(data: bytes) -> None:
+def test_other_png_types_use_the_general_decoder(data: bytes) -> None:
     assert decode_up_filtered_png(data) is None
 
 
@@ -79,6 +79,6 @@ def test_other_forms_are_left_to_others(data: bytes) -> None:
         (png(0, 1, 8, 2, b""), "0 x 1"),
     ],
 )
-def test_damaged_ones_are_refused(data: bytes, message: str) -> None:
+def test_damaged_png_files_are_refused(data: bytes, message: str) -> None:
     with pytest.raises((ValueError, TooLargeError), match=message):
         decode_up_filtered_png(data)

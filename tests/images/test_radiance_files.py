@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.images.colour_spaces import gamma_space
-from dermis.images.io import mended_radiance, read_colours, read_image, read_size
+from dermis.images.io import read_colours, read_image, read_size, repaired_radiance
 
 Floats = NDArray[np.float32]
 SHAPE = (6, 12)
@@ -47,9 +47,7 @@ def layers(*names: str, suffixes: str = "RGB") -> dict[str, Floats]:
         {"height": np.ones(SHAPE, np.float32)},
     ],
 )
-def test_the_only_picture_of_a_file_is_found_by_its_channels(
-    tmp_path: Path, channels: dict[str, Floats]
-) -> None:
+def test_single_picture_is_found_by_its_channels(tmp_path: Path, channels: dict[str, Floats]) -> None:
     image = read_image(exr(tmp_path / "a.exr", channels))
     assert image.shape[:2] == SHAPE and (image == 1.0).all()
 
@@ -63,7 +61,7 @@ def test_the_only_picture_of_a_file_is_found_by_its_channels(
         (("left", "right"), "left"),
     ],
 )
-def test_of_several_layers_the_picture_is_read_and_named(
+def test_picture_among_several_layers_is_read_and_named(
     tmp_path: Path, names: tuple[str, ...], used: str
 ) -> None:
     path = exr(tmp_path / "a.exr", layers(*names))
@@ -72,7 +70,7 @@ def test_of_several_layers_the_picture_is_read_and_named(
     assert (image == 1 + [name or "the one without a name" for name in names].index(used)).all()
 
 
-def test_of_several_parts_the_picture_is_read_and_named(tmp_path: Path) -> None:
+def test_picture_among_several_parts_is_read_and_named(tmp_path: Path) -> None:
     import OpenEXR
 
     def part(name: str, value: float) -> Any:
@@ -170,7 +168,7 @@ def test_hdr_files_are_upright_in_every_order_of_pixels(tmp_path: Path, size: st
     )
 
 
-def test_hdr_files_state_exposures_and_colour_corrections(tmp_path: Path) -> None:
+def test_hdr_exposure_and_colour_correction_are_applied(tmp_path: Path) -> None:
     rgbe = np.full((2, 3, 4), 128, np.uint8)
     path = tmp_path / "a.hdr"
     path.write_bytes(hdr(rgbe, "-Y 2 +X 3", "EXPOSURE=2", "EXPOSURE=4", "COLORCORR=1 2 0.5"))
@@ -197,7 +195,7 @@ def test_primaries_of_hdr_files_are_converted(tmp_path: Path) -> None:
     np.testing.assert_allclose(space.linear(pixels), 0.5, rtol=1e-3)  # white stays white
 
 
-def test_other_numbers_of_hdr_files_are_noted(tmp_path: Path) -> None:
+def test_unused_hdr_values_are_noted(tmp_path: Path) -> None:
     path = tmp_path / "a.hdr"
     path.write_bytes(hdr(np.full((2, 3, 4), 128, np.uint8), "-Y 2 +X 3", "GAMMA=2.2", "PIXASPECT=0.5"))
     with pytest.warns(
@@ -206,29 +204,29 @@ def test_other_numbers_of_hdr_files_are_noted(tmp_path: Path) -> None:
         read_image(path)
 
 
-def test_a_few_odd_pixels_are_mended_and_counted() -> None:
+def test_few_invalid_pixels_are_replaced_and_counted() -> None:
     radiance = np.full((4, 8, 3), 0.5, np.float32)
     radiance[0, 0, 1], radiance[1, 1], radiance[2, 2], radiance[3, 3, 0] = 7.0, np.inf, np.nan, -2.0
     with pytest.warns(DermisWarning, match="sky: 2 infinite or NaN and 1 negative pixels of 32") as notes:
-        mended = mended_radiance("sky", radiance)
+        mended = repaired_radiance("sky", radiance)
     assert "infinite values become 7, the largest finite one, others 0" in str(notes[0].message)
     assert (
         (mended[1, 1] == 7.0).all() and (mended[2, 2] == 0.0).all() and mended[3, 3].tolist() == [0, 0.5, 0.5]
     )
     assert (mended == radiance).sum() == 96 - 7
     sound = np.abs(np.nan_to_num(radiance[3:]))
-    assert mended_radiance("sky", sound) is sound
+    assert repaired_radiance("sky", sound) is sound
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 0.0])
-def test_radiance_that_is_mostly_odd_is_refused(value: float) -> None:
+def test_mostly_invalid_radiance_is_refused(value: float) -> None:
     radiance = np.full((4, 8, 3), value, np.float32)
     with pytest.raises(DermisError, match="sky: expected a picture of radiance above 0"):
-        mended_radiance("sky", radiance)
+        repaired_radiance("sky", radiance)
     radiance[:, 4:] = 1.0  # a half
     if value != 0.0:
         with pytest.warns(DermisWarning, match="16 "):
-            mended_radiance("sky", radiance)
+            repaired_radiance("sky", radiance)
 
 
 def test_an_exr_file_in_memory_has_no_name() -> None:

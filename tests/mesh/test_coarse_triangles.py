@@ -19,7 +19,7 @@ def area(places: Floats, triangles: Ints) -> float:
 
 
 @pytest.mark.parametrize("levels", [1, 2])
-def test_a_sphere_of_triangles_is_as_coarse_as_it_may_be(levels: int) -> None:
+def test_sphere_is_merged_to_its_control_triangles(levels: int) -> None:
     coarse = Head("sphere", uv_sphere(50, 32, 16), Maps())
     finer, count = subdivide_head(coarse, levels), len(coarse.mesh.triangles)
     found = coarse_triangles(finer, 1, 5.0)
@@ -28,7 +28,7 @@ def test_a_sphere_of_triangles_is_as_coarse_as_it_may_be(levels: int) -> None:
     assert len(coarse_triangles(finer, count + 1, 5.0)) == count * (4 if levels == 2 else 4**levels)
 
 
-def test_a_flat_sheet_is_whole() -> None:
+def test_flat_plane_is_merged() -> None:
     finer = subdivide_head(Head("sheet", plane(100.0, 4), Maps()), 2)
     found = coarse_triangles(finer, 1, 20.0)
     assert len(found) < len(finer.mesh.triangles) / 8
@@ -37,7 +37,7 @@ def test_a_flat_sheet_is_whole() -> None:
     )
 
 
-def test_a_person_is_fine_only_where_the_surface_is_off_its_faces() -> None:
+def test_person_is_merged_where_the_surface_is_flat() -> None:
     head = Human().head(subdivide=1)
     found = coarse_triangles(head, 5_000, 0.4)
     assert 0.25 < len(found) / len(head.mesh.triangles) < 0.5

@@ -11,7 +11,7 @@ from dermis.mesh.geometry import components
 
 
 @pytest.mark.parametrize("links", [0, 1, 300, 700, 3000])
-def test_components_are_those_of_scipy(links: int) -> None:
+def test_components_match_scipy(links: int) -> None:
     a, b = np.random.default_rng(links).integers(0, 1000, (2, links))
     graph = coo_array((np.ones(links), (a, b)), shape=(1000, 1000))
     assert np.array_equal(components(1000, a, b), connected_components(graph, directed=False)[1])
@@ -22,6 +22,6 @@ def test_a_long_chain_is_one_component() -> None:
     assert not components(5000, order[:-1], order[1:]).any()
 
 
-def test_nothing_has_no_components() -> None:
+def test_empty_mesh_has_no_components() -> None:
     none = np.zeros(0, np.int64)
     assert len(components(0, none, none)) == 0

@@ -54,18 +54,18 @@ NEAR = "skin eyelash Eyelashes eye_brow eyelids CC_Base_EyeOcclusion TearLine ey
 
 
 @pytest.mark.parametrize("name", EYES.split())
-def test_names_of_eyes(name: str) -> None:
+def test_names_of_eyes_are_recognised(name: str) -> None:
     assert is_eye_name((name,))
     assert is_eye_name(("white", name)) and not is_eye_name(("skin", name))
 
 
 @pytest.mark.parametrize("name", NEAR.split())
-def test_names_of_what_is_near_eyes(name: str) -> None:
+def test_names_of_parts_near_eyes_are_excluded(name: str) -> None:
     assert not is_eye_name((name,))
 
 
 @pytest.mark.parametrize("radius", [9.0, 12.0, 16.0])
-def test_a_ball_takes_the_place_of_a_files(tmp_path: Path, radius: float) -> None:
+def test_fitted_eyeball_replaces_that_of_the_file(tmp_path: Path, radius: float) -> None:
     path = write_head(tmp_path / "a.gltf", ball(radius), ball(radius))
     made, plain = head(path), head(path, eyes="plain")
     middles, ways, radii = eyes_of(made)
@@ -81,14 +81,14 @@ def test_a_ball_takes_the_place_of_a_files(tmp_path: Path, radius: float) -> Non
     assert np.linalg.norm(left - EYE_MM, axis=1).min() == pytest.approx(radius, abs=0.05)
 
 
-def test_plain_eyes_stay_as_they_are(tmp_path: Path) -> None:
+def test_plain_eyes_are_unchanged(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf")
     made = head(path, eyes="plain")
     assert made.eyes is None and made.rig is None and made.note == ""
     assert {material.name for material in made.mesh.materials} == {"skin", "eye_L", "eye_R"}
 
 
-def test_a_cornea_shows_the_way(tmp_path: Path) -> None:
+def test_cornea_determines_the_gaze_direction(tmp_path: Path) -> None:
     axis = np.array(angles_matrix((6.0, 14.0, 0.0))) @ AHEAD
     eyes = [ball_with_cornea(12.5, one) for one in (axis, axis * MIRROR)]
     _, ways, radii = eyes_of(head(write_head(tmp_path / "a.gltf", *eyes)))
@@ -116,7 +116,7 @@ def test_a_cornea_does_not_widen_the_ball() -> None:
         (ball(12.0), ball(5.0), "1 ball instead of two"),
     ],
 )
-def test_what_is_no_eye_stays_plain(tmp_path: Path, left: object, right: object, words: str) -> None:
+def test_other_parts_stay_plain(tmp_path: Path, left: object, right: object, words: str) -> None:
     made = head(write_head(tmp_path / "a.gltf", left, right))
     assert made.eyes is None and words in made.note and "'eye_L', 'eye_R' stay plain" in made.note
     assert {material.name for material in made.mesh.materials} == {"skin", "eye_L", "eye_R"}
@@ -126,7 +126,7 @@ def test_what_is_no_eye_stays_plain(tmp_path: Path, left: object, right: object,
         head(tmp_path / "a.gltf", eye={"redness": 1.0})
 
 
-def test_eyes_of_another_name_can_be_named(tmp_path: Path) -> None:
+def test_eye_groups_can_be_named(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf", names=("white_1", "white_2"))
     with pytest.warns(DermisWarning, match="not skin: 'white_"):
         plain = head(path)
@@ -144,7 +144,7 @@ def test_balls_are_found_within_one_surface(tmp_path: Path) -> None:
     assert lost == 2 * len(ball()[1])
 
 
-def test_subdivision_leaves_them_round(tmp_path: Path) -> None:
+def test_subdivision_keeps_eyes_round(tmp_path: Path) -> None:
     made = head(write_head(tmp_path / "a.gltf"), subdivide=1)
     middles, _, radii = eyes_of(made)
     np.testing.assert_allclose(middles, [EYE_MM, EYE_MM * MIRROR], atol=0.05)
@@ -153,7 +153,7 @@ def test_subdivision_leaves_them_round(tmp_path: Path) -> None:
     np.testing.assert_allclose(posed, made.mesh.positions, atol=1e-3)
 
 
-def test_a_head_without_bones_looks_at_a_place(tmp_path: Path) -> None:
+def test_head_without_bones_can_gaze_at_a_point(tmp_path: Path) -> None:
     made = head(write_head(tmp_path / "a.gltf"))
     place = np.array([120.0, 60.0, 500.0])
     pose = looking_at(made, place)
@@ -166,7 +166,7 @@ def test_a_head_without_bones_looks_at_a_place(tmp_path: Path) -> None:
         np.testing.assert_allclose(again.bones[name], angles, atol=1e-9)
 
 
-def test_bones_of_the_file_turn_them(tmp_path: Path) -> None:
+def test_bones_of_the_file_rotate_fitted_eyes(tmp_path: Path) -> None:
     made = head(write_head(tmp_path / "a.glb", joints=("head", "eyeball_l", "eyeball_r")))
     assert made.bones == ("head", "eyeball_l", "eyeball_r")
     before, after = eyes_of(made)[1], eyes_of(made, Pose(bones={"eyeball_l": (0, 20, 0)}))[1]
@@ -194,7 +194,7 @@ def test_targets_turn_and_shift_them_rigidly(tmp_path: Path) -> None:
     assert 0.2 < looking_at(made, (200, 12, 800)).weights["eyeLookOutLeft"] < 1.2
 
 
-def test_places_of_the_files_points_take_them_along(tmp_path: Path) -> None:
+def test_moved_points_of_the_file_move_fitted_eyes(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf")
     made, plain = head(path), head(path, eyes="plain")
     np.testing.assert_array_equal(made.positions_mm, plain.positions_mm)
@@ -227,7 +227,7 @@ def test_corneas_stay_behind_lids() -> None:
     assert 0.2 < lids_in_front(near, sphere, AHEAD).cornea_recess_mm(AHEAD, 1.0) < 1.2
 
 
-def test_looks_can_be_told(tmp_path: Path) -> None:
+def test_eye_appearance_can_be_given(tmp_path: Path) -> None:
     path = write_head(tmp_path / "a.gltf")
     made, plain = head(path, eye={"eumelanin": 0.1, "seed": 3}), head(path)
     assert made.eyes is not None and plain.eyes is not None

@@ -11,7 +11,7 @@ from dermis.mesh.primitives import plane, uv_sphere
 SKIN = (Material("skin"),)
 
 
-def test_weld_is_exact_and_does_not_mind_the_sign_of_zero() -> None:
+def test_weld_is_exact_and_ignores_the_sign_of_zero() -> None:
     rows = np.array([[0, 0, 1], [-0.0, 0, 1], [0, 0, np.nextafter(np.float32(1), np.float32(2))], [0, 0, 1]])
     point = weld(rows)
     assert point[0] == point[1] == point[3] != point[2]
@@ -60,7 +60,7 @@ def test_normals_weigh_angles_not_the_number_of_triangles() -> None:
     np.testing.assert_allclose(normal, np.ones(3) / np.sqrt(3), atol=1e-6)
 
 
-def test_tangents_of_a_plane_are_its_size_over_its_uv() -> None:
+def test_tangents_of_a_plane_equal_its_size_over_its_uv() -> None:
     flat = plane(120, 5, uv_scale=0.4)
     np.testing.assert_allclose(flat.dpdu, np.broadcast_to([300, 0, 0], flat.dpdu.shape), atol=1e-2)
     np.testing.assert_allclose(flat.dpdv, np.broadcast_to([0, -300, 0], flat.dpdv.shape), atol=1e-2)
@@ -77,7 +77,7 @@ def test_tangents_follow_a_sheared_map() -> None:
     np.testing.assert_allclose(sheared.dpdv, np.broadcast_to([-10, -20, 0], sheared.dpdv.shape), atol=1e-4)
 
 
-def test_tangents_without_uv_area_are_short_but_never_nothing() -> None:
+def test_tangents_without_uv_area_are_short_but_not_zero() -> None:
     flat = plane(10, 2)
     collapsed = build_mesh(flat.positions, np.full_like(flat.uv, 0.5), flat.triangles, flat.material, SKIN)
     for tangent in (collapsed.dpdu, collapsed.dpdv):
@@ -113,7 +113,7 @@ def test_given_normals_are_kept_only_where_they_are_unit() -> None:
     np.testing.assert_allclose(mesh.normals, [[0, 0.6, 0.8], [0, 0, 1], [0, 0, 1], [0, 0, 1]], atol=1e-6)
 
 
-def test_types_of_a_mesh() -> None:
+def test_mesh_arrays_have_their_dtypes() -> None:
     mesh = plane(10, 2)
     for values in (mesh.positions, mesh.normals, mesh.uv, mesh.dpdu, mesh.dpdv):
         assert values.dtype == np.float32

@@ -37,7 +37,7 @@ def _origins() -> np.ndarray:
     return (SKELETON.to_head @ np.array(world))[:, :3, 3]
 
 
-def test_a_pose_of_nothing_is_the_rest() -> None:
+def test_empty_pose_is_the_rest_pose() -> None:
     motion = Pose().motion(RIG)
     np.testing.assert_array_equal(motion.weights, np.zeros(8))
     np.testing.assert_allclose(motion.matrices, np.tile(np.eye(3, 4), (4, 1, 1)), atol=1e-4)
@@ -45,7 +45,7 @@ def test_a_pose_of_nothing_is_the_rest() -> None:
     assert [one.dtype for one in motion] == [np.float32] * 3
 
 
-def test_weights_stand_at_their_targets() -> None:
+def test_weights_are_stored_by_target() -> None:
     motion = Pose({"target6": 0.25, "target1": -2}).motion(RIG)
     assert motion.weights.tolist() == [0, -2, 0, 0, 0, 0, 0.25, 0]
 
@@ -57,7 +57,7 @@ def test_weights_count_from_those_at_rest() -> None:
     assert motion.matrices.shape == (0, 3, 4)
 
 
-def test_angles_turn_about_the_heads_axes_where_a_bone_rests() -> None:
+def test_angles_rotate_about_head_axes_at_the_bone() -> None:
     neck, jaw = (10.0, -40.0, 25.0), (20.0, 0.0, 0.0)
     matrices = Pose(bones={"jaw": jaw, "neck": neck}).motion(RIG).matrices
     origins = _origins()
@@ -66,7 +66,7 @@ def test_angles_turn_about_the_heads_axes_where_a_bone_rests() -> None:
     np.testing.assert_allclose(matrices, np.array(expected)[:, :3], atol=2e-4)
 
 
-def test_a_nod_is_a_nod_whatever_way_the_bone_points() -> None:
+def test_nod_does_not_depend_on_bone_orientation() -> None:
     motion = Pose(bones={"head": (30.0, 0.0, 0.0)}).motion(RIG)
     nose = np.array([0.0, -70.0, 100.0])
     moved = motion.matrices[2, :, :3] @ nose + motion.matrices[2, :, 3]
@@ -76,7 +76,7 @@ def test_a_nod_is_a_nod_whatever_way_the_bone_points() -> None:
 
 
 @pytest.mark.parametrize("bones", [("neck", "jaw"), ("root", "neck", "head", "jaw"), ("head",)])
-def test_matrices_stand_for_those_at_rest(bones: tuple[str, ...]) -> None:
+def test_matrices_are_relative_to_rest(bones: tuple[str, ...]) -> None:
     rng = np.random.default_rng(2)
     local = SKELETON.local.copy()
     for name in bones:
@@ -91,7 +91,7 @@ def test_matrices_stand_for_those_at_rest(bones: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("moved", [5, 30])
-def test_many_bones_move_as_few_do(moved: int) -> None:
+def test_many_bones_match_few_bones(moved: int) -> None:
     """Check that both algorithms for moved bones agree."""
     rng = np.random.default_rng(3)
     parent = np.array([-1, -1, *(rng.integers(0, k) for k in range(2, 30))], np.int32)
@@ -126,7 +126,7 @@ def test_bones_bound_elsewhere_than_they_rest() -> None:
     np.testing.assert_allclose(motion.matrices, shifted.matrices(local), atol=5e-4)
 
 
-def test_other_places_are_taken_as_they_are() -> None:
+def test_given_positions_are_used_unchanged() -> None:
     places = RIG.positions_mm + np.float32(1)
     assert Pose(positions_mm=places).motion(RIG).positions_mm is places
     listed = Pose(positions_mm=places.astype(float).tolist()).motion(RIG).positions_mm
@@ -160,12 +160,12 @@ FLAT = np.diag([1.0, 1, 0, 1])
         (Pose(positions_mm=np.full((3000, 3), NAN)), r"3000 are NaN, infinite or farther, first 0"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused(pose: Pose, words: str) -> None:
+def test_invalid_poses_are_refused(pose: Pose, words: str) -> None:
     with pytest.raises(DermisError, match=words):
         pose.motion(RIG)
 
 
-def test_a_head_without_targets_or_bones_says_so() -> None:
+def test_head_without_targets_or_bones_is_named() -> None:
     for pose, kind in ((Pose({"a": 1}), "morph target"), (Pose(bones={"b": (0, 0, 0)}), "bone")):
         with pytest.raises(DermisError, match=f"a {kind} of the head, but got '.' and it has none"):
             pose.motion(Rig(RIG.positions_mm))
@@ -193,7 +193,7 @@ def test_a_scene_checks_its_pose_and_takes_a_mapping() -> None:
         Scene(head, pose=0.5)
 
 
-def test_a_head_without_a_rig_takes_places() -> None:
+def test_head_without_rig_accepts_positions() -> None:
     head = Head("ball", uv_sphere(100.0, 16, 8), Maps())
     scene = Scene(head, pose=Pose(positions_mm=2 * head.positions_mm))
     assert scene.motion is not None

@@ -44,7 +44,7 @@ def test_bones_at_rest_leave_points_where_they_are() -> None:
     np.testing.assert_allclose(rig.pose(np.zeros(2), rig.skeleton.matrices()), rig.positions_mm, atol=1e-12)
 
 
-def test_a_bone_turns_what_follows_it() -> None:
+def test_bone_rotates_its_followers() -> None:
     rig = _rig()
     assert rig.skeleton is not None
     local = rig.skeleton.local.copy()
@@ -54,7 +54,7 @@ def test_a_bone_turns_what_follows_it() -> None:
     np.testing.assert_allclose(posed[0], [0, 0, 0], atol=1e-12)
 
 
-def test_stencils_are_means() -> None:
+def test_stencils_evaluate_weighted_means() -> None:
     stencils = Stencils(
         np.array([0, 1, 3], np.int32), np.array([2, 0, 1], np.int32), np.array([1, 0.25, 0.75], np.float32)
     )

@@ -38,14 +38,14 @@ def _missed_mm(rig: Rig, motion: Motion) -> float:
 
 
 @pytest.mark.parametrize("bones", [True, False])
-def test_no_pose_goes_beyond_its_outline(bones: bool) -> None:
+def test_poses_stay_within_the_outline(bones: bool) -> None:
     rig = random_rig(seed=4)
     rig = rig if bones else Rig(rig.positions_mm, rig.targets)
     poses = [_pose(rig, np.random.default_rng(seed)) for seed in range(30)]
     assert max(_missed_mm(rig, motion) for motion in [rig.rest, *poses]) < 1.0
 
 
-def test_another_person_has_an_outline_too() -> None:
+def test_other_people_have_outlines() -> None:
     rig = random_rig(seed=5)
     other = rig.positions_mm * np.float32([1.2, 0.9, 1.0]) + np.float32([0, 5, 3])
     for seed in range(5):
@@ -56,7 +56,7 @@ def test_another_person_has_an_outline_too() -> None:
     assert rig.outline_mm(rig.rest)[:, 1].max() < rig.outline_mm(motion)[:, 1].max()
 
 
-def test_the_outline_of_a_rig_is_found_once() -> None:
+def test_outline_of_a_rig_is_computed_once() -> None:
     first, second = random_rig(seed=6), random_rig(seed=6)
     assert len(first.outline_mm(first.rest)) > 100
     np.testing.assert_array_equal(first._outline_points, second._outline_points)

@@ -48,7 +48,7 @@ def _strands(mesh: Mesh) -> Strands:
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
-def test_roots_stay_where_they_are_on_a_finer_mesh(levels: int) -> None:
+def test_roots_keep_positions_on_a_finer_mesh(levels: int) -> None:
     """Check roots in the middle of a flat sheet, where subdivision moves nothing."""
     mesh = _sheet()
     inside = np.flatnonzero(_roots(mesh, 400).quad == 4)

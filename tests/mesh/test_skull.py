@@ -26,19 +26,19 @@ def head_of(mesh: Mesh, rig: Rig | None = None) -> Head:
     return Head("skin", mesh, Maps(), rig=rig)
 
 
-def test_a_head_has_its_skull_120_mm_below_its_crown() -> None:
+def test_skull_centre_of_a_head_is_120_mm_below_the_crown() -> None:
     ball = ellipsoids(((3, 500, 7), np.array(SIZE) / 2))
     assert head_of(ball).skull_mm == pytest.approx((3, 500, 7), abs=0.01)
 
 
-def test_the_skull_of_a_standing_figure_is_at_its_top() -> None:
+def test_skull_of_a_standing_figure_is_at_its_top() -> None:
     mesh = figure()
     assert is_standing_figure(mesh.positions, mesh.triangles)
     assert head_of(mesh).skull_mm == pytest.approx(CENTRE, abs=1.0)
 
 
 @pytest.mark.parametrize("mesh", [arm(), patch(), seated()], ids=["arm", "patch", "seated"])
-def test_what_is_not_a_head_has_its_centre_in_the_middle(mesh: Mesh) -> None:
+def test_other_meshes_use_their_centre(mesh: Mesh) -> None:
     head = head_of(mesh)
     assert head.skull_mm is None
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
@@ -69,7 +69,7 @@ def test_the_skull_of_a_body_is_at_its_head_bone(name: str) -> None:
     assert head_of(mesh, rig).skull_mm == pytest.approx((0, 1000, 0), abs=1e-3)
 
 
-def test_bones_that_only_contain_the_word_head_are_not_its_bone() -> None:
+def test_bone_names_containing_head_are_not_the_head_bone() -> None:
     assert head_bone(("forehead", "HeadTop_End", "headphones")) is None
 
 
@@ -82,7 +82,7 @@ def test_bones_that_only_contain_the_word_head_are_not_its_bone() -> None:
     ],
     ids=["up", "left", "back"],
 )
-def test_a_flat_piece_of_skin_faces_its_front(axes: list[list[int]]) -> None:
+def test_flat_skin_patch_faces_its_front(axes: list[list[int]]) -> None:
     head = head_of(patch(np.array(axes)))
     np.testing.assert_allclose(head.axes, axes)
     assert head.seen_positions_mm[:, 2].max() == pytest.approx(0.9, rel=0.2)

@@ -32,7 +32,7 @@ def test_closed_sphere_stays_a_sphere(levels: int) -> None:
     check_mesh(finer, "finer")
 
 
-def test_it_converges_by_a_quarter_a_level() -> None:
+def test_error_falls_by_four_per_level() -> None:
     sphere = uv_sphere(50, 16, 8)
     radii = [np.linalg.norm(subdivide(sphere, n).mesh.positions, axis=1).mean() for n in range(4)]
     steps = -np.diff(radii)
@@ -40,7 +40,7 @@ def test_it_converges_by_a_quarter_a_level() -> None:
     assert steps[1] < 0.6 * steps[0] and steps[2] < 0.6 * steps[1]
 
 
-def test_an_icosahedron_moves_as_the_weights_say() -> None:
+def test_icosahedron_moves_by_the_weights() -> None:
     golden = (1 + 5**0.5) / 2
     corners = [(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     positions = np.array([np.roll(c, k) for k in range(3) for c in corners])
@@ -64,7 +64,7 @@ def test_an_icosahedron_moves_as_the_weights_say() -> None:
     assert {tuple(p) for p in np.round(finer.positions[12:].astype(float), 4) + 0.0} == set(expected)
 
 
-def test_corners_of_three_triangles_have_a_weight_of_their_own() -> None:
+def test_valence_three_vertices_use_their_weight() -> None:
     positions = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
     mesh = build_mesh(positions, np.zeros((4, 2)), triangles, np.zeros(4), (Material("skin"),))
@@ -136,7 +136,7 @@ def test_materials_are_kept() -> None:
     np.testing.assert_allclose(finer.uv[finer.triangles].mean(axis=1)[3::4], centre, atol=1e-6)
 
 
-def test_levels() -> None:
+def test_invalid_levels_are_refused() -> None:
     flat = plane(100, 1)
     assert subdivide(flat, 0).mesh is flat and subdivide(flat, 0).stencils is None
     for levels in (-1, 4):

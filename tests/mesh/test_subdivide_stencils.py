@@ -42,7 +42,7 @@ def _control(mesh: Mesh) -> np.ndarray:
 @pytest.mark.parametrize(
     "mesh", [uv_sphere(50, 12, 6), plane(90, 3), _quads()], ids=["sphere", "plane", "quads"]
 )
-def test_stencils_give_the_finer_points(mesh: Mesh, levels: int) -> None:
+def test_stencils_reproduce_refined_points(mesh: Mesh, levels: int) -> None:
     finer, stencils = subdivide(mesh, levels)
     assert stencils is not None
     assert len(stencils.first) == int(finer.point.max()) + 2
@@ -92,7 +92,7 @@ def test_a_loaded_head_has_its_stencils(tmp_path: Path) -> None:
     np.testing.assert_allclose(points[head.mesh.point], head.mesh.positions, atol=2e-5)
 
 
-def test_weights_of_large_meshes_are_kept_by_topology(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_of_large_meshes_are_cached_by_topology(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = _quads()
     expected = subdivide(mesh, 2)
     monkeypatch.setattr(module, "_CACHED_TRIANGLES", 0)

@@ -26,7 +26,7 @@ def test_photons_leave_slabs_as_often(eta: float) -> None:
         back, through = (
             np.polyval(np.polyfit(ends, part[0, -4:], 3), 1.0) for part in (made.reflected, made.transmitted)
         )
-        run = trace_slab([ScatteringLayer(0.1, 0.9, depth, 0.0, eta)], PHOTONS).per_entering
+        run = trace_slab([ScatteringLayer(0.1, 0.9, depth, 0.0, eta)], PHOTONS).relative_to_entering
         assert back == pytest.approx(run.total_reflectance, abs=4.0 * run.total_reflectance_se)
         assert through == pytest.approx(run.total_transmittance, abs=4.0 * run.total_transmittance_se)
 

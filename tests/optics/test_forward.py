@@ -50,7 +50,7 @@ def test_photons_leave_slabs_as_often(reduced: float, eta: float) -> None:
     """Light is at normal incidence; depths correspond to 0.4 to 10 mm of skin."""
     for depth in (0.5, 2.0, 10.0):
         body = ScatteringLayer(1.0 - reduced, reduced / (1.0 - G), depth, G, eta)
-        run = trace_slab([body], PHOTONS).per_entering
+        run = trace_slab([body], PHOTONS).relative_to_entering
         for nodes in (8, DIRECTION_NODES):
             made = solve_slabs(reduced, depth, eta, nodes, G)
             back, through = (from_above(made.cosine, part[0]) for part in (made.reflected, made.transmitted))

@@ -26,7 +26,7 @@ def renderer() -> Renderer:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_picture(name: str, renderer: Renderer, tmp_path: Path) -> None:
+def test_picture_matches_reference(name: str, renderer: Renderer, tmp_path: Path) -> None:
     scene, chosen = next((scene, chosen) for known, scene, chosen in pictured() if known == name)
     image = drawn(renderer, scene, chosen).astype(int)
     stored = read_image(STORED / f"{name}.png").astype(int)
@@ -42,6 +42,6 @@ def test_picture(name: str, renderer: Renderer, tmp_path: Path) -> None:
         )
 
 
-def test_all_are_tested() -> None:
+def test_all_reference_pictures_are_tested() -> None:
     assert tuple(name for name, _, _ in pictured()) == NAMES
     assert {path.stem for path in STORED.glob("*.png")} == set(NAMES)

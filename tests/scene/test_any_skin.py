@@ -39,7 +39,7 @@ def seen(camera: Camera, head: Head) -> np.ndarray:
 
 @pytest.mark.parametrize("name", WHOLE)
 @pytest.mark.parametrize("piece", PIECES)
-def test_presets_show_all_of_a_piece_of_skin_and_fill_the_picture(piece: str, name: str) -> None:
+def test_camera_presets_fit_a_skin_patch_in_the_picture(piece: str, name: str) -> None:
     head = head_of(PIECES[piece])
     places = np.abs(seen(CAMERA_PRESETS[name](head), head))
     assert 0.85 < places.max() < 0.98
@@ -47,7 +47,7 @@ def test_presets_show_all_of_a_piece_of_skin_and_fill_the_picture(piece: str, na
 
 @pytest.mark.parametrize("name", CAMERA_PRESETS)
 @pytest.mark.parametrize("piece", PIECES)
-def test_every_preset_shows_some_of_a_piece_of_skin(piece: str, name: str) -> None:
+def test_every_camera_preset_shows_part_of_a_skin_patch(piece: str, name: str) -> None:
     head = head_of(PIECES[piece])
     assert (np.abs(seen(CAMERA_PRESETS[name](head), head)).max(axis=1) < 1.0).any()
 
@@ -57,7 +57,7 @@ def test_a_patch_that_faces_up_is_seen_from_above() -> None:
     assert camera.position[1] > 1000 and camera.up == (0.0, 0.0, -1.0)
 
 
-def test_a_portrait_of_a_body_is_that_of_its_head() -> None:
+def test_portrait_of_a_body_frames_its_head() -> None:
     head = head_of(figure())
     np.testing.assert_allclose(head.centre_mm, CENTRE, atol=1.0)
     assert dermis.portrait(head) == dermis.portrait(head_of(figure()))
@@ -86,7 +86,7 @@ def test_names_of_presets_have_hyphens_or_underscores() -> None:
 
 
 @pytest.mark.parametrize("name", light_presets())
-def test_lights_of_a_body_reach_its_feet(name: str) -> None:
+def test_lights_illuminate_a_body_to_its_feet(name: str) -> None:
     head = head_of(figure())
     feet = np.array([0.0, -1580.0, 0.0])
     for light, plain in zip(preset_lights(name, head), preset_lights(name), strict=True):
@@ -100,7 +100,7 @@ def test_lights_of_a_body_reach_its_feet(name: str) -> None:
             assert np.degrees(np.arccos(cosine)) < light.inner_degrees
 
 
-def test_area_lights_of_a_body_look_as_large_as_those_of_a_head() -> None:
+def test_area_lights_keep_their_apparent_size_for_bodies() -> None:
     for light, plain in zip(preset_lights("window", head_of(figure())), preset_lights("window"), strict=True):
         assert light.width_mm / np.linalg.norm(light.position) == pytest.approx(
             plain.width_mm / np.linalg.norm(plain.position)
@@ -137,13 +137,13 @@ def test_a_stated_colour_is_kept_but_not_the_grey_of_new_materials(
     assert head.maps.mean_colour == pytest.approx(expected or default_skin_colour(), abs=1e-3)
 
 
-def test_a_picture_of_the_user_is_the_colour(tmp_path: Path) -> None:
+def test_given_picture_is_used_as_colour(tmp_path: Path) -> None:
     dermis.write_image(tmp_path / "white.png", np.ones((1, 1, 3), np.float32))
     path = write_obj(tmp_path / "arm.obj", arm())
     assert load(path, colour=tmp_path / "white.png").maps.mean_colour == pytest.approx(np.ones(3))
 
 
-def test_front_turns_the_face(tmp_path: Path) -> None:
+def test_front_option_rotates_the_head(tmp_path: Path) -> None:
     path = write_obj(tmp_path / "patch.obj", patch(np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]])), 0.2)
     turned = load(path, unit_mm=0.2, front="-z")
     np.testing.assert_allclose(turned.mesh.positions, patch().positions, atol=1e-3)

@@ -27,7 +27,7 @@ def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:
     return np.column_stack((x / w, y / w))
 
 
-def test_centre_of_a_small_head_is_its_middle(head: Head) -> None:
+def test_centre_of_a_small_head_is_its_bounding_box_centre(head: Head) -> None:
     np.testing.assert_allclose(head.centre_mm, 0, atol=1e-3)
 
 
@@ -48,7 +48,7 @@ def test_up_is_up_and_the_camera_is_level(head: Head, name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "degrees"), [("portrait", 0), ("three-quarter", 40), ("profile", 90)])
-def test_presets_go_round_to_the_heads_left(head: Head, name: str, degrees: float) -> None:
+def test_preset_azimuth_increases_to_the_left_of_the_head(head: Head, name: str, degrees: float) -> None:
     camera = CAMERA_PRESETS[name](head)
     x, y, z = np.subtract(camera.position, camera.target)
     assert y == pytest.approx(0, abs=1e-6)

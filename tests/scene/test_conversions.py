@@ -21,7 +21,7 @@ def head(tmp_path: Path) -> Head:
     return dermis.load_head(write_head(tmp_path / "head.obj"))
 
 
-def test_lights_may_be_one_or_a_name_or_made_as_they_are_asked_for(head: Head) -> None:
+def test_lights_accept_one_light_an_iterable_or_a_name(head: Head) -> None:
     assert dermis.Scene(head, lights=LAMP).lights == (LAMP,)
     assert dermis.Scene(head, lights=(one for one in [LAMP, LAMP])).lights == (LAMP, LAMP)
     assert dermis.Scene(head, lights="window").lights == dermis.load_lights("window")
@@ -55,12 +55,12 @@ def test_heads_may_be_named(head: Head, tmp_path: Path) -> None:
         ({"environment": 3}, "environment: expected an environment, but got 3"),
     ],
 )
-def test_what_is_not_clear_is_refused(head: Head, parts: dict[str, Any], said: str) -> None:
+def test_ambiguous_values_are_refused(head: Head, parts: dict[str, Any], said: str) -> None:
     with pytest.raises(dermis.DermisError, match=said):
         dermis.Scene(head, **parts)
 
 
-def test_places_in_metres_are_pointed_out(head: Head) -> None:
+def test_positions_in_metres_are_pointed_out(head: Head) -> None:
     with pytest.warns(DermisWarning, match=r"^camera: .*1\.1 mm from the centre\. Write 1100 for 1\.1 m\."):
         dermis.Scene(head, camera=dermis.Camera(position=(0, 0, 1.1)))
     with pytest.warns(DermisWarning, match="^light: "):

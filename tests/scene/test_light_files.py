@@ -46,7 +46,7 @@ def _scene(folder: Path, text: str) -> Scene:
     return load_scene(path)[0]
 
 
-def test_kinds_of_lights(folder: Path) -> None:
+def test_all_light_types_are_read(folder: Path) -> None:
     scene = _scene(folder, KINDS)
     assert scene.lights == (
         RectangleLight(position=(0, 0, 900), width_mm=500, height_mm=300),
@@ -56,7 +56,7 @@ def test_kinds_of_lights(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", light_presets())
-def test_every_rig_loads_and_says_what_it_is(name: str) -> None:
+def test_every_rig_loads_and_has_a_description(name: str) -> None:
     lights = load_lights(name)
     assert (len(lights) == 0) == (name == "none")
     if lights:
@@ -66,7 +66,7 @@ def test_every_rig_loads_and_says_what_it_is(name: str) -> None:
         assert max(keys) > 3 and all(light.shadows for light in lights)
 
 
-def test_rigs_are_those_asked_for() -> None:
+def test_named_rig_is_loaded() -> None:
     assert light_presets() == [
         "backlit",
         *("laser", "none", "rembrandt", "rim", "studio", "top", "window"),
@@ -97,7 +97,7 @@ def test_an_environment_replaces_the_lights_that_are_not_named(folder: Path) -> 
     assert Scene(scene.head).lights == studio()
 
 
-def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
+def test_environment_path_is_relative_to_the_scene(folder: Path) -> None:
     (folder / "sky.hdr").write_bytes(b"")
     scene = _scene(folder, '[environment]\nname = "sky.hdr"\n')
     assert scene.environment is not None and scene.environment.name == str(folder / "sky.hdr")
@@ -116,6 +116,6 @@ def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
         ('[[lights]]\nkind = "rectangle"\nposition = [0, 0, 900]\nwidth_mm = 0\n', "width_mm"),
     ],
 )
-def test_what_cannot_be_is_refused(folder: Path, text: str, said: str) -> None:
+def test_invalid_light_files_are_refused(folder: Path, text: str, said: str) -> None:
     with pytest.raises(DermisError, match=said):
         _scene(folder, text)

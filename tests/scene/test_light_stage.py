@@ -14,14 +14,14 @@ from dermis.scene.environment import Environment
 from dermis.scene.light_stage import light_stage, light_stage_weights
 
 
-def test_lights_are_evenly_around() -> None:
+def test_lights_are_distributed_evenly() -> None:
     places = -np.array([light.direction for light in light_stage(200)])
     assert np.allclose(np.linalg.norm(places, axis=1), 1.0)
     assert np.abs(places.mean(axis=0)).max() < 0.01
     assert np.allclose(places.T @ places / 200, np.eye(3) / 3, atol=0.01)
 
 
-def test_weights_are_the_light_from_the_turned_surroundings(tmp_path: Path) -> None:
+def test_weights_match_the_rotated_environment(tmp_path: Path) -> None:
     """Check the total irradiance, and that most of it comes from the rotated bright spot."""
     sky = np.full((256, 512, 3), 0.1, np.float32)
     sky[128, 384] = (900.0, 600.0, 300.0)  # towards +X

@@ -55,7 +55,7 @@ def _models(kind: type[FrozenModel] = FrozenModel) -> Iterator[type[FrozenModel]
         yield from _models(one)
 
 
-def test_no_model_is_left_out() -> None:
+def test_all_models_are_tested() -> None:
     assert set(_models()) == set(NEEDED)
 
 
@@ -73,7 +73,7 @@ IDS = [f"{model.__name__}.{field}" for model, field in NUMBERS]
 
 
 @pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
-def test_what_is_no_number_of_a_model_is_refused(model: type[FrozenModel], field: str) -> None:
+def test_invalid_numbers_of_models_are_refused(model: type[FrozenModel], field: str) -> None:
     for value in NONE:
         if isinstance(value, str) and numeric_fields(model)[field]:  # a word may stand for it
             continue
@@ -82,7 +82,7 @@ def test_what_is_no_number_of_a_model_is_refused(model: type[FrozenModel], field
 
 
 @pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
-def test_a_number_of_a_model_has_a_range_with_a_reason(model: type[FrozenModel], field: str) -> None:
+def test_each_number_of_a_model_has_a_documented_range(model: type[FrozenModel], field: str) -> None:
     info = model.model_fields[field]
     kind = get_args(info.annotation)
     if field_bounds(info) == (None, None):
@@ -97,7 +97,7 @@ def test_a_number_of_a_model_has_a_range_with_a_reason(model: type[FrozenModel],
 
 
 @pytest.mark.parametrize("kind", PEOPLE)
-def test_what_is_no_number_of_a_person_is_refused(kind: Callable[..., object]) -> None:
+def test_invalid_numbers_of_people_are_refused(kind: Callable[..., object]) -> None:
     names = [one.name for one in fields(kind) if one.type in ("float", "int")]  # type: ignore[arg-type]
     assert len(names) > 3
     for name in names:
@@ -117,7 +117,7 @@ POSES: Mapping[str, Callable[[Any], dermis.Pose]] = {
 
 
 @pytest.mark.parametrize("part", POSES)
-def test_what_is_no_number_of_a_pose_is_refused(part: str) -> None:
+def test_invalid_numbers_of_poses_are_refused(part: str) -> None:
     head = Human().head()
     for value in NONE:
         with pytest.raises(DermisError, match=r"^pose: "):

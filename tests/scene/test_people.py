@@ -25,7 +25,7 @@ def test_light_spreads_less_in_darker_skin() -> None:
     assert mean_square_mm2(profile(pale)) > 1.1 * mean_square_mm2(profile(dark))
 
 
-def test_all_else_is_kept() -> None:
+def test_other_properties_are_kept() -> None:
     person = Human()
     skin = skin_of(person, Skin(oiliness=0.4, roughness=0.25))
     assert (skin.oiliness, skin.roughness, skin.albedo) == (0.4, 0.25, "map")

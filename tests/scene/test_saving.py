@@ -117,7 +117,7 @@ SETTINGS = Settings(
 @pytest.mark.parametrize(
     "plain", [CAMERA, SKIN, PIGMENTS, ROOM, SETTINGS, *LIGHTS], ids=lambda p: type(p).__name__
 )
-def test_no_field_here_has_its_default(plain: FrozenModel) -> None:
+def test_test_values_differ_from_defaults(plain: FrozenModel) -> None:
     """Check the test data, as the round trip could not detect an unsaved default."""
     fixed = {"kind", "angle_degrees"} if isinstance(plain, StripeLight) else {"kind"}
     for name in type(plain).model_fields.keys() - fixed:
@@ -133,7 +133,7 @@ def test_no_field_here_has_its_default(plain: FrozenModel) -> None:
         Scene(HEAD),
     ],
 )
-def test_a_scene_comes_back(scene: Scene, tmp_path: Path) -> None:
+def test_scene_round_trip(scene: Scene, tmp_path: Path) -> None:
     save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "human"})
     made, settings = load_scene(tmp_path / "scene.toml", HEAD)
     assert (made.camera, made.skin, made.environment, settings) == (
@@ -145,7 +145,7 @@ def test_a_scene_comes_back(scene: Scene, tmp_path: Path) -> None:
     assert tuple(made.lights) == tuple(scene.lights)
 
 
-def test_a_pose_comes_back(tmp_path: Path) -> None:
+def test_pose_round_trip(tmp_path: Path) -> None:
     rig = random_rig()
     rig = replace(rig, targets=replace(rig.targets, names=("mouth open", "é", *rig.targets.names[2:])))
     head = replace(HEAD, rig=rig)
@@ -161,13 +161,13 @@ def test_a_pose_comes_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(mine, other)
 
 
-def test_a_pose_of_nothing_comes_back(tmp_path: Path) -> None:
+def test_empty_pose_round_trip(tmp_path: Path) -> None:
     save_scene(tmp_path / "scene.toml", Scene(HEAD, pose=Pose()), SETTINGS, {"name": "human"})
     made, _ = load_scene(tmp_path / "scene.toml", HEAD)
     assert isinstance(made.pose, Pose) and not made.pose.weights and not made.pose.bones
 
 
-def test_places_of_points_are_not_saved_as_text(tmp_path: Path) -> None:
+def test_point_positions_are_not_saved_as_text(tmp_path: Path) -> None:
     scene = Scene(HEAD, pose=Pose(positions_mm=HEAD.positions_mm))
     with pytest.raises(DermisError, match=r"weights and bones, .* but it has positions_mm"):
         save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "human"})
@@ -186,13 +186,13 @@ def test_places_of_points_are_not_saved_as_text(tmp_path: Path) -> None:
         ('positions_mm = [[0, 0, 0]]', r"scene\.toml: pose: positions_mm: expected one of weights, bones"),
     ],
 )  # fmt: skip
-def test_a_pose_that_cannot_be_names_file_and_key(tmp_path: Path, table: str, words: str) -> None:
+def test_invalid_pose_names_file_and_key(tmp_path: Path, table: str, words: str) -> None:
     (tmp_path / "scene.toml").write_text(f'[head]\nname = "human"\n[pose]\n{table}\n')
     with pytest.raises(DermisError, match=words):
         load_scene(tmp_path / "scene.toml", replace(HEAD, rig=random_rig()))
 
 
 @pytest.mark.parametrize("name", ['a"b\\c.obj', "tab\tline\n.obj", "delete\x7f.obj", "é\u2028ø.obj"])
-def test_odd_file_names_come_back(name: str) -> None:
+def test_unusual_file_names_round_trip(name: str) -> None:
     text = scene_text(Scene(HEAD), Settings(), {"name": name})
     assert tomllib.loads(text)["head"]["name"] == name

@@ -95,7 +95,7 @@ def _load(folder: Path, text: str) -> tuple[Scene, Settings]:
     return load_scene(path)
 
 
-def test_everything_written_comes_out(folder: Path) -> None:
+def test_all_keys_are_read(folder: Path) -> None:
     scene, settings = _load(folder, WHOLE)
     expected = load_head(
         folder / "head.obj",
@@ -132,18 +132,18 @@ def test_everything_written_comes_out(folder: Path) -> None:
     )
 
 
-def test_what_is_left_out_has_its_default(folder: Path) -> None:
+def test_missing_keys_have_defaults(folder: Path) -> None:
     scene, settings = _load(folder, '[head]\nname = "head.obj"\n')
     assert (scene.skin, settings) == (Skin(), Settings())
     assert (scene.lights, scene.camera) == (studio(), portrait(scene.head))
 
 
-def test_presets_by_name(folder: Path) -> None:
+def test_presets_are_loaded_by_name(folder: Path) -> None:
     scene, _ = _load(folder, 'lights = "studio"\ncamera = "three-quarter"\n[head]\nname = "head.obj"\n')
     assert (scene.lights, scene.camera) == (studio(), three_quarter(scene.head))
 
 
-def test_lights_and_camera_may_lie_in_files_beside_the_scene(folder: Path) -> None:
+def test_lights_and_camera_files_are_relative_to_the_scene(folder: Path) -> None:
     scene, _ = _load(folder, 'lights = "lights.toml"\ncamera = "camera.toml"\n[head]\nname = "head.obj"\n')
     assert scene.lights == (PointLight(position=(0, 0, 900)),)
     assert scene.camera == Camera(position=(0, 0, 900))
@@ -173,7 +173,7 @@ def test_studio_is_three_shadowed_spots_from_three_sides() -> None:
     assert sum(lights[0].irradiance) > sum(lights[1].irradiance)
 
 
-def test_regions_of_the_face_come_from_a_table(folder: Path) -> None:
+def test_face_regions_are_read_from_a_table(folder: Path) -> None:
     values = "".join(f'["{region}"]\nm = 0.4\nrho_s = 0.25\n' for region in REGIONS)
     (folder / "face.toml").write_text('labels = "face.png"\n' + values)
     write_png(folder / "face.png", np.zeros((16, 16), np.uint8))
@@ -193,6 +193,14 @@ def test_regions_of_the_face_come_from_a_table(folder: Path) -> None:
         ("regions = 3", "", "regions"),
     ],
 )
-def test_regions_that_cannot_be_are_refused(folder: Path, head: str, skin: str, said: str) -> None:
+def test_invalid_regions_are_refused(folder: Path, head: str, skin: str, said: str) -> None:
     with pytest.raises(DermisError, match=said):
         _load(folder, f'[head]\nname = "head.obj"\n{head}\n[skin]\n{skin}\n')
+
+
+def test_old_keyword_of_the_head_warns(tmp_path: Path) -> None:
+    head = load_head(write_head(tmp_path / "head.obj"))
+    (tmp_path / "scene.toml").write_text('[head]\nname = "absent.obj"\n')
+    with pytest.warns(DeprecationWarning, match="known is now head"):
+        scene, _ = load_scene(tmp_path / "scene.toml", known=head)  # type: ignore[call-arg]
+    assert scene.head is head

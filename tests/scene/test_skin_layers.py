@@ -37,7 +37,7 @@ def test_a_layer_that_absorbs_more_red_returns_less_of_it() -> None:
     assert darker[0] < 0.6 * plain[0] and darker[1:] == pytest.approx(plain[1:], rel=0.02)
 
 
-def test_a_thicker_epidermis_is_fitted_near_what_a_fresh_fit_finds() -> None:
+def test_incremental_fit_of_thicker_epidermis_matches_a_new_fit() -> None:
     profiles = SkinProfiles()
     profiles.profile(with_layers("dj3", thickness_mm=0.30))
     near = profiles.profile(with_layers("dj3", thickness_mm=0.32))
@@ -47,14 +47,14 @@ def test_a_thicker_epidermis_is_fitted_near_what_a_fresh_fit_finds() -> None:
     assert near.energy_within(radii) == pytest.approx(fresh.energy_within(radii), rel=1e-2, abs=1e-3)
 
 
-def test_skins_that_take_turns_are_fitted_once() -> None:
+def test_alternating_skins_are_fitted_once() -> None:
     profiles = SkinProfiles()
     pair = with_layers("dj3"), Skin(profile="light", pigments=Pigments(structure="biospec"))
     first = [profiles.profile(skin) for skin in pair]
     assert all(profiles.profile(skin) is fit for skin, fit in zip(pair, first, strict=True))
 
 
-def test_structures_have_their_layers() -> None:
+def test_structures_give_their_layers() -> None:
     skins = (Skin(profile="light", pigments=Pigments(structure=name)) for name in ("dj2006", "biospec"))
     counts = [len(skin_tissue(skin).medium.layers) for skin in skins]
     assert counts == [2, 4]
@@ -62,7 +62,7 @@ def test_structures_have_their_layers() -> None:
 
 
 @pytest.mark.parametrize("profile", ["light", "gpu-gems-3"])
-def test_what_is_no_medium_takes_no_layers(profile: str) -> None:
+def test_layers_need_a_medium(profile: str) -> None:
     layers = tissue_layers(Skin(profile="skin1"))
     with pytest.raises(DermisError, match=profile):
         SkinProfiles().profile(Skin(profile=profile, layers=layers))
@@ -77,7 +77,7 @@ def test_impossible_layers_are_refused(fields: dict[str, object]) -> None:
         with_layers("dj3", **fields)
 
 
-def test_only_the_last_layer_is_endless() -> None:
+def test_only_the_last_layer_is_semi_infinite() -> None:
     layers = tissue_layers(Skin(profile="skin1")) * 2
     with pytest.raises(DermisError, match="infinite in the last layer only"):
         skin_tissue(Skin(profile="skin1", layers=layers))

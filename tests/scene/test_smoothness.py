@@ -38,7 +38,7 @@ def seen(head: Head, camera: Camera, side: int) -> Silhouette:
     return silhouette(head.mesh, K, R, t - R @ np.array(head.centre_mm), (side, side))
 
 
-def test_a_regular_polygon_is_off_its_circle_by_what_geometry_says() -> None:
+def test_polygon_deviates_from_its_circle_by_the_sagitta() -> None:
     distance, head = 1e5, ball()
     from_above = Camera(position=(0.0, distance, 0.0), up=(0.0, 0.0, 1.0), frame_mm=300.0)
     found = seen(head, from_above, 1000)
@@ -47,7 +47,7 @@ def test_a_regular_polygon_is_off_its_circle_by_what_geometry_says() -> None:
     assert np.allclose(found.deviation_px, RADIUS_MM * (1 - np.cos(np.pi / SIDES)) * scale, rtol=0.02)
 
 
-def test_most_of_the_outline_counts_by_its_length() -> None:
+def test_outline_deviation_is_weighted_by_length() -> None:
     found = Silhouette(np.array([90.0, 4.0, 6.0]), np.array([0.5, 2.0, 9.0]))
     assert found.typical_deviation_px == 0.5
     assert Silhouette(np.zeros(0), np.zeros(0)).typical_deviation_px == 0.0
@@ -64,7 +64,7 @@ def test_levels_grow_as_the_camera_comes_near() -> None:
     assert SmoothIn(lambda head: near, size)(ball()) > SmoothIn(portrait, size)(ball())
 
 
-def test_fine_heads_stay_as_they_are_and_none_gets_too_large() -> None:
+def test_fine_heads_are_unchanged_and_size_is_limited() -> None:
     assert SmoothIn()(ball(128)) == 0
     assert smooth_levels(1e3, 1000) == 3
     for triangles in (5_000, 50_000, 80_000, 500_000):
@@ -73,7 +73,7 @@ def test_fine_heads_stay_as_they_are_and_none_gets_too_large() -> None:
     assert smooth_levels(1e3, 80_000) == 0
 
 
-def test_an_outline_that_was_coarse_is_smooth(tmp_path: Path) -> None:
+def test_coarse_outline_becomes_smooth(tmp_path: Path) -> None:
     path = write_head(tmp_path / "head.obj")
     coarse, smooth = (
         seen(head, portrait(head), 1024)
@@ -84,7 +84,7 @@ def test_an_outline_that_was_coarse_is_smooth(tmp_path: Path) -> None:
     assert smooth.length_px.max() < 25
 
 
-def test_a_head_alone_is_made_for_a_portrait(tmp_path: Path) -> None:
+def test_head_without_picture_size_assumes_a_portrait(tmp_path: Path) -> None:
     path = write_head(tmp_path / "head.obj")
     plain = dermis.load_head(path, subdivide=0)
     assert plain.levels == 0
@@ -94,12 +94,12 @@ def test_a_head_alone_is_made_for_a_portrait(tmp_path: Path) -> None:
         dermis.load_head(path, subdivide="most")  # type: ignore[arg-type]
 
 
-def test_people_keep_their_own_level() -> None:
+def test_people_keep_their_subdivision_level() -> None:
     assert dermis.load_head("human").levels == 1
     assert dermis.load_head("human", subdivide=SmoothIn(size=(16, 16))).levels == 1
 
 
-def test_options_and_files_say_what_picture_it_is_for(
+def test_picture_size_of_options_and_files_sets_the_level(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, scene = write_head(tmp_path / "head.obj"), tmp_path / "scene.toml"

@@ -28,7 +28,7 @@ gamma = "wrong"
 
 
 @pytest.mark.parametrize("kind", FIELDS)
-def test_they_are_listed_under_their_heading(kind: type[FrozenModel]) -> None:
+def test_settings_of_the_talk_are_listed_under_their_heading(kind: type[FrozenModel]) -> None:
     assert fields_under(COMPARISONS, kind) == FIELDS[kind]
     assert {field_heading(kind, name) for name in kind.model_fields} == {"", COMPARISONS}
     assert all(field_help(kind, name) for name in FIELDS[kind])

@@ -62,13 +62,13 @@ def test_impossible_values_are_refused(kind: type, values: dict, says: str) -> N
     assert FORM.fullmatch(message), message
 
 
-def test_all_that_is_wrong_is_told_at_once() -> None:
+def test_all_errors_are_reported_at_once() -> None:
     with pytest.raises(InvalidFieldsError) as caught:
         Skin(mix=2, roughness=-1)
     assert list(caught.value.messages) == ["mix", "roughness"]
 
 
-def test_edges_of_the_ranges_are_allowed() -> None:
+def test_range_limits_are_allowed() -> None:
     Skin(mix=0, roughness=0.05, rho_s=0), Skin(mix=1, roughness=1, rho_s=1)
     Settings(size=(1, 1), atlas=64, samples=1), Settings(size=(16384, 1), samples=64)
 
@@ -82,7 +82,7 @@ def test_scene_data_are_frozen_and_copied_with_other_values() -> None:
         skin.replace(mix=7)
 
 
-def test_the_one_value_that_is_needed_may_come_without_its_name() -> None:
+def test_single_required_value_may_be_positional() -> None:
     assert Environment("lebombo") == Environment(name="lebombo")
     assert Camera((0, 0, 900), frame_mm=200) == Camera(position=(0, 0, 900), frame_mm=200)
     assert PointLight(np.array([0, 0, 900])) == PointLight(position=(0, 0, 900))
@@ -92,7 +92,7 @@ def test_the_one_value_that_is_needed_may_come_without_its_name() -> None:
         Camera((0, 0, 900), (0, 0, 0))
 
 
-def test_clear_values_are_taken() -> None:
+def test_unambiguous_values_are_converted() -> None:
     assert Settings(size=64) == Settings(size=(64, 64)) == Settings(size=np.array([64, 64]))
     assert PointLight(position=[0, 0, 9], irradiance=2) == PointLight(
         position=(0, 0, 9), irradiance=(2, 2, 2)
@@ -112,20 +112,20 @@ def test_clear_values_are_taken() -> None:
         (PointLight, {"position": (0, 0, 9), "irradiance": "white"}, "expected a list of 3 numbers, but"),
     ],
 )
-def test_wrong_names_and_forms_say_what_is_meant(kind: type, values: dict, says: str) -> None:
+def test_wrong_names_and_types_suggest_the_right_ones(kind: type, values: dict, says: str) -> None:
     with pytest.raises(DermisError) as caught:
         kind(**values)
     assert says in str(caught.value)
 
 
-def test_equal_values_are_those_that_say_the_same() -> None:
+def test_equality_compares_values() -> None:
     assert Skin(mix=0.3) == Skin(mix=0.3) and hash(Skin(mix=0.3)) == hash(Skin(mix=0.3))
     assert Skin(mix=0.3) != Skin(mix=0.4)
     assert PointLight(position=(0, 0, 9)) != SpotLight(position=(0, 0, 9))
     assert Skin() != "skin"
 
 
-def test_a_word_may_stand_for_a_number() -> None:
+def test_names_may_replace_numbers() -> None:
     """Check that words are kept, also in files, and that encoded colours become linear."""
     settings = Settings(exposure="auto", background="gradient")
     assert Settings(**settings.model_dump()) == settings

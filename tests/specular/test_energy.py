@@ -29,7 +29,7 @@ def furnace(energy: EnergyScheme, views: Floats, m: float, rho_s: float, model: 
     return energy.furnace_radiance(rho, mean_albedo(m, model), rho_s)
 
 
-def test_published_use_loses_what_others_measured() -> None:
+def test_published_scheme_loses_the_measured_energy() -> None:
     """Check strength 0.18 and m = 0.3: 0.96 overall and 0.85 at grazing angles, 0.99 if divided by pi."""
     ends = furnace(ENERGY_SCHEMES["published"], np.array([1.0, 0.05]), 0.3, 0.18)
     assert ends == pytest.approx([0.96, 0.85], abs=0.005)
@@ -37,13 +37,13 @@ def test_published_use_loses_what_others_measured() -> None:
     assert divided == pytest.approx([0.99, 0.99], abs=0.005)
 
 
-def test_without_the_term_skin_gives_more_than_it_gets() -> None:
+def test_omitting_the_term_creates_energy() -> None:
     assert (furnace(ENERGY_SCHEMES["none"], VIEWS, 0.3, 0.18) > 1.0).all()
 
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
 @pytest.mark.parametrize("model", MODELS)
-def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
+def test_full_scheme_conserves_energy(model: str, m: float) -> None:
     """Check the shader's tables: no view above 1.01, the mean within 1 %."""
     rho = directional_albedo(VIEWS, m, MODELS[model].lobe)
     table, mean = twins.surface_albedo(VIEWS, m, model)
@@ -56,7 +56,7 @@ def test_full_energy_gives_back_all_of_the_light(model: str, m: float) -> None:
 
 @pytest.mark.parametrize("view", [0.1, 0.6, 1.0])
 @pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "two-lobe"])
-def test_furnace_light_by_light(model: str, view: float) -> None:
+def test_furnace_test_per_light_direction(model: str, view: float) -> None:
     """Sum the whole reflection over light directions, without a quadrature of the model."""
     m, rho_s, energy = 0.35, 0.7, ENERGY_SCHEMES["full"]
     mu, phi = (np.arange(500) + 0.5) / 500, np.pi * (np.arange(240) + 0.5) / 240
@@ -74,7 +74,7 @@ def test_furnace_light_by_light(model: str, view: float) -> None:
     assert out == pytest.approx(1.0, abs=0.005)
 
 
-def test_dark_skin_gets_no_lighter_than_its_own_colour() -> None:
+def test_dark_skin_is_not_lighter_than_its_colour() -> None:
     """Check that light reflected back inside is dimmed by the skin once."""
     m, rho_s, colour = 0.3, 1.0, 0.2
     rho, mean = directional_albedo(VIEWS, m), mean_albedo(m)
@@ -82,5 +82,5 @@ def test_dark_skin_gets_no_lighter_than_its_own_colour() -> None:
     assert (below * VIEWS).sum() / VIEWS.sum() == pytest.approx(colour * (1 - mean), rel=0.002)
 
 
-def test_the_published_term_stops_at_nothing() -> None:
+def test_published_term_is_clamped_at_zero() -> None:
     assert ENERGY_SCHEMES["published"].entering_fraction(0.5, 1.0) == 0.0

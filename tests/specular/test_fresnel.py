@@ -19,7 +19,7 @@ def columns(sample_folder: Path) -> NDArray[np.float64]:
     return np.loadtxt(path, delimiter=",", skiprows=1).T
 
 
-def test_both_curves_are_the_reference_columns(columns: NDArray[np.float64]) -> None:
+def test_both_curves_match_the_reference_columns(columns: NDArray[np.float64]) -> None:
     cosine, exact, schlick_exact, schlick_rounded = columns
     assert np.allclose(dielectric(cosine), exact, rtol=PUBLISHED)
     assert np.allclose(schlick(cosine, ((SKIN_ETA - 1) / (SKIN_ETA + 1)) ** 2), schlick_exact, rtol=PUBLISHED)
@@ -34,14 +34,14 @@ def test_schlick_follows_fresnel() -> None:
 
 
 @pytest.mark.parametrize("eta", [1.2, 1.3, 1.33, 1.38, 1.4, 1.45, 1.5, 1.55])
-def test_share_of_light_from_everywhere(sample_folder: Path, eta: float) -> None:
+def test_hemispherical_reflectance_matches_quadrature(sample_folder: Path, eta: float) -> None:
     path = sample_folder / "reference" / "data" / "fresnel_hemispherical.csv"
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     external = float(table[table[:, 0] == eta, 3][0])
     assert hemispherical_reflectance(lambda c: dielectric(c, eta)) == pytest.approx(external, rel=PUBLISHED)
 
 
-def test_skin_reflects_more_from_everywhere_than_the_six_percent_of_the_talk() -> None:
+def test_hemispherical_reflectance_exceeds_six_percent_of_the_talk() -> None:
     assert hemispherical_reflectance() == pytest.approx(0.0768, abs=5e-5)
     # Schlick's curve integrates in closed form: F0 + (1 - F0) / 21
     assert hemispherical_reflectance(schlick) == pytest.approx(SKIN_F0 + (1 - SKIN_F0) / 21, rel=1e-12)

@@ -40,7 +40,7 @@ def albedo(sin_o: float, depth: Floats, roughness: float = LONGITUDINAL_ROUGHNES
 
 @pytest.mark.parametrize("angle", ANGLES)
 @pytest.mark.parametrize("roughness", [0.2, 0.3, 0.9])
-def test_a_white_hair_gives_back_what_it_gets(angle: float, roughness: float) -> None:
+def test_white_hair_conserves_energy(angle: float, roughness: float) -> None:
     assert albedo(np.sin(angle), np.zeros(3), roughness) == pytest.approx(np.ones(3), abs=ENERGY)
 
 
@@ -54,7 +54,7 @@ def test_shares_of_the_lobes_add_up(angle: float) -> None:
 
 
 @pytest.mark.parametrize("variance", fibre_parameters().variance)
-def test_along_the_fibre_nothing_is_lost_and_both_ways_are_one(variance: float) -> None:
+def test_longitudinal_term_conserves_energy_and_is_reciprocal(variance: float) -> None:
     sines, step = bands(20_000, -1, 1)
     for angle in ANGLES:
         assert longitudinal_scattering(sines, np.sin(angle), variance).sum() * step == pytest.approx(
@@ -64,13 +64,13 @@ def test_along_the_fibre_nothing_is_lost_and_both_ways_are_one(variance: float) 
     assert np.allclose(longitudinal_scattering(i, o, variance), longitudinal_scattering(o, i, variance))
 
 
-def test_around_the_fibre_nothing_is_lost() -> None:
+def test_azimuthal_term_conserves_energy() -> None:
     phi, step = bands(5000, -np.pi, np.pi)
     for width in (0.05, 0.27, 2.0):
         assert azimuthal_logistic(phi + 9.0, width).sum() * step == pytest.approx(1.0, abs=1e-6)
 
 
-def test_left_and_right_are_alike() -> None:
+def test_lobe_is_symmetric() -> None:
     rng = np.random.default_rng(1)
     (i, o), phi = rng.uniform(-0.99, 0.99, (2, 300)), rng.uniform(-np.pi, np.pi, 300)
     depth = np.array([0.2, 0.5, 1.0])

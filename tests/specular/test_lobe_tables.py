@@ -28,7 +28,7 @@ COLUMNS = {
 
 
 @pytest.mark.parametrize("name", COLUMNS)
-def test_directional_albedo(sample_folder: Path, name: str) -> None:
+def test_directional_albedo_matches_the_reference(sample_folder: Path, name: str) -> None:
     stored = np.load(sample_folder / "reference" / "data" / "specular_rho_dt.npz")
     column, factor = COLUMNS[name]
     made = directional_albedo(stored["cos_theta"], stored["m"][:, None], MODELS[name].lobe)
@@ -78,7 +78,7 @@ def test_albedo_table_between_its_texels(name: str, fresnel: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_table_knows_the_mean_of_all_directions(name: str) -> None:
+def test_table_contains_the_hemispherical_mean(name: str) -> None:
     x, w = np.polynomial.legendre.leggauss(64)
     mu, m = 0.5 * (x + 1), np.linspace(0.1, 0.9, 9)
     exact = (directional_albedo(mu, m[:, None], MODELS[name].lobe) * mu) @ w
@@ -86,7 +86,7 @@ def test_table_knows_the_mean_of_all_directions(name: str) -> None:
     assert np.abs(made - exact).max() < 0.001  # of all the light
 
 
-def test_tables_are_made_once() -> None:
+def test_tables_are_computed_once() -> None:
     assert albedo_table("phong") is albedo_table("phong")
     assert beckmann_table() is beckmann_table()
 

@@ -60,7 +60,7 @@ def test_lobe_is_the_reference_lobe(sample_folder: Path, name: str, m: float) ->
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_light_and_view_may_change_places_where_the_model_says_so(name: str) -> None:
+def test_models_stated_reciprocal_are_reciprocal(name: str) -> None:
     """Check reciprocity; the plain highlights are not reciprocal."""
     error = reciprocity_error(name)
     assert error < RECIPROCAL if MODELS[name].reciprocal else error > 0.1
@@ -89,7 +89,7 @@ def test_roughness_may_differ_from_point_to_point(name: str) -> None:
 
 
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
-def test_peaks_over_the_surface(m: float) -> None:
+def test_peaks_match_the_reference(m: float) -> None:
     """Compare with F0 / (4 pi m^2) of Beckmann lobes and equally wide powers; two lobes mix theirs."""
     one = SKIN_F0 / (4 * np.pi * m**2)
     for name in ("kelemen", "torrance-sparrow", "torrance-sparrow-smith", "blinn-phong"):
@@ -114,7 +114,7 @@ def test_smith_masking_at_its_limits() -> None:
 
 
 @pytest.mark.parametrize("degrees", [30.0, 70.0, 85.0])
-def test_facets_of_both_kinds_that_are_seen_fill_just_what_the_surface_fills(degrees: float) -> None:
+def test_visible_facets_project_to_the_surface_area(degrees: float) -> None:
     """Check that projected areas of visible facets sum to cos theta."""
     m, step = 0.3, np.pi / 400
     theta, phi = np.meshgrid(step * (np.arange(200) + 0.5), step * np.arange(800))
@@ -126,7 +126,7 @@ def test_facets_of_both_kinds_that_are_seen_fill_just_what_the_surface_fills(deg
     assert areas * two_lobe_masking(cosine, m) == pytest.approx(cosine, rel=1e-3)
 
 
-def test_two_lobes_alike_are_torrance_and_sparrows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_two_lobes_reduce_to_torrance_sparrow(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.specular.two_lobe.NARROW_FACTOR", 1.0)
     monkeypatch.setattr("dermis.specular.two_lobe.WIDE_FACTOR", 1.0)
     angles = cosines(Z, towards(np.array([75.0]), np.zeros(1)), towards(np.array([60.0]), np.array([170.0])))
@@ -134,7 +134,7 @@ def test_two_lobes_alike_are_torrance_and_sparrows(monkeypatch: pytest.MonkeyPat
     assert one == pytest.approx(other, rel=1e-12)
 
 
-def test_each_model_takes_a_reflectance_of_its_own() -> None:
+def test_each_model_uses_its_reflectance() -> None:
     angles = cosines(Z, towards(np.array([40.0]), np.zeros(1)), towards(np.array([50.0]), np.array([170.0])))
     for name, model in MODELS.items():
         twice = model.lobe(angles, 0.3, lambda cosine: 2.0 * schlick(cosine))

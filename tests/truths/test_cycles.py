@@ -48,7 +48,7 @@ def test_missing_blender_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         cycles_render(ball_scene(LIGHTS["point"]), SKIN1, python=tmp_path / "python")
 
 
-def test_what_cycles_cannot_do_is_refused() -> None:
+def test_unsupported_features_of_cycles_are_refused() -> None:
     scene = ball_scene(LIGHTS["point"])
     with pytest.raises(DermisError, match="expected one layer, for Cycles, but it has 3"):
         cycles_render(scene, media()["dj3"])
@@ -63,7 +63,7 @@ def test_what_cycles_cannot_do_is_refused() -> None:
 
 @blender
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_lights_and_pixels_are_those_of_mitsuba(kind: str) -> None:
+def test_lights_and_pixels_match_mitsuba(kind: str) -> None:
     pytest.importorskip("mitsuba")
     scene, settings = ball_scene(LIGHTS[kind]), Settings(size=(64, 64))
     ours, theirs = path_trace(scene, GREY, 128, settings), cycles_render(scene, GREY, 64, settings)
@@ -76,7 +76,7 @@ def test_lights_and_pixels_are_those_of_mitsuba(kind: str) -> None:
 
 @blender
 @pytest.mark.samples
-def test_environment_is_that_of_mitsuba() -> None:
+def test_environment_matches_mitsuba() -> None:
     pytest.importorskip("mitsuba")
     scene = ball_scene(environment=Environment(name="lebombo", rotation_degrees=70.0))
     ours, theirs = (
@@ -102,7 +102,7 @@ def test_ball_returns_its_colour(method: SubsurfaceMethod, tolerance: float) -> 
 
 
 @blender
-def test_passes_have_seeds_of_their_own_and_repeat() -> None:
+def test_passes_have_separate_repeatable_seeds() -> None:
     scene, settings = ball_scene(LIGHTS["point"]), Settings(size=(16, 16))
     first, again = (cycles_passes(scene, SKIN1, [1, 4, 4], settings, seed=7) for _ in range(2))
     assert [one.samples for one in first] == [1, 4, 4]
@@ -113,7 +113,7 @@ def test_passes_have_seeds_of_their_own_and_repeat() -> None:
 
 
 @blender
-def test_a_coat_reflects_and_keeps_that_from_the_skin() -> None:
+def test_coat_reflects_and_dims_the_skin() -> None:
     """At index 1.4 the surface reflects 3 to 6 % of uniform light; the skin's colour scales the rest."""
     scene = ball_scene(environment=Environment(name="uniform"))
     grey = PrincipledSkin(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)

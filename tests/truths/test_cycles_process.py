@@ -55,7 +55,7 @@ def test_file_that_is_no_program_is_named(python: Path) -> None:
         cycles_render(ball_scene(LIGHTS["point"]), SKIN1, 4, python=python)
 
 
-def test_failure_tells_its_last_words(python: Path) -> None:
+def test_failure_reports_its_last_output(python: Path) -> None:
     with pytest.raises(DermisError, match=r"it failed \(RuntimeError: no such socket\)\. Try bpy 5\.0"):
         render(python, 'echo "Traceback" >&2; echo "RuntimeError: no such socket" >&2; exit 1')
     with pytest.raises(DermisError, match=r"it failed \(no output\)"):
@@ -64,7 +64,7 @@ def test_failure_tells_its_last_words(python: Path) -> None:
         render(python, r"printf '\377\376' >&2; exit 1")
 
 
-def test_crash_tells_the_signal(python: Path) -> None:
+def test_crash_reports_the_signal(python: Path) -> None:
     with pytest.raises(DermisError, match=r"signal 11 ended it \(Writing: blender\.crash\.txt\)"):
         render(python, "echo 'Writing: blender.crash.txt'; kill -11 $$")
 
@@ -75,7 +75,7 @@ def test_endless_run_is_stopped(python: Path, monkeypatch: pytest.MonkeyPatch) -
         render(python, "exec sleep 60")
 
 
-def test_nothing_or_garbage_is_no_rendering(python: Path) -> None:
+def test_invalid_output_is_refused(python: Path) -> None:
     for script, message in (
         ("true", "No such file"),
         ('echo "}{" > "$3"/done.json', "Expecting value"),
@@ -91,7 +91,7 @@ def left(folder: Path, picture: np.ndarray, done: object) -> None:
     (folder / "done.json").write_text(json.dumps(done))
 
 
-def test_passes_are_what_was_asked_for(tmp_path: Path) -> None:
+def test_passes_match_the_request(tmp_path: Path) -> None:
     good = np.full((2, 3, 4), 0.5, np.float32)
     left(tmp_path, good, {"version": "5.0.1", "times": [[2.0, 3.0]]})
     (one,) = read_passes(tmp_path, [8], (3, 2))

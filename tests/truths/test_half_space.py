@@ -13,7 +13,7 @@ NORMAL = {0.3: 0.0572, 0.5: 0.1152, 0.8: 0.2853, 0.9: 0.4150, 0.95: 0.5355, 0.99
 
 
 @pytest.mark.parametrize("albedo", NORMAL)
-def test_normal_incidence_is_as_published(albedo: float) -> None:
+def test_normal_incidence_matches_published_values(albedo: float) -> None:
     assert float(directional_albedo(1.0, albedo)) == pytest.approx(NORMAL[albedo], abs=6e-5)
 
 
@@ -29,7 +29,7 @@ def test_h_solves_its_equation(albedo: float) -> None:
 
 
 @pytest.mark.parametrize("albedo", [0.5, 0.95])
-def test_all_views_together_are_the_albedo(albedo: float) -> None:
+def test_integral_over_views_is_the_albedo(albedo: float) -> None:
     nodes, weights = np.polynomial.legendre.leggauss(100)
     view, weight = 0.5 * (nodes + 1.0), 0.5 * weights
     for cosine in (0.2, 1.0):
@@ -44,7 +44,7 @@ def test_reflection_is_reciprocal() -> None:
     )
 
 
-def test_diffuse_light_comes_back_more_than_light_along_the_normal() -> None:
+def test_diffuse_light_is_reflected_more_than_normal_light() -> None:
     for albedo in (0.3, 0.9):
         assert float(directional_albedo(1.0, albedo)) < diffuse_albedo(albedo) < 1.0
     assert diffuse_albedo(0.0) == 0.0

@@ -19,7 +19,7 @@ TRIALS = 400
 SAMPLES = 64
 
 
-def test_without_noise_it_is_the_plain_ratio() -> None:
+def test_error_without_noise_is_the_plain_ratio() -> None:
     reference = np.full((4, 5, 3), 2.0)
     image = reference.copy()
     image[:2] += 0.5
@@ -60,7 +60,7 @@ def noisy(
     ("channels", "shared", "skewed", "slack"),
     [(1, False, False, 1.0), (3, True, False, 1.0), (3, False, False, np.sqrt(3.0)), (1, False, True, 1.0)],
 )
-def test_noise_is_taken_off(channels: int, shared: bool, skewed: bool, slack: float) -> None:
+def test_noise_is_subtracted(channels: int, shared: bool, skewed: bool, slack: float) -> None:
     """The estimate is unbiased within three standard errors over many references.
 
     The stated errors match the spread. Deviations of channels are added: this is right when they share paths,
@@ -85,7 +85,7 @@ def test_noise_is_taken_off(channels: int, shared: bool, skewed: bool, slack: fl
         assert covered == pytest.approx(erf(slack / np.sqrt(2.0)), abs=0.07)
 
 
-def test_noise_of_both_is_taken_off() -> None:
+def test_noise_of_both_pictures_is_subtracted() -> None:
     """A noisy image has the same error against a noisy reference as without noise.
 
     Its standard error is not too small.
@@ -138,7 +138,7 @@ def flat(*colour: float) -> Floats:
     return np.broadcast_to(np.array(colour), (32, 32, 3)).copy()
 
 
-def test_flip_of_known_pairs() -> None:
+def test_flip_matches_known_pairs() -> None:
     """FLIP is 1 for green against blue and 0 for equal pictures, and symmetric."""
     pytest.importorskip("flip_evaluator")
     assert flip(flat(0.2, 0.5, 0.7), flat(0.2, 0.5, 0.7)).mean == 0.0
@@ -151,7 +151,7 @@ def test_flip_of_known_pairs() -> None:
     assert there.pixels_per_degree == 67.0
 
 
-def test_flip_counts_the_mask_only() -> None:
+def test_flip_uses_only_masked_pixels() -> None:
     pytest.importorskip("flip_evaluator")
     mask = np.zeros((32, 32), bool)
     mask[:, :16] = True
@@ -177,7 +177,7 @@ def test_flip_of_high_dynamic_range_chooses_its_exposure() -> None:
     assert dim == pytest.approx(bright, rel=0.02) and dim > 0.02
 
 
-def test_flip_refuses_what_it_cannot_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flip_refuses_invalid_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("flip_evaluator")
     for image in (flat(1.2, 0.0, 0.0), flat(-0.1, 0.0, 0.0), flat(np.nan, 0.0, 0.0), np.zeros((4, 4))):
         with pytest.raises(DermisError, match="flip"):

@@ -52,13 +52,13 @@ def error_of(dry: NDArray[Any], reference: PathTraced) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_lights_are_the_same(renderer: Renderer, kind: str) -> None:
+def test_lights_match_the_renderer(renderer: Renderer, kind: str) -> None:
     error, energy = error_of(*both(renderer, ball_scene(LIGHTS[kind]), 64, size=(96, 96)))
     assert error < 0.01
     assert energy == pytest.approx(1.0, abs=0.005)
 
 
-def test_uniform_light_is_the_same(renderer: Renderer) -> None:
+def test_uniform_light_matches_the_renderer(renderer: Renderer) -> None:
     scene = ball_scene(environment=Environment(name="uniform", exposure=2.0))
     error, energy = error_of(*both(renderer, scene, 128, size=(64, 64), occlusion="none"))
     assert error < 0.01
@@ -67,7 +67,7 @@ def test_uniform_light_is_the_same(renderer: Renderer) -> None:
 
 @pytest.mark.samples
 @pytest.mark.parametrize("degrees", [0.0, 70.0])
-def test_environment_has_the_same_rotation(renderer: Renderer, degrees: float) -> None:
+def test_environment_rotation_matches_the_renderer(renderer: Renderer, degrees: float) -> None:
     around = Environment(name="lebombo", rotation_degrees=degrees)
     error, energy = error_of(
         *both(renderer, ball_scene(environment=around), 256, size=(64, 64), occlusion="none")
@@ -83,7 +83,9 @@ def scan(sample_folder: Any) -> Head:
 
 
 @pytest.mark.parametrize("position", [(60, 60, 1100), (-450, 400, 1000)])
-def test_scan_is_lit_the_same(renderer: Renderer, scan: Head, position: tuple[float, float, float]) -> None:
+def test_lit_scan_matches_the_renderer(
+    renderer: Renderer, scan: Head, position: tuple[float, float, float]
+) -> None:
     light = PointLight(position=position, irradiance=COLOUR, softness_mm=0.3)
     scene = Scene(scan, lights=(light,), camera=portrait(scan), skin=DRY)
     straight = {"interreflection": False, "shadow_size": 8192}  # as in the reference
@@ -109,7 +111,7 @@ def shift_between(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> NDA
 
 @pytest.mark.samples
 @pytest.mark.parametrize("turned", [False, True])
-def test_pixels_are_the_same(renderer: Renderer, scan: Head, turned: bool) -> None:
+def test_pixels_match_the_renderer(renderer: Renderer, scan: Head, turned: bool) -> None:
     camera = portrait(scan)
     if turned:
         camera = Camera(position=(700, 500, 300), target=(20, -40, 10), up=(0.4, 1, 0.1), frame_mm=300.0)

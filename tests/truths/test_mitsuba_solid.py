@@ -36,14 +36,14 @@ def without(mesh: Mesh, kept: np.ndarray) -> Mesh:
     )
 
 
-def test_closed_surface_stays_as_it_is() -> None:
+def test_closed_surface_is_unchanged() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     solid = closed_skin(sphere, "sphere")
     assert is_closed(solid) and solid.caps == 0
     assert len(solid.triangles) == len(sphere.triangles)
 
 
-def test_each_opening_is_shut() -> None:
+def test_each_opening_is_closed() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     height = sphere.positions[sphere.triangles][..., 1].mean(axis=1)
     solid = closed_skin(without(sphere, np.abs(height) < 8.0), "ring")
@@ -52,7 +52,7 @@ def test_each_opening_is_shut() -> None:
     assert solid.cap_area == pytest.approx(2.0 * np.pi * radius**2, rel=0.01)
 
 
-def test_caps_leave_the_front_alone() -> None:
+def test_caps_do_not_change_the_front() -> None:
     solid = closed_skin(pan(40.0, 10.0, 8).mesh, "pan")
     assert is_closed(solid) and solid.caps == 1
     assert solid.cap_area == pytest.approx(1600.0)
@@ -75,7 +75,7 @@ def test_only_skin_counts() -> None:
         closed_skin(blind, "head")
 
 
-def test_inside_out_is_refused() -> None:
+def test_inverted_mesh_is_refused() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     turned = build_mesh(
         sphere.positions, sphere.uv, sphere.triangles[:, ::-1], sphere.material, SKIN, -sphere.normals

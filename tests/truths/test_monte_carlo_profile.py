@@ -10,7 +10,7 @@ from dermis.optics.media import Layer, Medium, media
 from dermis.optics.tissue import load_tissue
 
 
-def test_per_entering_light_in_rings() -> None:
+def test_relative_to_entering_light_in_rings() -> None:
     monte_carlo: list[tuple[int, int]] = []
     profile = monte_carlo_profile(
         media()["dj3"], photons=40_000, seed=3, progress=lambda done, total: monte_carlo.append((done, total))

@@ -90,7 +90,7 @@ def test_layers_inside_one_another_agree_with_photons_through_layers() -> None:
 
 
 @pytest.mark.usefixtures("mitsuba")
-def test_variance_of_a_pixel_is_that_of_another_trial() -> None:
+def test_pixel_variance_predicts_another_trial() -> None:
     first = path_trace(ball_scene(), SKIN1, 160, SMALL)
     both = path_trace(ball_scene(), SKIN1, 320, SMALL)
     second = 2.0 * both.image.astype(np.float64) - first.image  # mean of the 160 added samples
@@ -184,7 +184,7 @@ def test_missing_mitsuba_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("mitsuba")
-def test_impossible_wishes_are_refused() -> None:
+def test_invalid_options_are_refused() -> None:
     scene = ball_scene()
     with pytest.raises(DermisError, match=r"index-matched .*with_eta\(1.0\)"):
         path_trace(scene, media()["skin1"], 8, SMALL)

@@ -86,7 +86,7 @@ def test_the_iris_is_refracted_by_snells_law(degrees: float) -> None:
     assert np.abs(found - expected)[clear].max() < 0.08  # a fifth of a pixel, for few paths
 
 
-def test_the_ball_is_whole_and_has_the_published_shape() -> None:
+def test_eyeball_is_closed_and_has_the_published_shape() -> None:
     positions, triangles, normals, uv = eyes.eyeball_mesh()
     assert np.linalg.norm(positions, axis=1).min() >= SCLERA_MM - 1e-9
     assert positions[:, 2].max() == pytest.approx(apex_mm())

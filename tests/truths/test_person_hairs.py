@@ -38,14 +38,14 @@ def test_curves_go_through_their_knots() -> None:
     np.testing.assert_allclose(through, knots, atol=1e-12)
 
 
-def test_files_hold_a_block_for_each_curve(tmp_path: Path) -> None:
+def test_files_contain_a_block_for_each_curve(tmp_path: Path) -> None:
     write_curves(tmp_path / "a.txt", np.zeros((3, 4, 3)), np.full((3, 4), 0.05, np.float32))
     blocks = (tmp_path / "a.txt").read_text("ascii").strip().split("\n\n")
     assert len(blocks) == 3
     assert all(len(block.splitlines()) == 6 for block in blocks)
 
 
-def test_hairs_are_parted_by_what_they_absorb() -> None:
+def test_hairs_are_grouped_by_absorption() -> None:
     depth = np.random.default_rng(1).random((100, 3))
     parts = absorption_groups(depth)
     assert len(parts) == MAX_HAIR_GROUPS and sorted(np.concatenate(parts)) == list(range(100))
@@ -55,7 +55,7 @@ def test_hairs_are_parted_by_what_they_absorb() -> None:
 
 
 @pytest.mark.parametrize("radius_mm", [0.04, 0.5])
-def test_a_hair_under_even_light_shines_as_our_lobe_does(radius_mm: float) -> None:
+def test_hair_in_uniform_light_matches_the_lobe(radius_mm: float) -> None:
     depth = np.array([0.0, 0.2, 1.0])
     mi, r = load_mitsuba(), 0.999 * radius_mm
     with mitsuba_variant(mi, "scalar_rgb"):

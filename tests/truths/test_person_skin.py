@@ -44,14 +44,14 @@ def middle(person: Any, paths: NDArray[np.float64] = SHORT, samples: int = 256, 
         return np.array(mi.render(built, spp=samples))[6:10, 6:10].mean(axis=(0, 1))
 
 
-def test_half_spaces_of_the_single_albedo_give_back_the_colour() -> None:
+def test_half_space_of_the_single_scattering_albedo_has_the_colour() -> None:
     for colour in (0.02, 0.2, 0.5, 0.8):
         assert diffuse_albedo(float(single_scattering_albedo(colour))) * COAT_TRANSMITTANCE == pytest.approx(
             colour, abs=1e-3
         )
 
 
-def test_light_spreads_as_far_as_asked() -> None:
+def test_light_spreads_by_the_given_distance() -> None:
     wanted = np.array([1.1, 0.26, 0.17])
     paths = mean_free_paths(COLOUR, wanted)
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 200.0, 150)])
@@ -61,7 +61,7 @@ def test_light_spreads_as_far_as_asked() -> None:
         assert (ring * 0.5 * (edges[1:] + edges[:-1])).sum() / ring.sum() == pytest.approx(distance, rel=0.04)
 
 
-def test_the_medium_looks_as_such_half_spaces_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_medium_looks_like_the_half_spaces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Seen at normal incidence the ball is a little darker than its colour, the mean over all directions."""
     monkeypatch.setattr(skin, "COAT_INDEX", 1.0)  # no surface reflection
     expected = [

@@ -58,7 +58,7 @@ def same(a: SlabResult, b: SlabResult) -> bool:
 def test_no_light_is_lost(layers: tuple[ScatteringLayer, ...]) -> None:
     run = trace_slab(layers, 3000, edges_mm=np.array([0.0, 0.5, 1.0]))
     assert accounted(run) == pytest.approx(1.0, abs=1e-12)
-    assert accounted(run.per_entering) == pytest.approx(1.0, abs=1e-12)
+    assert accounted(run.relative_to_entering) == pytest.approx(1.0, abs=1e-12)
     areas = np.pi * np.diff(run.edges_mm**2)
     for face in ("reflectance", "transmittance"):
         rings = getattr(run, face) @ areas + getattr(run, f"overflow_{face}")
@@ -77,9 +77,9 @@ def test_fractions_of_entering_light_exclude_the_mirror() -> None:
     run = trace_slab(SKIN, 2000)
     assert run.specular == pytest.approx(normal_reflectance(1.4), abs=1e-15)
     entered = 1.0 - run.specular
-    assert np.allclose(run.per_entering.reflectance * entered, run.reflectance)
-    assert np.allclose(run.per_entering.reflectance_se * entered, run.reflectance_se)
-    assert run.per_entering.specular == 0.0
+    assert np.allclose(run.relative_to_entering.reflectance * entered, run.reflectance)
+    assert np.allclose(run.relative_to_entering.reflectance_se * entered, run.reflectance_se)
+    assert run.relative_to_entering.specular == 0.0
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])

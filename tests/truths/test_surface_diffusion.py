@@ -115,7 +115,7 @@ def test_convergence_is_of_second_order_in_time() -> None:
     assert (np.log2(errors[:-1] / errors[1:]) > 1.8).all(), errors
 
 
-def test_levels_of_a_cascade_are_the_same_as_alone() -> None:
+def test_levels_of_a_cascade_equal_separate_levels() -> None:
     surface = rough_plane(6.0, 30)
     values = np.cos(surface[0][:, :2] * 1.3)
     together = diffuse_on_surface(*surface, values, [0.4, 1.0, 3.0], 24)
@@ -134,7 +134,7 @@ def test_light_is_conserved_and_a_constant_stays(surface: Surface) -> None:
     assert levels[1, :, 0].std() < levels[0, :, 0].std() < 0.2 * values[:, 0].std()
 
 
-def test_borders_let_nothing_through() -> None:
+def test_borders_are_insulating() -> None:
     """A straight border mirrors heat."""
     whole = rough_plane(12.0, 48)
     kept = (whole[0][whole[1]][:, :, 0] <= 1e-6).all(axis=1)
@@ -152,7 +152,7 @@ def test_a_vertex_without_triangles_keeps_its_value() -> None:
     assert diffuse_on_surface(positions, triangles, values, [2.0])[0, -1, 0] == pytest.approx(5.0)
 
 
-def test_degenerate_triangles_do_no_harm() -> None:
+def test_degenerate_triangles_leave_results_finite() -> None:
     """The mesh has a vertex in the middle of an edge, and two corners at one position."""
     positions, triangles = rough_plane(6.0, 20)
     a, b, c = triangles[100]
@@ -174,7 +174,7 @@ def test_resolved_lists_levels_whose_addition_spans_two_edges() -> None:
     assert longest_edge_mm(positions, triangles) == pytest.approx(0.3 * np.sqrt(2))
 
 
-def test_long_edges_are_refused_and_the_levels_that_they_allow_named() -> None:
+def test_long_edges_are_refused_with_the_allowed_levels() -> None:
     positions, triangles = rough_plane(6.0, 10)
     values = np.ones((len(positions), 1))
     with pytest.raises(DermisError, match=r"0\.15 mm.*got 0\.849 mm.*variances 3, 7\.5\. Refine"):
@@ -192,14 +192,14 @@ def test_long_edges_are_refused_and_the_levels_that_they_allow_named() -> None:
         (np.ones((121, 1)), [3.0], 0, "at least one time step"),
     ],
 )
-def test_unfit_arguments_are_refused(
+def test_invalid_arguments_are_refused(
     values: Floats, variances: list[float], steps: int, complaint: str
 ) -> None:
     with pytest.raises(DermisError, match=complaint):
         diffuse_on_surface(*rough_plane(6.0, 10), values, variances, steps)
 
 
-def test_unfit_surface_is_refused() -> None:
+def test_invalid_surface_is_refused() -> None:
     positions, triangles = rough_plane(6.0, 10)
     for bad in ((positions[:-1], triangles), (positions[:, :2], triangles), (positions * np.nan, triangles)):
         with pytest.raises(DermisError, match="finite positions"):

@@ -33,7 +33,7 @@ def skewed_plane(cells: int) -> tuple[Floats, NDArray[np.int64]]:
     return positions, triangles
 
 
-def test_flips_make_the_best_of_obtuse_triangles() -> None:
+def test_edge_flips_reduce_obtuse_triangles() -> None:
     """The sheared triangles become halves of the grid's squares, except at the sheared borders."""
     positions, triangles = skewed_plane(30)
     skewed = intrinsic_triangulation(positions, triangles)

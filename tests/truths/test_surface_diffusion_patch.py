@@ -46,7 +46,7 @@ def test_edges_are_short_and_the_surface_is_the_same(patch: SurfacePatch) -> Non
     assert np.array_equal(np.unique(patch.triangles), np.arange(len(patch.positions)))
 
 
-def test_the_whole_is_closed_and_has_its_area() -> None:
+def test_closed_surface_keeps_its_area() -> None:
     assert (uses(WHOLE.triangles) == 2).all() and WHOLE.contains(WHOLE.positions).all()
     area = triangle_areas(WHOLE.positions[WHOLE.triangles])
     per_parent = np.bincount(WHOLE.parent, area)
@@ -95,14 +95,14 @@ def heat(patch: SurfacePatch) -> tuple[Floats, Floats]:
     return patch.positions[judged][order], levels[:, judged][:, order]
 
 
-def test_heat_on_a_patch_is_that_on_the_whole_within_the_margin() -> None:
+def test_heat_on_a_patch_matches_the_full_surface_inside_the_margin() -> None:
     points, exact = heat(WHOLE)
     same, levels = heat(SMALL)
     assert np.allclose(points, same)
     assert np.abs(levels - exact).max() < 5e-4 * exact.max()
 
 
-def test_without_a_margin_the_border_is_felt() -> None:
+def test_border_changes_the_result_without_margin() -> None:
     bare = refine_patch(*COARSE, PLACE, 3.0, max_edge_mm(VARIANCES), 0.0)
     values = 1 + np.cos(bare.positions[:, :1])
     levels = diffuse_on_surface(bare.positions, bare.triangles, values, VARIANCES)
@@ -110,7 +110,7 @@ def test_without_a_margin_the_border_is_felt() -> None:
     assert abs(levels[1, :, 0].max() - wide[1, SMALL.contains(SMALL.positions), 0].max()) > 0.01
 
 
-def test_edges_in_need_alone_are_halved() -> None:
+def test_only_long_edges_are_split() -> None:
     """A long thin triangle is split across, and a fine one is left unchanged."""
     positions = np.array([[0.0, 0, 0], [8, 0, 0], [0, 0.5, 0], [-0.5, 0, 0]])
     patch = refine_patch(positions, [[0, 1, 2], [0, 2, 3]], [0, 0, 0], np.inf, 1.0, 0.0)
@@ -151,7 +151,7 @@ def test_the_ear_of_a_scan_keeps_its_light() -> None:
         ({"edge_mm": 1e-4, "radius_mm": 5.0}, "make more than 8000000"),
     ],
 )
-def test_patches_that_cannot_be_are_refused(change: dict[str, float], complaint: str) -> None:
+def test_invalid_patches_are_refused(change: dict[str, float], complaint: str) -> None:
     settings = {"centre_mm": PLACE, "radius_mm": 1.0, "edge_mm": 0.5, "margin_mm": 0.0} | change
     with pytest.raises(DermisError, match=complaint):
         refine_patch(*COARSE, **settings)

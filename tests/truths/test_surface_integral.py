@@ -53,7 +53,7 @@ def even(places: MeshPoints) -> Floats:
     return np.ones_like(places.positions)
 
 
-def test_even_light_stays_even() -> None:
+def test_uniform_light_stays_uniform() -> None:
     samples = sample_irradiance(plane(80.0), even, 2.0)
     exitance = integrate_exitance(along(np.linspace(-8.0, 8.0, 200)), samples, PUBLISHED)
     total = np.broadcast_to(PUBLISHED.weight.sum(axis=0), exitance.shape)
@@ -92,7 +92,7 @@ def test_edge_of_light_is_smoothed(profile: GaussianSum) -> None:
     np.testing.assert_allclose(exitance[away], reached[away], atol=0.025)
 
 
-def test_point_of_light_is_the_profile() -> None:
+def test_point_of_light_spreads_as_the_profile() -> None:
     spot = plane(0.002)
     samples = sample_irradiance(spot, even, 1.0)
     r = np.linspace(0.0, 12.0, 61)
@@ -101,7 +101,7 @@ def test_point_of_light_is_the_profile() -> None:
     np.testing.assert_allclose(exitance, expected, rtol=1e-3, atol=1e-9 * expected.max())
 
 
-def test_light_comes_through_thin_parts() -> None:
+def test_thin_parts_transmit_light() -> None:
     """A lit sheet is 1.5 mm behind the point, so each Gaussian is multiplied by exp(-d² / 2v)."""
     samples = sample_irradiance(plane(80.0), even, 2.0)
     exitance = integrate_exitance([[0.3, 0.2, 1.5]], samples, PUBLISHED)
@@ -109,7 +109,7 @@ def test_light_comes_through_thin_parts() -> None:
     np.testing.assert_allclose(exitance[0], error_density @ PUBLISHED.weight, rtol=2.0 * ERROR, atol=1e-5)
 
 
-def test_all_light_comes_out_again() -> None:
+def test_total_light_is_conserved() -> None:
     """The sum of the exitance over a grid, exact for such a smooth spot, is that of the light."""
 
     def spot(places: Floats) -> Floats:
@@ -123,7 +123,7 @@ def test_all_light_comes_out_again() -> None:
 
 
 @pytest.mark.parametrize(("radius", "variance"), [(5.0, 7.41), (5.0, 0.567), (20.0, 7.41), (2.0, 1.0)])
-def test_harmonics_of_a_sphere(radius: float, variance: float) -> None:
+def test_sphere_harmonics_are_damped_as_predicted(radius: float, variance: float) -> None:
     """With k = R²/v the Gaussian of the chord times P_l integrates to 2 k exp(-k) i_l(k), a Bessel function.
 
     This is 1 - exp(-2k) for uniform light and 1 + exp(-2k) - (1 - exp(-2k)) / k for light proportional to z.
@@ -197,7 +197,7 @@ def dipole_like() -> RadialTable:
 
 
 @pytest.mark.parametrize("profile", [PUBLISHED, dipole_like()], ids=["gaussians", "table"])
-def test_octree_against_plain_sum(profile: Profile) -> None:
+def test_octree_matches_the_plain_sum(profile: Profile) -> None:
     samples = bumpy()
     points = points_on(samples, 14)
     exact = plain_sum(points, samples, lambda r: profile.derivatives(r)[0])
@@ -209,7 +209,7 @@ def test_octree_against_plain_sum(profile: Profile) -> None:
     assert (errors[-1] < 0.1 * errors[0]).all()
 
 
-def test_table_of_a_gaussian_is_the_gaussian() -> None:
+def test_table_of_a_gaussian_matches_the_gaussian() -> None:
     r = np.linspace(0.0, 8.0, 400)
     table = RadialTable(r, gaussian(0.567).derivatives(r)[0])
     samples, points = bumpy(), points_on(bumpy(), 50)
@@ -225,7 +225,7 @@ def test_channels_without_energy_are_dark() -> None:
     np.testing.assert_allclose(exitance, [[1.0, 0.0, 0.0]], atol=ERROR)
 
 
-def test_more_points_than_one_batch() -> None:
+def test_several_batches_of_points_are_processed() -> None:
     samples = sample_irradiance(plane(20.0), lambda p: white(10.0 + p.positions[:, 0]), 2.0)
     points = along(np.linspace(-4.0, 4.0, 2500))
     many = integrate_exitance(points, samples, gaussian(0.2), 0.01)

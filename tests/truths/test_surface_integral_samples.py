@@ -27,7 +27,7 @@ def sides_mm(samples: IrradianceSamples) -> Floats:
     return np.linalg.norm(samples.positions[ends[:, 0]] - samples.positions[ends[:, 1]], axis=1)
 
 
-def test_sides_are_short_and_meet() -> None:
+def test_sample_edges_are_short_and_shared() -> None:
     mesh = uv_sphere(10.0, 24, 12)
     samples = sample_irradiance(mesh, even, 0.7)
     assert sides_mm(samples).max() <= 0.7
@@ -54,7 +54,7 @@ def test_points_interpolate_values_of_the_mesh() -> None:
     np.testing.assert_allclose(uv[:, 1], 0.5 - samples.positions[:, 1] / 20.0, atol=1e-6)
 
 
-def test_samples_crowd_where_light_changes() -> None:
+def test_samples_are_denser_where_light_changes() -> None:
     """The light is evaluated for new samples only, and all keep the light of their positions."""
     asked: list[int] = []
 
@@ -75,7 +75,7 @@ def test_samples_crowd_where_light_changes() -> None:
     assert flux == pytest.approx(np.pi * 9.0, rel=0.01)
 
 
-def test_crowding_ends_at_a_single_bright_corner() -> None:
+def test_refinement_ends_at_a_single_bright_corner() -> None:
     """Sides that meet in a corner would remain long for ever if only they were split."""
 
     def corner(mesh_points: MeshPoints) -> Floats:
@@ -111,7 +111,7 @@ def tree() -> Octree:
     return build_octree(sample_irradiance(uv_sphere(8.0, 32, 16), light, 0.8))
 
 
-def test_nodes_hold_their_triangles_once(tree: Octree) -> None:
+def test_each_triangle_is_in_one_octree_node(tree: Octree) -> None:
     """A traversal that opens every node visits every triangle exactly once."""
     met = np.zeros(len(tree.area), np.int64)
     for node in range(len(tree.first)):
@@ -125,7 +125,7 @@ def test_nodes_hold_their_triangles_once(tree: Octree) -> None:
 
 
 @pytest.mark.parametrize("part", [0.0, 0.003, 0.5, 1.0])
-def test_points_stand_for_a_node(tree: Octree, part: float) -> None:
+def test_points_represent_a_node(tree: Octree, part: float) -> None:
     """Flux, centroids, second moments and bounds are compared with sums over many points of the triangles."""
     node = round(part * (len(tree.first) - 1))
     inside = slice(tree.first[node], tree.end[node])
@@ -162,7 +162,7 @@ def test_flat_nodes_of_white_light_keep_second_moments() -> None:
     assert tree.moment_error.max() < 1e-6 and tree.centroid_error.max() < 1e-6
 
 
-def test_dark_nodes_do_no_harm() -> None:
+def test_dark_nodes_give_finite_results() -> None:
     tree = build_octree(sample_irradiance(plane(12.0), lambda p: 0.0 * p.positions, 0.5))
     assert (tree.flux == 0.0).all() and np.isfinite(tree.points).all() and np.isfinite(tree.centre).all()
     assert (tree.second_moment == 0.0).all() and (tree.centroid_error == 0.0).all()

@@ -12,7 +12,7 @@ from dermis.optics.media import Layer, Medium
 EDGES = np.linspace(-6.0, 6.0, 25)
 
 
-def test_one_medium_on_both_sides_is_that_medium() -> None:
+def test_equal_media_reduce_to_one_medium() -> None:
     sigma_a, sigma_s = np.full(2, 0.3), np.full(2, 2.0)
     left = strip_transfer(sigma_a, sigma_s, EDGES, 4000)[10:14].sum(axis=1)
     layer = Layer(sigma_a[:1], sigma_s[:1], float("inf"), "half-space")

@@ -29,6 +29,6 @@ def test_profiles_follow_melanin_and_blood(tmp_path: Path) -> None:
     assert prior_sd[0] > prior_sd[1] > prior_sd[2]  # blood and melanin shorten the paths of red light
 
 
-def test_what_is_no_skin_has_no_widths() -> None:
+def test_other_profiles_have_no_widths() -> None:
     with pytest.raises(DermisError, match="no texel is like skin"):
         profile_mixture(unmix(np.zeros((4, 4, 3)), adapter="cpu"))

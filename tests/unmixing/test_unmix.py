@@ -71,7 +71,7 @@ def test_errors_with_noise_match_the_stated_deviations() -> None:
         assert 0.75 < ratio < 1.25
 
 
-def test_slopes_are_those_of_the_colours() -> None:
+def test_jacobian_matches_the_colours() -> None:
     for third in ("none", "oxygen", "shade"):
         model = skin_model(third=third)
         x = np.random.default_rng(1).uniform(0.11, 0.89, (30, 3))
@@ -83,7 +83,7 @@ def test_slopes_are_those_of_the_colours() -> None:
 
 
 @pytest.mark.parametrize("third", ["none", "oxygen"])
-def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, third: ThirdUnknown) -> None:
+def test_device_result_matches_float64(device: Device, colours: Pixels, third: ThirdUnknown) -> None:
     noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
     noisy = noisy.astype(np.float32)
     model = skin_model(third=third)
@@ -98,7 +98,7 @@ def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, th
     assert np.mean(cost > least + 0.1) < 2e-3
 
 
-def test_hidden_blood_is_at_its_prior() -> None:
+def test_invisible_blood_stays_at_its_prior() -> None:
     thick = replace(DEFAULT_SKIN, epidermis_mm=0.25)
     found = solve_pigments(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
     assert 0.005 < found.blood[0] < 0.03 and found.blood_sd[0] > found.blood[0]

@@ -67,7 +67,7 @@ def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFac
 
 
 @pytest.mark.parametrize("preset", BENCHMARK_PRESETS.values(), ids=BENCHMARK_PRESETS)
-def test_cases_vary_in_one_thing(preset: object) -> None:
+def test_cases_vary_one_parameter(preset: object) -> None:
     base_case, *others = preset.cases()  # type: ignore[attr-defined]
     assert base_case.varies == ""
     assert {GPU_GEMS_3, FRAGMENT_TECHNIQUE} == {
@@ -95,7 +95,9 @@ def test_cameras_and_lights_move(head_file: str, tmp_path: Path) -> None:
     assert len({scene.lights[4] for scene in scenes}) == 3
 
 
-def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -> None:
+def test_bandwidth_bound_matches_a_manual_calculation(
+    renderer: Renderer, head_file: str, tmp_path: Path
+) -> None:
     head = load_head(head_file, subdivide=0)
     (scene,), settings = case_scenes(TINY, head, tmp_path, 1), case_settings(TINY)
     image = renderer.draw(scene, settings).srgb8()
@@ -120,7 +122,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
 
 
-def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
+def test_bandwidth_bound_of_thin_parts_counts_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
     """The floor is computed from the sizes of the buffers."""
     from small_head import obj_text
 
@@ -144,7 +146,7 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     )
 
 
-def test_a_row_is_complete(row: BenchmarkRow) -> None:
+def test_row_contains_all_columns(row: BenchmarkRow) -> None:
     assert row.frame_ms > 0 and row.python_ms > 0 and row.image_ms > 0 and row.memory_mb > 0.1
     stages = {name: ms for name, ms in row.gpu_ms.items() if name != "total"}
     assert {"irradiance", "diffuse", "shade"} <= set(stages) and min(stages.values()) > 0
@@ -162,7 +164,7 @@ def test_more_work_moves_more_bytes(
         assert more.floor_ms[stage] > 1.25 * row.floor_ms[stage], stage
 
 
-def test_copies_take_time(device: Device) -> None:
+def test_copy_bandwidth_is_measured(device: Device) -> None:
     assert 1e7 < copy_rate(device) < 1e14
 
 
@@ -181,14 +183,14 @@ def benchmark_of_one_row(row: BenchmarkRow) -> Benchmark:
     return Benchmark(*where, (row, *others), (skipped,))
 
 
-def test_the_published_passes_are_compared(benchmark_of_one_row: Benchmark, row: BenchmarkRow) -> None:
+def test_published_passes_are_included(benchmark_of_one_row: Benchmark, row: BenchmarkRow) -> None:
     assert benchmark_of_one_row.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
     assert benchmark_of_one_row.ratio(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
     assert replace(benchmark_of_one_row, rows=(row,)).ratio(GPU_GEMS_3) is None
     assert replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:]).ratio(GPU_GEMS_3) is None
 
 
-def test_the_json_has_what_was_asked_for(benchmark_of_one_row: Benchmark) -> None:
+def test_json_contains_the_requested_cases(benchmark_of_one_row: Benchmark) -> None:
     import json
 
     fields = json.loads(json.dumps(benchmark_json(benchmark_of_one_row)))
@@ -204,7 +206,7 @@ def test_the_json_has_what_was_asked_for(benchmark_of_one_row: Benchmark) -> Non
     assert (skipped["image"], skipped["reason"]) == ([9999, 32], "size: <too large>")
 
 
-def test_the_report_needs_nothing_else(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
+def test_report_is_self_contained(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
     write_report(tmp_path / "report.html", benchmark_of_one_row)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "an &lt;adapter&gt;" in page and page.count("<svg") == 2
@@ -216,7 +218,7 @@ def test_the_report_needs_nothing_else(benchmark_of_one_row: Benchmark, tmp_path
     assert "2007, fragments" in page and "9999x32" in page and "&lt;too large&gt;" in page
 
 
-def test_a_report_without_the_base_frame(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
+def test_report_without_the_base_frame_is_written(benchmark_of_one_row: Benchmark, tmp_path: Path) -> None:
     others = replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:])
     assert others.base_row is None and stage_table(others) == []
     write_report(tmp_path / "report.html", others)
@@ -256,7 +258,7 @@ def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: 
     assert str(device.max_texture_size) in skipped_lines(benchmark)[0]
 
 
-def test_nothing_measured_is_an_error(device: Device, head_file: str) -> None:
+def test_empty_measurement_is_an_error(device: Device, head_file: str) -> None:
     too_large = replace(TINY, atlas=device.max_texture_size + 1)
     with pytest.raises(DermisError, match=str(device.max_texture_size)):
         run_benchmark([too_large], head_file, device.adapter.name)

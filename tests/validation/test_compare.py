@@ -54,7 +54,7 @@ def test_reference_and_image_are_aligned(stripe_comparison: Comparison) -> None:
     assert abs(int(peaks[0]) - int(peaks[1])) <= 1
 
 
-def test_heat_agrees_along_a_gentle_surface(stripe_comparison: Comparison) -> None:
+def test_heat_equation_agrees_on_a_gently_curved_surface(stripe_comparison: Comparison) -> None:
     heat = compare(
         BALL,
         "heat",
@@ -69,7 +69,7 @@ def test_heat_agrees_along_a_gentle_surface(stripe_comparison: Comparison) -> No
     assert ours.relrmse < 0.2 * none.relrmse
 
 
-def test_report_holds_all_pictures(stripe_comparison: Comparison, tmp_path: Path) -> None:
+def test_report_contains_all_pictures(stripe_comparison: Comparison, tmp_path: Path) -> None:
     write_report(tmp_path / "report.html", stripe_comparison)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert text.count("data:image/png;base64,") == 1 + 2 * len(stripe_comparison.rows)
@@ -78,7 +78,7 @@ def test_report_holds_all_pictures(stripe_comparison: Comparison, tmp_path: Path
 
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("region", REGIONS)
-def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
+def test_scenes_use_no_colour_map(light: str, region: str) -> None:
     scene = comparison_scene(BALL, light, region, "gpu-gems-3")
     assert scene.head.maps.colour is None and scene.skin.strength == 0.0
     assert scene.skin.albedo == "profile" and scene.skin.energy == "none"
@@ -86,7 +86,7 @@ def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["human", pytest.param("lee_perry_smith", marks=pytest.mark.samples)])
-def test_the_back_light_shines_at_an_ear_and_not_at_a_shoulder(name: str) -> None:
+def test_back_light_illuminates_the_ear_and_not_the_shoulder(name: str) -> None:
     head = load_head(name)
     target = comparison_scene(head, "back", "ear", "gpu-gems-3").lights[0].target
     assert 75.0 < target[0] < 95.0 and abs(target[1]) < 30.0 and -50.0 < target[2] < 0.0

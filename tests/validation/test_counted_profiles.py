@@ -31,14 +31,14 @@ def profiles() -> dict[ModelName, GaussianSum]:
     return found
 
 
-def test_total_is_the_half_spaces(profiles: dict[ModelName, GaussianSum]) -> None:
+def test_total_equals_the_half_space(profiles: dict[ModelName, GaussianSum]) -> None:
     exact = np.array([float(directional_albedo(1.0, float(one))) for one in BODY.layers[0].alpha_prime])
     error = {name: np.abs(one.albedo / exact - 1.0) for name, one in profiles.items()}
     assert (error["montecarlo"] < 0.005).all() and (error["counted"] < COUNTED_TOTAL).all()
     assert max(error["montecarlo"].mean(), error["counted"].mean()) < 0.2 * error["layered"].mean()
 
 
-def test_less_light_goes_far(profiles: dict[ModelName, GaussianSum]) -> None:
+def test_less_light_travels_far(profiles: dict[ModelName, GaussianSum]) -> None:
     """Diffusion underestimates the light that leaves within half a mean free path."""
     near = [profiles[name] for name in ("montecarlo", "counted", "layered")]
     radius = 0.5 * BODY.layers[0].mean_free_path_mm[0]
@@ -50,7 +50,7 @@ def test_less_light_goes_far(profiles: dict[ModelName, GaussianSum]) -> None:
     assert tables == pytest.approx(now, rel=0.03)
 
 
-def test_tables_are_the_default_where_there_are_some() -> None:
+def test_tables_are_the_default_where_available() -> None:
     with medium_scene(BALL, "laser", "ear", BODY) as (_, usual):
         assert usual.from_photons
     with medium_scene(BALL, "laser", "ear", media()["dj3"].with_eta(1.0)) as (_, usual):

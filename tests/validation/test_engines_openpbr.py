@@ -13,14 +13,14 @@ from dermis.apps.validation.engines.page import PAGE
 CHANGED = 2e-3  # change of an edge response
 
 
-def test_the_page_has_the_figures() -> None:
+def test_page_contains_the_figures() -> None:
     figures = json.loads(RESULTS_FILE.read_text("utf-8"))
     assert figures["libraries"]["valid"] and figures["libraries"]["errors"] == []
     page = PAGE.read_text("utf-8")
     assert all(line in page for line in script.error_table(figures["skins"]))
 
 
-def test_figures_are_those_of_today(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_match_recomputed_values(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "COMPARED_SKINS", ("skin1",))
     known = json.loads(RESULTS_FILE.read_text("utf-8"))["skins"]["skin1"]
     found = script.skin_errors()["skin1"]

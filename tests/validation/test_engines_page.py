@@ -9,11 +9,11 @@ from dermis.apps.validation.engines.page import PAGE, blender_tables, fill_table
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")
-def test_the_table_is_what_the_command_writes() -> None:
+def test_table_equals_the_command_output() -> None:
     assert differences(fill_tables(PAGE.read_text("utf-8")), PAGE.read_text("utf-8")) == []
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason="this is no checkout")
-def test_tables_of_blender_are_those_of_the_measurement() -> None:
+def test_blender_tables_equal_the_measurement() -> None:
     page = PAGE.read_text("utf-8")
     assert [line for line in filter(None, blender_tables().splitlines()) if line not in page] == []

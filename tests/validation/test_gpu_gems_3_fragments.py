@@ -105,13 +105,13 @@ def test_every_level_is_the_same(both: tuple[Drawn, Drawn]) -> None:
         assert np.abs(one - other).max() < (1 + 2 * k) * HALVES * one.max()
 
 
-def test_so_are_their_sum_what_comes_through_and_the_image(both: tuple[Drawn, Drawn]) -> None:
+def test_sum_transmitted_light_and_image_match(both: tuple[Drawn, Drawn]) -> None:
     for one, other in zip(both[0].results, both[1].results, strict=True):
         assert one[..., :3].max() > 0.01
         assert np.abs(one - other).max() < 11 * HALVES * one.max()
 
 
-def test_afterwards_all_is_compute_again(renderer: Renderer, leaf: Scene) -> None:
+def test_compute_passes_are_restored_afterwards(renderer: Renderer, leaf: Scene) -> None:
     with pytest.raises(KeyError), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
         assert drawn(renderer, leaf, FRAGMENT_TECHNIQUE, "alpha").filled > 0
         raise KeyError

@@ -38,19 +38,19 @@ def both() -> tuple[Comparison, Comparison]:
     return against_paths("lambertian"), against_paths("half-space")
 
 
-def test_half_space_is_much_nearer_to_the_paths(both: tuple[Comparison, Comparison]) -> None:
+def test_half_space_is_closer_to_path_tracing(both: tuple[Comparison, Comparison]) -> None:
     """Scattering along the surface is disabled; it hardly matters on such a large ball."""
     (lambertian,), (turned,) = (result.rows for result in both)
     assert lambertian.relrmse > 0.2
     assert turned.relrmse + turned.relrmse_se < 0.4 * lambertian.relrmse
 
 
-def test_half_space_keeps_the_energy(both: tuple[Comparison, Comparison]) -> None:
+def test_half_space_conserves_energy(both: tuple[Comparison, Comparison]) -> None:
     """Light comes from behind, so most of it enters and leaves at grazing angles."""
     (lambertian,), (turned,) = (result.rows for result in both)
     assert lambertian.energy_ratio < 0.8
     assert turned.energy_ratio == pytest.approx(1.0, abs=0.05)
 
 
-def test_report_says_so(both: tuple[Comparison, Comparison]) -> None:
+def test_report_states_the_comparison(both: tuple[Comparison, Comparison]) -> None:
     assert ", half-space skin, profile by photons" in both[1].title and ", lambertian skin" in both[0].title

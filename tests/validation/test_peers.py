@@ -98,7 +98,7 @@ def test_noise_bias_and_time_are_separated(peers: Any, tmp_path: Path, capsys: A
     assert "goal 50" in capsys.readouterr().out
 
 
-def test_time_to_our_error_is_that_of_noise_over_bias(peers: Any, tmp_path: Path) -> None:
+def test_time_to_equal_error_follows_from_noise_and_bias(peers: Any, tmp_path: Path) -> None:
     out = tmp_path / "peers.json"
     peers.peers(lights="front", quick=True, output=out)
     (results,) = json.loads(out.read_text())["scenes"]
@@ -109,7 +109,7 @@ def test_time_to_our_error_is_that_of_noise_over_bias(peers: Any, tmp_path: Path
     assert results["ours_energy_put_right"]["screen space"] == pytest.approx(0.0, abs=0.01)
 
 
-def test_all_but_times_is_the_same_again(peers: Any, tmp_path: Path) -> None:
+def test_results_except_times_are_reproducible(peers: Any, tmp_path: Path) -> None:
     files = [tmp_path / name for name in ("first.json", "second.json")]
     for file in files:
         peers.peers(lights="front,back", quick=True, output=file)
@@ -147,7 +147,7 @@ def test_without_mitsuba_there_is_no_reference(
         peers.peers(quick=True, output=tmp_path / "peers.txt")
 
 
-def test_bar_ends_with_the_work(peers: Any) -> None:
+def test_progress_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
     rendering.render_peers(BALL, "front", peers.QUICK_PLAN, renderer, done.append)  # type: ignore[arg-type]
@@ -156,7 +156,7 @@ def test_bar_ends_with_the_work(peers: Any) -> None:
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 
 
-def test_the_passes_of_2007_are_set_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
+def test_passes_of_2007_are_listed_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "peers.json"
     peers.peers(lights="front", quick=True, output=out)
     (results,), printed = json.loads(out.read_text())["scenes"], capsys.readouterr().out

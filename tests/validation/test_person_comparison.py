@@ -59,7 +59,7 @@ def test_the_iris_is_painted_around_its_pupil(paint: SkinTextures) -> None:
     assert ring[:, 0].mean() > 1.5 * ring[:, 2].mean() > 0.01  # brown
 
 
-def test_the_white_is_white_and_teeth_stand_in_gums(paint: SkinTextures) -> None:
+def test_sclera_is_white_and_teeth_are_set_in_gums(paint: SkinTextures) -> None:
     middle = paint.white[480:544, 480:544].mean(axis=(0, 1))
     assert 0.3 < middle[2] < middle[0] < 0.65
     upper, lower = paint.teeth
@@ -81,7 +81,7 @@ def test_lights_of_all_views_have_a_size(name: str) -> None:
     assert all(isinstance(light, RectangleLight) for light in scene.lights)
 
 
-def test_only_points_become_softboxes() -> None:
+def test_only_point_lights_become_softboxes() -> None:
     ball, point = SphereLight(position=(0, 0, 900)), PointLight(position=(0, 500, 900), irradiance=(1, 2, 3))
     assert as_softbox(ball) is ball
     found = as_softbox(point)
@@ -89,7 +89,7 @@ def test_only_points_become_softboxes() -> None:
     assert (found.position, found.irradiance) == (point.position, point.irradiance)
 
 
-def test_a_picture_is_the_mean_of_one_twice_as_large(renderer: Renderer) -> None:
+def test_picture_is_downsampled_from_twice_its_size(renderer: Renderer) -> None:
     scene, small = view_scene(head(), VIEWS["portrait"]), Settings(size=(24, 24), atlas=128, shadow_size=256)
     large = renderer.render(scene, size=(48, 48), atlas=128, shadow_size=256)
     found = render_frame(renderer, scene, small)
@@ -131,7 +131,7 @@ def iris_pair(shift: int, gain: float) -> PersonComparison:
     return person_comparison("eye", ours, path, np.ones((side, side), bool))
 
 
-def test_iris_shift_and_brightness() -> None:
+def test_iris_shift_and_brightness_are_measured() -> None:
     found = iris_errors(iris_pair(1, 0.5), EYE_FRAME_MM)
     assert found.right.value == pytest.approx(1.0, abs=0.15) and abs(found.down.value) < 0.1
     assert found.brightness.value == pytest.approx(2.0, abs=0.05)

@@ -24,7 +24,7 @@ def noisy(name: str, side: int) -> PersonComparison:
     return PersonComparison(name, image, image, 0 * image, mask, ONE, ONE, (ONE,) * 3, 40, 12.0)
 
 
-def test_a_line_tells_view_light_and_errors() -> None:
+def test_row_states_view_light_and_errors() -> None:
     line = page.view_row(noisy("eye", 8))
     assert line == "| eye | window | 40 | 1.000 ± 0.010 | 1.000 ± 0.010 | 1.00, 1.00, 1.00 |"
 
@@ -36,7 +36,7 @@ def test_the_picture_is_small_and_shows_all_views() -> None:
     assert width >= page.SHEET_COLUMNS * 96 and height >= -(-2 * len(VIEWS) // page.SHEET_COLUMNS) * 96
 
 
-def test_the_page_names_what_is_filled_in() -> None:
+def test_page_lists_its_placeholders() -> None:
     text = (ROOT / "docs" / "templates" / "path_traced.md").read_text(encoding="utf-8")
     names = {name for _, name, _, _ in string.Formatter().parse(text) if name}
     assert {"rows", "right", "down", "brightness", "left_half", "right_half", "side", "adapter"} <= names

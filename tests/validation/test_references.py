@@ -41,7 +41,7 @@ def with_variances(subject: ComparisonSubject, *variance_mm2: float) -> Comparis
     return replace(subject, profile=GaussianSum("test", np.array(variance_mm2), weight))
 
 
-def test_without_scattering_the_integral_is_the_light_that_enters(stripe_subject: ComparisonSubject) -> None:
+def test_integral_without_scattering_equals_entering_light(stripe_subject: ComparisonSubject) -> None:
     """A coarser grid of samples, which misses parts of the stripe, would have an error of 7 %."""
     reference = surface_integral(with_variances(stripe_subject, 0.03**2), 0)
     plain = Settings(**(stripe_subject.settings.model_dump() | {"technique": "none", "samples": 1}))
@@ -52,7 +52,7 @@ def test_without_scattering_the_integral_is_the_light_that_enters(stripe_subject
     assert energy_ratio(entered, reference.image, reference.mask).value == pytest.approx(1.0, abs=0.003)
 
 
-def test_heat_and_the_integral_agree_where_the_surface_is_gentle(stripe_subject: ComparisonSubject) -> None:
+def test_heat_and_integral_agree_on_gently_curved_surfaces(stripe_subject: ComparisonSubject) -> None:
     """This includes a Gaussian so narrow that it is integrated by Euclidean distance."""
     subject = with_variances(stripe_subject, 0.2, 0.5)
     stripe = subject.scene.lights[0]

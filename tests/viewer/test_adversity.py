@@ -47,7 +47,7 @@ def lose_device(driver: InputDriver) -> Any:
     return view_renderer
 
 
-def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDriver) -> None:
+def test_many_resizes_restore_picture_and_memory(driver: InputDriver) -> None:
     before = driver.settled()
     for width, height in ((300, 200), SIZE):  # both sizes of everything have been there
         resized(driver, width, height)
@@ -74,7 +74,7 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
 
 
 @pytest.mark.parametrize("how", ["picture", "split", ATLAS_VIEW_NAME, "normals"])
-def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) -> None:
+def test_restored_window_continues(driver: InputDriver, how: str) -> None:
     session = driver.viewer.session
     if how == "split":
         session.split.freeze(session.state)
@@ -93,7 +93,7 @@ def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) 
 
 
 @pytest.mark.parametrize("how", ["split", ATLAS_VIEW_NAME, "minimised"])
-def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDriver], how: str) -> None:
+def test_device_lost_during_a_drag_is_recreated(make_driver: Callable[[], InputDriver], how: str) -> None:
     driver = make_driver()
     session = driver.viewer.session
     if how == "split":
@@ -129,7 +129,7 @@ def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDrive
     np.testing.assert_array_equal(found[PICTURE], after[PICTURE])
 
 
-def test_devices_that_go_one_after_the_other_leave_nothing_behind(
+def test_repeated_device_losses_leak_no_memory(
     make_driver: Callable[[], InputDriver],
 ) -> None:
     driver = make_driver()
@@ -148,7 +148,7 @@ def test_devices_that_go_one_after_the_other_leave_nothing_behind(
     assert allocated_bytes() <= FEW_BYTES * held
 
 
-def test_a_device_that_never_works_again_closes_the_window(
+def test_permanently_lost_device_closes_the_window(
     make_driver: Callable[[], InputDriver], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     driver = make_driver()
@@ -165,7 +165,7 @@ def test_a_device_that_never_works_again_closes_the_window(
 
 
 @pytest.mark.parametrize("how", ["twice", "never again"])
-def test_a_device_that_is_not_to_be_had_again_closes_the_window_with_a_word(
+def test_unavailable_device_closes_the_window_with_a_message(
     make_driver: Callable[[], InputDriver], monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
     driver = make_driver()
@@ -193,7 +193,7 @@ def test_a_device_that_is_not_to_be_had_again_closes_the_window_with_a_word(
         _raise_failure(driver.viewer)
 
 
-def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
+def test_state_over_the_memory_limit_keeps_the_last_picture(
     driver: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """This is not a lost device: another device would have no more memory."""
@@ -211,7 +211,7 @@ def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
     assert np.array_equal(after[:100, 205:], before[:100, 205:])
 
 
-def test_input_during_a_frame_is_in_the_next_one(
+def test_input_during_a_frame_applies_to_the_next_one(
     driver: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All input of the frame is processed at once and is one step of the history."""

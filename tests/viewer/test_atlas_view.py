@@ -17,19 +17,19 @@ def place_at(atlas_view: AtlasView, x: float, y: float) -> tuple[float, float]:
     return atlas_view.centre[0] + atlas_view.span * x, atlas_view.centre[1] + atlas_view.span * y
 
 
-def test_zooming_keeps_the_place_under_the_cursor() -> None:
+def test_zooming_keeps_the_point_under_the_cursor() -> None:
     atlas_view = AtlasView(centre=(0.4, 0.6), span=0.3)
     near = atlas_view.zoomed(0.25, 0.2, -0.3)
     assert near.span == pytest.approx(0.075)
     assert place_at(near, 0.2, -0.3) == pytest.approx(place_at(atlas_view, 0.2, -0.3))
 
 
-def test_panning_carries_the_place_along() -> None:
+def test_panning_moves_the_point_with_the_cursor() -> None:
     atlas_view = AtlasView(span=0.2)
     assert place_at(atlas_view.panned(0.1, -0.2), 0.1, -0.2) == pytest.approx(atlas_view.centre)
 
 
-def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -> None:
+def test_each_texel_is_drawn_as_a_square_with_its_light(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
     shown = state.with_view(ATLAS_VIEW_NAME).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     image = view_renderer.render_image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), moving=True)
@@ -59,7 +59,7 @@ def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
     assert np.abs(coarse - mean).max() <= 1.01
 
 
-def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
+def test_changing_the_visible_atlas_part_draws_no_new_frame(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
     shown = state.with_view(ATLAS_VIEW_NAME)
     first = view_renderer.read(view_renderer.render_image(shown, state.scene.camera, (64, 64), moving=False))

@@ -61,7 +61,7 @@ def page(browser: Any, url: str) -> Iterator[Any]:
         yield one
 
 
-def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
+def test_page_shows_the_head_and_drag_orbits_it(page: Any) -> None:
     before = still(page, shows_head)
     drag(page, (320, 240), (230, 240))
     still(page, differs_from(before))
@@ -75,7 +75,7 @@ def places(make_driver: Callable[[], InputDriver]) -> dict[str, tuple[float, flo
     return driver.viewer.session.positions
 
 
-def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, float]]) -> None:
+def test_panel_changes_the_picture(page: Any, places: dict[str, tuple[float, float]]) -> None:
     before = still(page, shows_head)
     for view, judge in (("irradiance", differs_from(before)), ("picture", looks_like(before))):
         closed = pixels(page)[80:280, :100]
@@ -85,7 +85,7 @@ def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, 
         still(page, judge)
 
 
-def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
+def test_lost_connection_is_restored(page: Any) -> None:
     before = still(page, shows_head)
     page.evaluate("window.websocket.close()")
     page.wait_for_function("() => window.websocket.readyState === WebSocket.OPEN")
@@ -112,7 +112,7 @@ def watcher(browser: Any) -> Iterator[Any]:
     one.close()
 
 
-def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: str) -> None:
+def test_second_page_is_read_only(page: Any, watcher: Any, url: str) -> None:
     before = still(page, shows_head)
     watcher.goto(url)
     wait_for_picture(watcher)
@@ -126,7 +126,7 @@ def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: 
     watcher.wait_for_function("() => document.querySelector('#notice').innerText === ''")
 
 
-def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url: str) -> None:
+def test_one_finger_orbits_and_two_zoom_and_pan(browser: Any, url: str) -> None:
     page = browser.new_context(viewport=SIZE, has_touch=True).new_page()
     listen(page)
     page.goto(url)
@@ -165,7 +165,7 @@ def test_keys_and_the_wheel_work_without_a_click(page: Any) -> None:
     still(page, looks_like(before))
 
 
-def test_a_window_that_changes_its_size_is_filled(page: Any) -> None:
+def test_resized_window_is_filled(page: Any) -> None:
     still(page, shows_head)
     page.set_viewport_size({"width": 500, "height": 300})
     page.wait_for_function("() => document.querySelector('img').naturalWidth === 500")
@@ -173,7 +173,7 @@ def test_a_window_that_changes_its_size_is_filled(page: Any) -> None:
     wait_for_picture(page)
 
 
-def test_a_watcher_of_another_size_takes_over_with_its_own(page: Any, watcher: Any, url: str) -> None:
+def test_watcher_that_takes_over_uses_its_size(page: Any, watcher: Any, url: str) -> None:
     still(page, shows_head)
     watcher.set_viewport_size({"width": 520, "height": 320})
     watcher.goto(url)
@@ -193,9 +193,7 @@ _RECORD_SOCKETS = """
 
 
 @pytest.mark.parametrize(("page_at", "socket_at"), [("http:", "ws:"), ("https:", "wss:")])
-def test_a_page_that_came_encrypted_opens_an_encrypted_socket(
-    page_at: str, socket_at: str, browser: Any, url: str
-) -> None:
+def test_https_page_opens_a_wss_socket(page_at: str, socket_at: str, browser: Any, url: str) -> None:
     """As behind a proxy, which is simulated with the server's own files."""
     page, base = browser.new_page(), url.partition("?")[0]
     page.add_init_script(_RECORD_SOCKETS)

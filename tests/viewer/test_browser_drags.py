@@ -19,7 +19,7 @@ def is_done(shown: Any) -> bool:
     return bool(history.can_undo and not history._gesture and shown.is_still)
 
 
-def test_the_same_quick_drag_ends_at_the_same_value(browser: Any, shown: Any) -> None:
+def test_equal_quick_drags_end_at_equal_values(browser: Any, shown: Any) -> None:
     session, ends = shown.session, []
     with visited(browser, shown.url) as page:
         assert wait(page, lambda: "mix" in session.positions)
@@ -37,7 +37,7 @@ def test_the_same_quick_drag_ends_at_the_same_value(browser: Any, shown: Any) ->
     assert len(set(ends)) == 1 and ends[0] > 0.5
 
 
-def test_a_finger_that_is_taken_away_leaves_the_slider_where_it_was(browser: Any, shown: Any) -> None:
+def test_lifted_finger_leaves_the_slider_value(browser: Any, shown: Any) -> None:
     session = shown.session
     with visited(browser, shown.url, has_touch=True) as page:
         assert wait(page, lambda: "mix" in session.positions and shown.is_still)
@@ -63,7 +63,7 @@ _QUICKER_THAN_HANDS = """() => {
 }"""
 
 
-def test_no_move_of_a_drag_comes_after_its_release(browser: Any, shown: Any) -> None:
+def test_no_drag_move_follows_its_release(browser: Any, shown: Any) -> None:
     told: list[dict[str, Any]] = []
 
     def listen(socket: Any) -> None:

@@ -15,7 +15,7 @@ from dermis.scene.files import load_scene
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 
 
-def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
+def test_scene_and_screenshot_are_downloads_without_server_files(
     browser: Any, shown: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from PIL import Image
@@ -45,9 +45,7 @@ def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
     assert [path.name for path in tmp_path.iterdir()] == ["got.toml"]
 
 
-def test_a_chosen_file_is_sent_and_shown_and_others_are_refused(
-    browser: Any, shown: Any, tmp_path: Path
-) -> None:
+def test_chosen_file_is_uploaded_and_others_are_refused(browser: Any, shown: Any, tmp_path: Path) -> None:
     session, first = shown.session, shown.session.state
     good, bad, other = (tmp_path / name for name in ("mine.obj", "broken.obj", "notes.txt"))
     write_head(good)

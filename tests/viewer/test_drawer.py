@@ -22,7 +22,7 @@ def phone(driver: InputDriver) -> Iterator[InputDriver]:
     driver.canvas.set_logical_size(400, 480)
 
 
-def test_a_closed_drawer_leaves_the_head_free(phone: InputDriver) -> None:
+def test_closed_drawer_does_not_cover_the_head(phone: InputDriver) -> None:
     shown = phone.settled().astype(int)
     sides = shown[150:450, :180].mean(), shown[150:450, 180:].mean()
     lit = np.flatnonzero(shown[320].max(axis=-1) > 40)
@@ -30,7 +30,7 @@ def test_a_closed_drawer_leaves_the_head_free(phone: InputDriver) -> None:
     assert (shown[120:500, :20] < 6).all()  # no panel
 
 
-def test_the_drawer_opens_over_the_picture_and_has_the_pointer_there(phone: InputDriver) -> None:
+def test_open_drawer_covers_the_picture_and_receives_input(phone: InputDriver) -> None:
     session, panel = phone.viewer.session, phone.viewer.panel
     closed, camera = phone.settled(), session.state.scene.camera
     phone.press("panel")
@@ -50,14 +50,14 @@ def test_the_drawer_opens_over_the_picture_and_has_the_pointer_there(phone: Inpu
     ("size", "drawer"),
     [((360, 640), True), ((430, 800), True), ((360, 300), True), ((640, 360), False), ((400, 480), False)],
 )
-def test_phones_have_a_drawer_and_desks_a_panel(size: tuple[int, int], drawer: bool) -> None:
+def test_narrow_screens_use_a_drawer_and_wide_ones_a_panel(size: tuple[int, int], drawer: bool) -> None:
     from dermis.apps.viewer.panel.panel import is_drawer
 
     assert is_drawer(size) is drawer
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-def test_a_phone_s_fingers_turn_the_head_and_open_the_drawer(browser: Any, shown: Any) -> None:
+def test_touch_input_orbits_the_head_and_opens_the_drawer(browser: Any, shown: Any) -> None:
     session, panel = shown.session, shown.panel
     view = {"width": PHONE[0], "height": PHONE[1]}
     with visited(browser, shown.url, viewport=view, has_touch=True) as page:

@@ -13,7 +13,7 @@ def escape(driver: InputDriver) -> None:
         driver.event(kind, key="Escape")
 
 
-def test_escape_closes_a_list_and_takes_nothing_of_it(driver: InputDriver) -> None:
+def test_escape_closes_a_list_without_a_choice(driver: InputDriver) -> None:
     session = driver.viewer.session
     closed, before = driver.settled(), session.state
     driver.press("profile")
@@ -36,7 +36,7 @@ def test_escape_hides_the_help_before_it_clears_the_search(driver: InputDriver) 
         assert (panel.shows_help, session.search) == (help_is_shown, search)
 
 
-def test_escape_clears_the_search_that_is_typed_in(rigged: ViewerState, driver: InputDriver) -> None:
+def test_escape_clears_the_focused_search(rigged: ViewerState, driver: InputDriver) -> None:
     session = driver.viewer.session
     session.change(rigged)
     driver.press("search")

@@ -35,7 +35,7 @@ def unlike(a: NDArray[np.uint8], b: NDArray[np.uint8], part: Any) -> float:
 
 
 @pytest.mark.parametrize("ratio", [1e-300, -1.0, float("nan"), float("inf"), 1e300])
-def test_an_impossible_pixel_ratio_ends_only_its_frames(
+def test_invalid_pixel_ratio_fails_only_its_frames(
     calm: InputDriver, ratio: float, caplog: pytest.LogCaptureFixture
 ) -> None:
     before = calm.settled()
@@ -51,7 +51,7 @@ def test_an_impossible_pixel_ratio_ends_only_its_frames(
     assert len(told) == len(set(told)) <= 2
 
 
-def test_a_section_that_fails_spares_the_others(
+def test_failing_section_does_not_affect_others(
     calm: InputDriver, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     from imgui_bundle import imgui
@@ -80,7 +80,7 @@ def test_a_section_that_fails_spares_the_others(
     assert unlike(calm.settled(), before, PANEL) < 0.002
 
 
-def test_a_state_that_cannot_be_drawn_leaves_the_last_picture(
+def test_undrawable_state_keeps_the_last_picture(
     calm: InputDriver, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     before, session = calm.settled(), calm.viewer.session
@@ -97,7 +97,7 @@ def test_a_state_that_cannot_be_drawn_leaves_the_last_picture(
     assert np.array_equal(calm.settled()[PICTURE], before[PICTURE])
 
 
-def test_a_frame_that_fails_elsewhere_is_told_and_the_next_one_drawn(
+def test_failed_frame_is_reported_and_the_next_one_drawn(
     calm: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = calm.settled()
@@ -112,7 +112,7 @@ def test_a_frame_that_fails_elsewhere_is_told_and_the_next_one_drawn(
     assert unlike(calm.settled(), before, PICTURE) == 0.0 and calm.viewer.failure is None
 
 
-def test_a_head_or_a_button_that_fails_is_told(calm: InputDriver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failing_head_or_button_is_reported(calm: InputDriver, monkeypatch: pytest.MonkeyPatch) -> None:
     session = calm.viewer.session
 
     def fail(*_: Any) -> None:

@@ -33,7 +33,7 @@ BAD = [
 ]
 
 
-def test_no_message_breaks_the_page(shown: Any) -> None:
+def test_invalid_messages_do_not_break_the_page(shown: Any) -> None:
     with visit(shown) as socket:
         page = Page(socket)
         page.show()
@@ -46,7 +46,7 @@ def test_no_message_breaks_the_page(shown: Any) -> None:
         assert shown.canvas.get_pixel_ratio() == 1.0 and not shown.session.message
 
 
-def test_a_message_that_is_far_too_long_ends_its_own_socket(shown: Any) -> None:
+def test_oversized_message_closes_its_socket(shown: Any) -> None:
     from websockets.exceptions import ConnectionClosed
 
     with visit(shown) as one, visit(shown) as other:
@@ -82,9 +82,7 @@ def answered(shown: Any, method: str, path: str, **headers: str) -> Iterator[htt
         ("POST", "/upload/a.obj", 400),
     ],
 )
-def test_every_response_tells_browsers_what_the_page_may(
-    shown: Any, method: str, path: str, status: int
-) -> None:
+def test_every_response_has_security_headers(shown: Any, method: str, path: str, status: int) -> None:
     with answered(shown, method, path) as response:
         assert response.status == status
         assert {name: response.headers.get_all(name) for name in RESPONSE_HEADERS} == {
@@ -98,7 +96,7 @@ def test_every_response_tells_browsers_what_the_page_may(
     )
 
 
-def test_who_is_refused_is_told_the_same_and_hung_up_on(shown: Any) -> None:
+def test_refused_clients_get_the_same_response_and_are_closed(shown: Any) -> None:
     with answered(shown, "GET", "/", Host="evil.example") as response:
         assert response.status == 403 and response.headers["Connection"] == "close"
         assert response.headers["Content-Security-Policy"] and b"token" not in response.read()
@@ -124,9 +122,7 @@ ASKED = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
     [b"", b"GET / HTTP/1.1\r\nHost:", ASKED + b"GET /page.js HT", b"\x16\x03\x01"],
     ids=["nothing", "half", "one and a half", "another protocol"],
 )
-def test_headers_that_do_not_come_are_not_waited_for(
-    shown: Any, said: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_incomplete_headers_time_out(shown: Any, said: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "HEADER_TIMEOUT_S", 0.3)
     with socket.create_connection(address(shown)) as one:
         one.sendall(said)
@@ -167,7 +163,7 @@ def comes(reached: Callable[[], bool]) -> bool:
     return reached()
 
 
-def test_a_page_may_be_silent(shown: Any, made: list[Any]) -> None:
+def test_silent_page_stays_connected(shown: Any, made: list[Any]) -> None:
     with socket.create_connection(address(shown)):
         assert comes(lambda: len(made) == 1 and made[0]._deadline is not None)
     with visit(shown) as one:
@@ -177,7 +173,7 @@ def test_a_page_may_be_silent(shown: Any, made: list[Any]) -> None:
         page.still()
 
 
-def test_only_so_many_connections_are_open(
+def test_number_of_connections_is_limited(
     shown: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server, "MAX_CONNECTIONS", 3)
@@ -196,7 +192,7 @@ def is_answered(shown: Any) -> bool:
     return False
 
 
-def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_number_of_pages_is_limited(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from websockets.exceptions import InvalidStatus
 
     monkeypatch.setattr("dermis.apps.viewer.browser.request_filter.MAX_PAGES", 2)

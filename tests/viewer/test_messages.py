@@ -34,7 +34,7 @@ TOUCHES = {"0": {"x": 1, "y": 2, "pressure": 0.5}, "1": {"x": 3, "y": 4}}
         {"type": "hide"},
     ],
 )
-def test_what_a_page_sends_passes(event: dict[str, Any]) -> None:
+def test_valid_page_events_pass(event: dict[str, Any]) -> None:
     passed = json.loads(str(checked_message(json.dumps(event | {"timestamp": 12.5}))))
     assert {name: passed[name] for name in event if name != "touches"} == {
         name: value for name, value in event.items() if name != "touches"
@@ -58,13 +58,13 @@ FIELDS = [
 
 @pytest.mark.parametrize(("event", "field"), FIELDS, ids=[field for _, field in FIELDS])
 @pytest.mark.parametrize("value", NUMBERS, ids=[str(value)[:5] for value in NUMBERS])
-def test_numbers_are_finite_and_possible(event: dict[str, Any], field: str, value: Any) -> None:
+def test_numbers_are_finite_and_in_range(event: dict[str, Any], field: str, value: Any) -> None:
     assert checked_message(json.dumps({"timestamp": 1.0} | event)) is not None
     assert checked_message(json.dumps({"timestamp": 1.0} | event | {field: value})) is None
 
 
 @pytest.mark.parametrize("ratio", [1e-300, 5e-324, 0, -0.0, -1, 0.01, 21])
-def test_pixel_ratios_are_those_of_screens(ratio: float) -> None:
+def test_pixel_ratios_are_limited_to_real_screens(ratio: float) -> None:
     assert checked_message(json.dumps(RESIZE | {"timestamp": 1, "ratio": ratio})) is None
 
 
@@ -100,7 +100,7 @@ def test_other_events_are_dropped(event: dict[str, Any]) -> None:
     assert checked_message(json.dumps({"timestamp": 1.0} | event)) is None
 
 
-def test_fields_that_an_event_does_not_have_are_dropped() -> None:
+def test_unknown_event_fields_are_dropped() -> None:
     passed = json.loads(
         str(checked_message(json.dumps(KEY | {"timestamp": 1, "event_type": "close", "more": [1]})))
     )
@@ -112,5 +112,5 @@ def test_fields_that_an_event_does_not_have_are_dropped() -> None:
     ["", "{", "hello", "3", "[1, 2]", None, b"{}", "[" * 4000, '{"a":' * 700, "9" * 4000, '{"type": "show"'],
     ids=lambda text: str(text)[:6],
 )
-def test_what_is_no_event_is_dropped(text: Any) -> None:
+def test_invalid_events_are_dropped(text: Any) -> None:
     assert checked_message(text) is None

@@ -68,12 +68,12 @@ def sliders(driver: InputDriver) -> set[str]:
     return {label.removesuffix("##target") for label in positions if label.endswith("##target")}
 
 
-def test_it_plays_at_once(player: InputDriver) -> None:
+def test_motion_plays_at_once(player: InputDriver) -> None:
     first, _, later = player.frame(), player.frame(), player.frame(0.5)
     assert player.viewer.session.player.is_playing and difference(first, later) > 1.0
 
 
-def test_a_slider_moves_the_head_and_is_one_step(faces: InputDriver) -> None:
+def test_slider_moves_the_head_as_one_undo_step(faces: InputDriver) -> None:
     before, session = faces.settled(), faces.viewer.session
     x, y = faces.position("jawOpen##target")
     faces.drag((x, y), (x + 60.0, y))
@@ -85,7 +85,7 @@ def test_a_slider_moves_the_head_and_is_one_step(faces: InputDriver) -> None:
     assert difference(before, faces.settled()) == 0.0
 
 
-def test_a_slider_held_shows_each_of_its_weights(faces: InputDriver) -> None:
+def test_dragged_slider_shows_each_weight(faces: InputDriver) -> None:
     x, y = faces.position("jawOpen##target")
     faces.event("pointer_move", x=x, y=y, button=0, buttons=())
     faces.event("pointer_down", x=x, y=y, button=1, buttons=(1,))
@@ -103,7 +103,7 @@ def test_a_slider_held_shows_each_of_its_weights(faces: InputDriver) -> None:
     assert all("shape" in one and "shade" in one for one in ran)
 
 
-def test_names_are_searched_for(faces: InputDriver) -> None:
+def test_target_names_are_searchable(faces: InputDriver) -> None:
     session = faces.viewer.session
     assert sliders(faces) == set(session.state.scene.head.targets)
     faces.press("search")
@@ -114,7 +114,7 @@ def test_names_are_searched_for(faces: InputDriver) -> None:
     faces.click((300.0, 470.0))
 
 
-def test_bones_are_folded_and_turn_the_head(faces: InputDriver) -> None:
+def test_bone_controls_are_collapsed_and_rotate_the_head(faces: InputDriver) -> None:
     before, session = faces.settled(), faces.viewer.session
     assert "head##bone" not in session.positions
     faces.press("bones")
@@ -128,7 +128,7 @@ def test_bones_are_folded_and_turn_the_head(faces: InputDriver) -> None:
     assert not session.history.can_undo
 
 
-def test_rest_takes_all_back_in_one_step(faces: InputDriver) -> None:
+def test_rest_button_resets_the_pose_in_one_step(faces: InputDriver) -> None:
     before, session = faces.settled(), faces.viewer.session
     session.change(session.state.with_pose(Pose({"jawOpen": 1.0}, {"neck": (0.0, 30.0, 0.0)})))
     assert difference(before, faces.settled()) > 1.0
@@ -138,7 +138,7 @@ def test_rest_takes_all_back_in_one_step(faces: InputDriver) -> None:
     assert difference(before, faces.settled()) == 0.0
 
 
-def test_the_key_plays_and_pauses_and_the_last_pose_is_refined(faces: InputDriver) -> None:
+def test_play_key_pauses_and_refines_the_last_pose(faces: InputDriver) -> None:
     session, view_renderer = faces.viewer.session, faces.viewer.session.view_renderer
     rest = faces.settled()
     faces.event("key_down", key=" ")
@@ -158,7 +158,7 @@ def test_the_key_plays_and_pauses_and_the_last_pose_is_refined(faces: InputDrive
     assert difference(paused, faces.settled()) == 0.0
 
 
-def test_buttons_and_the_slider_of_time(faces: InputDriver) -> None:
+def test_playback_buttons_and_time_slider_work(faces: InputDriver) -> None:
     session = faces.viewer.session
     faces.press("play##motion")
     assert session.player.is_playing and not session.history.can_undo
@@ -179,7 +179,7 @@ def _talk(seconds: float) -> float:
     return 1.0 - abs(seconds - 1.0)
 
 
-def test_what_plays_is_what_is_saved_and_frozen(faces: InputDriver, tmp_path: Path) -> None:
+def test_current_pose_is_saved_and_frozen(faces: InputDriver, tmp_path: Path) -> None:
     session = faces.viewer.session
     faces.event("key_down", key=" ")
     faces.frame()
@@ -206,7 +206,7 @@ def test_a_motion_is_opened_by_name(faces: InputDriver, tmp_path: Path) -> None:
     assert session.player.is_playing
 
 
-def test_a_head_that_nothing_moves_has_no_such_sections(driver: InputDriver) -> None:
+def test_static_head_has_no_motion_sections(driver: InputDriver) -> None:
     driver.settled()
     assert not {"Expressions", "Motion", "search", "rest"} & set(driver.viewer.session.positions)
     driver.event("key_down", key=" ")

@@ -34,7 +34,7 @@ def distance(camera: Camera) -> float:
     return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
 
 
-def test_a_quarter_turn_leads_to_the_side() -> None:
+def test_quarter_turn_shows_the_side() -> None:
     turned = orbit(CAMERA, math.pi / 2, 0.0)
     assert np.allclose(turned.position, (1000.0, 0.0, 0.0), atol=1e-9)
     assert turned.target == CAMERA.target
@@ -50,7 +50,7 @@ def test_orbit_keeps_the_distance_and_never_goes_over_the_top() -> None:
     assert np.isfinite(camera_axes(camera)).all()
 
 
-def test_orbits_there_and_back_end_where_they_began() -> None:
+def test_orbit_and_reverse_orbit_return() -> None:
     back = orbit(orbit(CAMERA, 0.7, 0.4), -0.7, -0.4)
     assert np.allclose(back.position, CAMERA.position, atol=1e-9)
 
@@ -60,7 +60,7 @@ def test_pan_moves_by_the_height_of_the_image() -> None:
     assert np.allclose(moved.target, (0.0, 300.0, 0.0)) and distance(moved) == pytest.approx(1000.0)
 
 
-def test_dolly_scales_distance_and_frame_together_until_it_is_near() -> None:
+def test_dolly_scales_distance_and_frame_until_a_minimum() -> None:
     near = dolly(CAMERA, 0.5)
     assert (distance(near), near.frame_mm) == (pytest.approx(500.0), pytest.approx(150.0))
     close = CAMERA
@@ -82,7 +82,7 @@ def test_presets_look_at_the_head(name: str, head: Head) -> None:
     assert pick(Scene(head), camera_preset(name, head), 0.0, 0.0, 1.0) is not None
 
 
-def test_the_middle_of_the_picture_is_the_front_of_the_head(head: Head) -> None:
+def test_picking_the_centre_hits_the_front_of_the_head(head: Head) -> None:
     place = pick(Scene(head), CAMERA, 0.0, 0.0, 1.0)
     p = head.mesh.positions - np.array(head.centre_mm)
     assert place is not None
@@ -90,7 +90,7 @@ def test_the_middle_of_the_picture_is_the_front_of_the_head(head: Head) -> None:
     assert place[2] == pytest.approx(float(p[:, 2].max()), rel=0.03)
 
 
-def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
+def test_picked_point_lies_on_the_ray_of_its_pixel(head: Head) -> None:
     x, y, aspect = 0.2, -0.3, 1.5
     place = pick(Scene(head), CAMERA, x, y, aspect)
     assert place is not None
@@ -101,7 +101,7 @@ def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
     assert ray @ up / (ray @ forward) == pytest.approx(y * half)
 
 
-def test_a_picked_place_follows_the_pose(rigged_head: Head) -> None:
+def test_picked_point_follows_the_pose(rigged_head: Head) -> None:
     """A camera that rotates with the head picks the same point."""
     degrees = 40.0
     turned = Scene(rigged_head, pose=Pose({"jawOpen": 0.8}, {"neck": (0.0, degrees, 0.0)}))
@@ -113,11 +113,11 @@ def test_a_picked_place_follows_the_pose(rigged_head: Head) -> None:
     assert np.allclose(found, np.array(angles_matrix((0.0, degrees, 0.0))) @ open_jaw, atol=0.01)
 
 
-def test_beside_the_head_there_is_nothing(head: Head) -> None:
+def test_picking_beside_the_head_finds_nothing(head: Head) -> None:
     assert pick(Scene(head), CAMERA, 0.99, 0.99, 1.0) is None
 
 
-def test_easing_is_alike_at_every_frame_rate() -> None:
+def test_easing_does_not_depend_on_the_frame_rate() -> None:
     wanted = dolly(orbit(CAMERA, 0.4, 0.2), 0.6)
     slow, fast = CameraEasing(CAMERA), CameraEasing(CAMERA)
     slow.advance(wanted, 0.06)
@@ -134,7 +134,7 @@ def test_easing_arrives_and_stays() -> None:
     assert easing.camera is wanted
 
 
-def test_between_opposite_sides_does_not_go_through_the_head() -> None:
+def test_easing_between_opposite_sides_avoids_the_head() -> None:
     behind = orbit(CAMERA, math.pi, 0.0)
     assert distance(interpolate_cameras(CAMERA, behind, 0.5)) == pytest.approx(1000.0)
 

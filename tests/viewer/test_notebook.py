@@ -58,7 +58,7 @@ class Page:
         raise AssertionError("the widget does not come to rest")
 
 
-def test_the_widget_shows_the_head_and_a_drag_turns_it(state: ViewerState) -> None:
+def test_widget_shows_the_head_and_drag_orbits_it(state: ViewerState) -> None:
     async def visit() -> None:
         widget = view(state, ADAPTER, SIZE)
         assert "application/vnd.jupyter.widget-view+json" in str(widget._repr_mimebundle_())
@@ -76,7 +76,7 @@ def test_the_widget_shows_the_head_and_a_drag_turns_it(state: ViewerState) -> No
     asyncio.run(visit())
 
 
-def test_a_closed_widget_is_closed_once(head_file: Path) -> None:
+def test_widget_is_closed_once(head_file: Path) -> None:
     widget = view(str(head_file), ADAPTER, SIZE)
     widget.close()
     assert widget.get_closed()
@@ -90,12 +90,17 @@ def test_heads_people_and_scenes_are_shown(head: Head) -> None:
     assert make_state(person).scene.skin == skin_of(person)
 
 
-def test_something_else_is_refused_by_name() -> None:
+def test_other_subjects_are_refused_by_name() -> None:
     with pytest.raises(dermis.DermisError, match=r"a head, a person, a scene or a name, but got a list"):
         dermis.view([1, 2])  # type: ignore[arg-type]
 
 
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_keyword_of_the_subject_warns() -> None:
+    with pytest.warns(DeprecationWarning, match="subject"), pytest.raises(dermis.DermisError):
+        dermis.view(shown=[1, 2])  # type: ignore[call-arg]
+
+
+def test_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(dermis.DermisError, match=r'pip install "dermis\[notebook\]"'):
         dermis.view()

@@ -68,9 +68,7 @@ def heard(socket: Any, kind: str) -> dict[str, Any]:
             return dict(told)
 
 
-def test_the_page_is_there_while_a_head_is_read_and_hears_each_stage(
-    start: Start, state: ViewerState
-) -> None:
+def test_page_shows_loading_stages_while_a_head_is_read(start: Start, state: ViewerState) -> None:
     gate = threading.Event()
 
     def load() -> Any:
@@ -100,7 +98,7 @@ def test_the_page_is_there_while_a_head_is_read_and_hears_each_stage(
         assert page.still().max() > 50
 
 
-def test_why_nothing_can_be_shown_is_told_in_the_page_and_ends_the_server(start: Start) -> None:
+def test_startup_failure_is_shown_in_the_page_and_ends_the_server(start: Start) -> None:
     gate = threading.Event()
 
     def load() -> Any:
@@ -121,7 +119,7 @@ def command(*words: str) -> subprocess.Popen[str]:
     return child_process.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def test_the_command_ends_with_its_one_line(tmp_path: Path) -> None:
+def test_command_ends_with_one_error_line(tmp_path: Path) -> None:
     broken = tmp_path / "broken.obj"
     broken.write_text("v 1 2\nf 1 2 3\n")
     with command(str(broken)) as ended:
@@ -132,7 +130,7 @@ def test_the_command_ends_with_its_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
-def test_a_signal_ends_it_while_it_prepares_and_leaves_nothing(
+def test_signal_during_preparation_ends_cleanly(
     number: signal.Signals, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path))

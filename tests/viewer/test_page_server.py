@@ -61,7 +61,7 @@ PASSED, REFUSED = (200, "websocket.accept"), (403, 1008)
 KINDS = pytest.mark.parametrize("kind", ["http", "websocket"])
 
 
-def test_this_machine_needs_no_token() -> None:
+def test_local_clients_need_no_token() -> None:
     request_filter = RequestFilter(_app, "")
     assert status(ask(request_filter)) == 200
     assert status(ask(request_filter, host="localhost:8765")) == 200
@@ -74,14 +74,14 @@ def test_this_machine_needs_no_token() -> None:
     "query", ["", "token=", "token=wrong", "token=secre", "token=secrets", "tokens=secret"]
 )
 @pytest.mark.parametrize("cookie", ["", "dermis=", "dermis=secrets", "other=secret; a", "dermis", "=secret"])
-def test_without_the_token_nothing_is_answered(kind: str, query: str, cookie: str) -> None:
+def test_requests_without_token_are_refused(kind: str, query: str, cookie: str) -> None:
     answers = ask(RequestFilter(_app, "secret"), query, kind, cookie=cookie)
     assert status(answers) in REFUSED
     if kind == "http":
         assert b"dermis view has printed" in answers[1]["body"] and b"secret" not in answers[1]["body"]
 
 
-def test_the_token_of_the_address_becomes_a_cookie_that_opens_all_else() -> None:
+def test_url_token_becomes_a_session_cookie() -> None:
     request_filter = RequestFilter(_app, "secret", "dermis-80")
     headers = ask(request_filter, "token=secret", host="gpu.example:8765")[0]["headers"]
     assert headers == [(b"set-cookie", b"dermis-80=secret; Path=/; HttpOnly; SameSite=Strict")]
@@ -109,21 +109,21 @@ def test_pages_of_other_sites_are_refused(kind: str) -> None:
 
 
 @KINDS
-def test_with_the_token_too(kind: str) -> None:
+def test_other_origins_are_refused_even_with_token(kind: str) -> None:
     request_filter, cookie = RequestFilter(_app, "secret"), "dermis=secret"
     assert status(ask(request_filter, kind=kind, cookie=cookie, origin="http://127.0.0.1:9000")) in REFUSED
     assert status(ask(request_filter, "token=secret", kind=kind, origin="http://evil.example")) in REFUSED
 
 
 @pytest.mark.parametrize(("kind", "scheme"), [("http", "https"), ("websocket", "wss")])
-def test_behind_a_proxy_the_origin_is_the_one_that_it_tells(kind: str, scheme: str) -> None:
+def test_origin_behind_a_proxy_is_taken_from_its_header(kind: str, scheme: str) -> None:
     request_filter = RequestFilter(_app, "secret")
     given = {"host": "skin.example", "origin": "https://skin.example", "cookie": "dermis=secret"}
     assert status(ask(request_filter, kind=kind, scheme=scheme, **given)) in PASSED
     assert status(ask(request_filter, kind=kind, **given)) in REFUSED
 
 
-def test_only_so_many_pages_are_open() -> None:
+def test_number_of_open_pages_is_limited() -> None:
     request_filter = RequestFilter(_app, "")
     request_filter._pages = MAX_PAGES
     assert status(ask(request_filter, kind="websocket")) == 1008 and status(ask(request_filter)) == 200
@@ -151,11 +151,11 @@ def test_bad_messages_do_not_reach_the_canvas() -> None:
         ("", False),
     ],
 )
-def test_only_this_machine_is_local(host: str, local: bool) -> None:
+def test_only_loopback_addresses_are_local(host: str, local: bool) -> None:
     assert is_local(host) is local
 
 
-def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
+def test_remote_hosts_get_a_new_token_each_time() -> None:
     tokens = set()
     for _ in range(2):
         listener, address = bind("0.0.0.0", 0)
@@ -168,18 +168,18 @@ def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
         assert address.token == "" and address.url == f"http://127.0.0.1:{address.port}/"
 
 
-def test_this_machine_gets_a_token_when_asked() -> None:
+def test_local_host_gets_a_token_on_request() -> None:
     listener, address = bind("127.0.0.1", 0, require_token=True)
     with listener:
         assert len(address.token) >= 20 and address.url.endswith(f"/?token={address.token}")
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
-def test_a_server_that_listens_everywhere_goes_by_the_machine_s_name(host: str) -> None:
+def test_server_on_all_interfaces_shows_the_host_name(host: str) -> None:
     assert Address(host, 80, "secret").url == f"http://{socket.gethostname()}:80/?token=secret"
 
 
-def test_addresses_of_version_six_are_bracketed() -> None:
+def test_ipv6_addresses_are_bracketed() -> None:
     assert Address("::1", 80, "").url == "http://[::1]:80/"
 
 

@@ -18,12 +18,12 @@ def count_of(image: NDArray[np.uint8], colour: tuple[float, float, float]) -> in
     return int((off < 12.0).sum())
 
 
-def test_stages_without_a_time_in_a_frame_have_none_there() -> None:
+def test_stages_without_time_in_a_frame_are_empty() -> None:
     found = stage_series([{"shade": 2.0, "total": 2.0}, {"blur": 1.0, "shade": 3.0, "total": 4.0}])
     assert {name: values.tolist() for name, values in found.items()} == {"shade": [2, 3], "blur": [0, 1]}
 
 
-def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> None:
+def test_recent_frame_times_are_kept(driver: InputDriver) -> None:
     times, session = driver.viewer.session.view_renderer.stage_times, driver.viewer.session
     for k in range(130):
         times.append({"shade": float(k)})
@@ -34,7 +34,7 @@ def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> N
     assert times[-1] == (session.view_renderer.rendered.gpu_ms or {})
 
 
-def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDriver) -> None:
+def test_profile_graph_has_three_colours_and_updates(driver: InputDriver) -> None:
     wide = driver.settled()
     for colour in _CHANNEL_COLOURS:
         assert count_of(wide, colour) > 15
@@ -42,7 +42,7 @@ def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDrive
     assert np.abs(driver.settled()[PANEL].astype(int) - wide[PANEL]).max() > 50
 
 
-def test_the_graph_of_times_is_drawn_with_numbers(driver: InputDriver) -> None:
+def test_time_graph_shows_numbers(driver: InputDriver) -> None:
     for title in ("View", "Profile", "Surface"):
         driver.press(title)
     closed = driver.settled()

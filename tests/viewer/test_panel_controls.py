@@ -90,9 +90,7 @@ def move(driver: InputDriver, label: str) -> None:
 
 
 @pytest.mark.parametrize("start", [*STARTS, "faces"])
-def test_every_control_is_a_step_that_undo_takes_back(
-    start: str, tall: InputDriver, rigged: ViewerState
-) -> None:
+def test_every_control_is_an_undoable_step(start: str, tall: InputDriver, rigged: ViewerState) -> None:
     session = tall.viewer.session
     smiling = rigged.with_pose(Pose({"mouthSmileLeft": 0.5}, {"neck": (10.0, 0.0, 5.0)}))
     session.change(smiling if start == "faces" else STARTS[start](session.history.states[0]))
@@ -127,7 +125,7 @@ def test_every_field_has_a_help_text(kind: type[FrozenModel]) -> None:
     assert all(field_help(kind, name) for name in kind.model_fields)
 
 
-def test_comparisons_of_the_talk_are_a_section_of_their_own_last_and_closed(driver: InputDriver) -> None:
+def test_talk_comparisons_are_the_last_collapsed_section(driver: InputDriver) -> None:
     assert SECTIONS[-1].title == COMPARISONS and not SECTIONS[-1].is_open
     labels = {"energy", "reflection", "stretch", "seams", "gamma"}
     session, opened = driver.viewer.session, ("Technique", "Picture")
@@ -190,7 +188,7 @@ def test_the_panel_can_be_hidden_and_brought_back_without_keys(driver: InputDriv
     assert driver.viewer.panel.is_visible and driver.viewer.session.state.scene.camera == camera
 
 
-def test_a_finger_scrolls_the_panel_beside_its_controls(driver: InputDriver) -> None:
+def test_touch_scrolls_the_panel_beside_controls(driver: InputDriver) -> None:
     _, y = driver.position("mix")
     driver.drag((170.0, y), (170.0, y - 90.0))  # on the label
     assert driver.position("mix")[1] == pytest.approx(y - 90.0, abs=2.0)
@@ -198,7 +196,7 @@ def test_a_finger_scrolls_the_panel_beside_its_controls(driver: InputDriver) -> 
     assert driver.position("mix")[1] == pytest.approx(y, abs=2.0)
 
 
-def test_help_lies_over_the_picture_and_goes_at_the_next_touch(driver: InputDriver) -> None:
+def test_help_overlay_closes_at_the_next_touch(driver: InputDriver) -> None:
     before = driver.settled()
     driver.event("key_down", key="?")
     shown = driver.settled()
@@ -217,7 +215,7 @@ def test_help_lies_over_the_picture_and_goes_at_the_next_touch(driver: InputDriv
         ("a.png", "picture", (16_000, 16_000), "at most 134 million"),
     ],
 )
-def test_a_screenshot_that_cannot_be_is_told_and_the_viewer_goes_on(
+def test_failed_screenshot_is_reported(
     name: str, view: str, size: tuple[int, int], said: str, driver: InputDriver, tmp_path: Path
 ) -> None:
     session = driver.viewer.session

@@ -21,13 +21,13 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_words_are_about_fields_and_choices_that_exist(kind: type[FrozenModel]) -> None:
+def test_labels_refer_to_existing_fields_and_choices(kind: type[FrozenModel]) -> None:
     for name, style in KINDS[kind].items():
         assert name in kind.model_fields
         assert set(style.names) <= set(field_choices(kind, name)), name
 
 
-def test_words_are_about_kinds_of_light_that_exist() -> None:
+def test_labels_refer_to_existing_light_types() -> None:
     assert set(fields.LIGHT_KIND_NAMES) <= set(LIGHTS)
     assert all(any(name in kind.model_fields for kind in LIGHTS.values()) for name in fields.LIGHT_STYLES)
     assert set(fields.PROFILE_NAMES) <= set(preset_names())
@@ -46,7 +46,7 @@ def test_labels_fit_beside_their_controls(driver: InputDriver) -> None:
     assert {label for label, width in wide.items() if width > room} == set()
 
 
-def test_media_of_food_come_after_all_skins(driver: InputDriver) -> None:
+def test_food_media_are_listed_after_skins(driver: InputDriver) -> None:
     session = driver.viewer.session
     driver.press("profile")
     offered = {name.partition("/")[2]: y for name, (_, y) in session.positions.items() if "profile/" in name}
@@ -59,7 +59,7 @@ def test_media_of_food_come_after_all_skins(driver: InputDriver) -> None:
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_a_light_of_each_kind_is_added_copied_and_removed(kind: str, driver: InputDriver) -> None:
+def test_light_of_each_type_is_added_copied_and_removed(kind: str, driver: InputDriver) -> None:
     session = driver.viewer.session
     rest = session.state.scene.lights
     for section in ("Profile", "Surface", "Light"):

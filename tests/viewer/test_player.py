@@ -61,11 +61,11 @@ def start(player: MotionPlayer, clock: Clock) -> None:
     after(player, clock, 0.0)
 
 
-def test_it_rests_until_it_is_played(player: MotionPlayer, rigged: ViewerState, clock: Clock) -> None:
+def test_player_is_stopped_initially(player: MotionPlayer, rigged: ViewerState, clock: Clock) -> None:
     assert after(player, clock, 1.0) == 0.0 and player.displayed_state is rigged and not player.is_playing
 
 
-def test_it_runs_by_the_clock_however_long_frames_take(player: MotionPlayer, clock: Clock) -> None:
+def test_player_follows_the_clock_at_any_frame_time(player: MotionPlayer, clock: Clock) -> None:
     player.play()
     assert after(player, clock, 5.0) == 0.0
     assert after(player, clock, 5.0) == 0.0  # the first picture took so long
@@ -74,15 +74,13 @@ def test_it_runs_by_the_clock_however_long_frames_take(player: MotionPlayer, clo
     assert player.seconds == pytest.approx(0.45)
 
 
-def test_it_begins_again(player: MotionPlayer, clock: Clock) -> None:
+def test_player_loops(player: MotionPlayer, clock: Clock) -> None:
     start(player, clock)
     assert after(player, clock, 0.6) == pytest.approx(0.2)
     assert after(player, clock, 50.1) == pytest.approx(0.4)
 
 
-def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(
-    player: MotionPlayer, clock: Clock
-) -> None:
+def test_player_without_loop_stops_at_the_end_and_restarts(player: MotionPlayer, clock: Clock) -> None:
     player.loops = False
     start(player, clock)
     assert after(player, clock, 0.7) == 1.0 and not player.is_playing and player.seconds == 0.5
@@ -90,7 +88,7 @@ def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(
     assert player.is_playing and after(player, clock, 0.1) == 0.0
 
 
-def test_a_run_is_one_step(
+def test_playback_is_one_undo_step(
     player: MotionPlayer, history: UndoHistory, rigged: ViewerState, clock: Clock
 ) -> None:
     start(player, clock)
@@ -106,7 +104,7 @@ def test_a_run_is_one_step(
     assert after(player, clock, 0.1) == pytest.approx(0.8)
 
 
-def test_what_changes_meanwhile_is_a_step_of_its_own(
+def test_change_during_playback_is_a_separate_step(
     player: MotionPlayer, history: UndoHistory, clock: Clock
 ) -> None:
     start(player, clock)
@@ -122,7 +120,7 @@ def test_what_changes_meanwhile_is_a_step_of_its_own(
     assert player.displayed_state.scene.camera == camera and jaw(player) == pytest.approx(0.6)
 
 
-def test_a_slider_keeps_what_the_motion_does_not_move(
+def test_slider_keeps_targets_outside_the_motion(
     player: MotionPlayer, history: UndoHistory, clock: Clock
 ) -> None:
     start(player, clock)
@@ -134,7 +132,7 @@ def test_a_slider_keeps_what_the_motion_does_not_move(
     )
 
 
-def test_scrubbing_stops_and_stays_there(player: MotionPlayer, history: UndoHistory, clock: Clock) -> None:
+def test_scrubbing_stops_playback(player: MotionPlayer, history: UndoHistory, clock: Clock) -> None:
     start(player, clock)
     for seconds in (0.1, 0.25, 0.35):
         history.change(player.state_at(seconds), "hold time")
@@ -144,7 +142,7 @@ def test_scrubbing_stops_and_stays_there(player: MotionPlayer, history: UndoHist
     assert after(player, clock, 0.1) == pytest.approx(0.9)
 
 
-def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
+def test_motion_without_matching_names_is_reported_and_the_previous_continues(
     player: MotionPlayer, history: UndoHistory, state: ViewerState, rigged: ViewerState, clock: Clock
 ) -> None:
     start(player, clock)
@@ -158,9 +156,7 @@ def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
     assert player.clip is not None and player.note == ""
 
 
-def test_another_motion_plays_from_its_beginning(
-    player: MotionPlayer, clock: Clock, rigged_file: Path
-) -> None:
+def test_new_motion_plays_from_its_beginning(player: MotionPlayer, clock: Clock, rigged_file: Path) -> None:
     start(player, clock)
     after(player, clock, 0.3)
     player.open(MotionFile(rigged_file))
@@ -187,7 +183,7 @@ def test_a_frame_that_cannot_be_read_stops_it(
     assert not player.is_playing and "frame 3" in player.note
 
 
-def test_a_motion_of_one_frame_stands(rigged: ViewerState, clock: Clock, tmp_path: Path) -> None:
+def test_motion_of_one_frame_is_static(rigged: ViewerState, clock: Clock, tmp_path: Path) -> None:
     player = MotionPlayer(UndoHistory(rigged), MotionFile(write_take(tmp_path / "one.csv", 0.5)), clock)
     start(player, clock)
     assert after(player, clock, 0.1) == 0.5 and not player.is_playing

@@ -27,7 +27,7 @@ from dermis.scene import Scene
 from dermis.scene.heads import load_head
 
 
-def test_a_slider_changes_its_own_weight(rigged_head: Head) -> None:
+def test_slider_changes_its_weight_only(rigged_head: Head) -> None:
     scene = Scene(rigged_head, pose=Pose({"jawOpen": 0.2}, {"head": (5.0, 0.0, 0.0)}))
     found = with_target_weight(scene, "browInnerUp", 0.75)
     assert found is not None
@@ -35,7 +35,7 @@ def test_a_slider_changes_its_own_weight(rigged_head: Head) -> None:
     assert target_weight(scene, "jawOpen") == 0.2 and target_weight(scene, "browInnerUp") == 0.0
 
 
-def test_what_is_put_back_is_at_rest(rigged_head: Head) -> None:
+def test_reset_target_is_at_rest(rigged_head: Head) -> None:
     moved = Scene(rigged_head, pose={"jawOpen": 0.2})
     assert with_target_weight(moved, "jawOpen", 0.0) is None
     turned = Scene(rigged_head, pose=Pose(bones={"neck": (1.0, 2.0, 3.0)}))
@@ -43,7 +43,7 @@ def test_what_is_put_back_is_at_rest(rigged_head: Head) -> None:
     assert rest_pose(turned) is None
 
 
-def test_a_head_that_rests_with_a_weight_shows_it(rigged_head: Head) -> None:
+def test_rest_weight_is_shown(rigged_head: Head) -> None:
     targets = replace(rigged_head.control.targets, rest=np.array([0.5, 0, 0, 0], np.float32))
     rig = Rig(rigged_head.positions_mm, targets)
     scene = Scene(replace(rigged_head, rig=rig))
@@ -59,7 +59,7 @@ def test_the_person_stays_at_rest(rigged_head: Head) -> None:
     assert rest is not None and rest.positions_mm is person and not rest.weights
 
 
-def test_angles_of_a_matrix_are_its_turn(rigged_head: Head) -> None:
+def test_angles_match_the_rotation_matrix(rigged_head: Head) -> None:
     skeleton = rigged_head.control.skeleton
     assert skeleton is not None
     local = skeleton.local[1].copy()
@@ -69,14 +69,14 @@ def test_angles_of_a_matrix_are_its_turn(rigged_head: Head) -> None:
     assert bone_angles(scene, "neck") == (0.0, 0.0, 0.0)
 
 
-def test_moves_leave_what_they_do_not_name(rigged_head: Head) -> None:
+def test_moves_keep_unnamed_targets(rigged_head: Head) -> None:
     before = Pose({"jawOpen": 0.1, "browInnerUp": 0.4}, {"neck": (1.0, 0.0, 0.0)})
     found = merge_poses(Pose({"jawOpen": 0.9}, {"head": (0.0, 5.0, 0.0)}), before)
     assert dict(found.weights) == {"jawOpen": 0.9, "browInnerUp": 0.4}
     assert set(found.bones) == {"neck", "head"} and found.positions_mm is None
 
 
-def test_poses_are_compared_by_what_they_say() -> None:
+def test_poses_are_compared_by_value() -> None:
     assert poses_equal(None, Pose()) and poses_equal({"a": 0.5}, Pose({"a": 0.5}))
     assert poses_equal(Pose(bones={"a": (1.0, 2.0, 3.0)}), Pose(bones={"a": np.array([1.0, 2.0, 3.0])}))
     assert not poses_equal(Pose({"a": 0.5}), Pose({"a": 0.4}))
@@ -85,14 +85,14 @@ def test_poses_are_compared_by_what_they_say() -> None:
     assert not poses_equal(Pose(positions_mm=places), Pose(positions_mm=places.copy()))
 
 
-def test_names_are_found_by_some_letters() -> None:
+def test_names_are_found_by_substring() -> None:
     names = ("jawOpen", "mouthSmileLeft", "mouthSmileRight")
     assert filter_names(names, " SMILE ") == ["mouthSmileLeft", "mouthSmileRight"]
     assert filter_names(names, "") == list(names) and filter_names(names, "ear") == []
 
 
 @pytest.mark.parametrize("levels", [0, 1])
-def test_the_posed_surface_is_the_head_turned(rigged_file: Path, levels: int) -> None:
+def test_posed_surface_is_the_rotated_head(rigged_file: Path, levels: int) -> None:
     head = load_head(rigged_file, subdivide=levels)
     pose = Pose(bones={"neck": (0.0, 90.0, 0.0)})
     turned, rest = posed_positions(Scene(head, pose=pose)), head.mesh.positions
@@ -100,7 +100,7 @@ def test_the_posed_surface_is_the_head_turned(rigged_file: Path, levels: int) ->
     assert posed_positions(Scene(head)) is rest
 
 
-def test_a_pose_is_a_step_of_the_history(rigged: ViewerState) -> None:
+def test_pose_is_an_undo_step(rigged: ViewerState) -> None:
     history = UndoHistory(rigged)
     history.change(rigged.with_pose(Pose({"jawOpen": 0.5})))
     assert history.can_undo
@@ -109,7 +109,7 @@ def test_a_pose_is_a_step_of_the_history(rigged: ViewerState) -> None:
     assert history.state is rigged
 
 
-def test_a_saved_pose_comes_back(rigged: ViewerState, tmp_path: Path) -> None:
+def test_saved_pose_is_restored(rigged: ViewerState, tmp_path: Path) -> None:
     skeleton = rigged.scene.head.control.skeleton
     assert skeleton is not None
     pose = Pose({"jawOpen": 1 / 3}, {"neck": (1.0, -2.0, 0.1), "head": skeleton.local[1]})

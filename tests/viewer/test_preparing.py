@@ -74,7 +74,7 @@ def test_the_last_picture_stays_until_a_head_is_prepared(
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
 
 
-def test_who_goes_back_meanwhile_sees_the_head_of_before(
+def test_undo_during_preparation_shows_the_previous_head(
     driver: InputDriver, gate: threading.Event, other: Any
 ) -> None:
     before, session = driver.settled(), driver.viewer.session
@@ -87,7 +87,7 @@ def test_who_goes_back_meanwhile_sees_the_head_of_before(
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
 
 
-def test_a_head_that_cannot_be_prepared_is_told_and_can_be_undone(
+def test_failed_preparation_is_reported_and_undoable(
     driver: InputDriver, other: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, session = driver.settled(), driver.viewer.session
@@ -104,7 +104,7 @@ def test_a_head_that_cannot_be_prepared_is_told_and_can_be_undone(
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
 
 
-def test_a_device_that_is_lost_meanwhile_is_opened_again(
+def test_device_lost_during_preparation_is_recreated(
     driver: InputDriver, gate: threading.Event, other: Any
 ) -> None:
     driver.settled()

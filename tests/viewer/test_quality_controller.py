@@ -14,7 +14,7 @@ def noted(quality_controller: QualityController, *frames_ms: float) -> QualityCo
     return quality_controller
 
 
-def test_a_still_frame_has_all_that_was_asked_for() -> None:
+def test_still_frame_has_full_quality() -> None:
     found = noted(QualityController(software=True), *[900.0] * 20).limited_settings(
         WANTED, (640, 480), moving=False
     )
@@ -26,7 +26,7 @@ def test_a_software_adapter_begins_with_one_sample_and_a_small_atlas() -> None:
     assert (found.size, found.atlas, found.samples) == ((640, 480), 512, 1)
 
 
-def test_a_gpu_begins_with_everything() -> None:
+def test_gpu_begins_with_full_quality() -> None:
     assert QualityController(software=False).limited_settings(WANTED, (640, 480), moving=True).samples == 4
 
 
@@ -36,18 +36,18 @@ def test_slow_frames_lower_the_effort_and_fast_ones_raise_it_again() -> None:
     assert noted(quality_controller, *[10.0] * 20).quality is QUALITY_LEVELS[2]
 
 
-def test_one_slow_frame_alone_changes_nothing() -> None:
+def test_single_slow_frame_changes_nothing() -> None:
     quality_controller = noted(QualityController(software=True), 400.0, 90.0, 400.0, 90.0)
     assert quality_controller.quality is QUALITY_LEVELS[2]
 
 
-def test_frames_within_the_budget_stay_as_they_are() -> None:
+def test_quality_is_stable_within_the_budget() -> None:
     quality_controller = noted(QualityController(software=True), *[400.0] * 2)
     level = quality_controller.quality
     assert noted(quality_controller, *[95.0] * 20).quality is level
 
 
-def test_less_than_asked_for_is_not_raised() -> None:
+def test_quality_is_never_above_the_request() -> None:
     small = Settings(atlas=128, samples=1, shadow_size=64)
     found = QualityController(software=False).limited_settings(small, (8, 8), moving=True)
     assert (found.atlas, found.samples, found.shadow_size) == (128, 1, 64)

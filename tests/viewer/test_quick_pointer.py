@@ -22,7 +22,7 @@ def in_one_frame(driver: InputDriver, *path: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("moves", [0, 1, 5])
-def test_a_slider_ends_where_the_pointer_left_it(moves: int, driver: InputDriver) -> None:
+def test_slider_ends_at_the_last_pointer_position(moves: int, driver: InputDriver) -> None:
     session = driver.viewer.session
     x, y = driver.position("mix")
     for end, expected in ((x + 300.0, 1.0), (x - 90.0, 0.0), (x + 300.0, 1.0)):
@@ -44,7 +44,7 @@ def test_the_head_turns_as_far_as_the_pointer_went(driver: InputDriver) -> None:
     assert session.state.scene.camera == first
 
 
-def test_the_divider_stays_where_it_is_let_go(driver: InputDriver) -> None:
+def test_divider_stays_where_it_is_released(driver: InputDriver) -> None:
     session = driver.viewer.session
     session.split.freeze(session.state)
     session.split.divider_position = 0.5
@@ -52,7 +52,7 @@ def test_the_divider_stays_where_it_is_let_go(driver: InputDriver) -> None:
     assert session.split.divider_position == 0.75 and not session.split.is_dragged
 
 
-def test_keys_between_two_frames_are_all_seen(rigged: ViewerState, driver: InputDriver) -> None:
+def test_all_keys_between_two_frames_are_handled(rigged: ViewerState, driver: InputDriver) -> None:
     session = driver.viewer.session
     session.change(rigged)
     driver.press("search")

@@ -111,7 +111,7 @@ def test_the_command_renders_what_the_viewer_shows(
     assert seen.std() > 0.02 and np.array_equal(seen, made)
 
 
-def test_a_part_that_was_looked_at_is_looked_at_again(state: ViewerState, tmp_path: Path) -> None:
+def test_saved_view_is_restored(state: ViewerState, tmp_path: Path) -> None:
     save_state(tmp_path / "scene.toml", state.with_view("specular"))
     loaded = load_state(tmp_path / "scene.toml", state)
     assert loaded.view == "specular" and loaded.settings.parts == "all"

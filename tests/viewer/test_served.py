@@ -31,7 +31,7 @@ def viewer(head: Head) -> Iterator[Any]:
         yield one
 
 
-def test_a_page_that_shows_nothing_gets_two_frames_and_then_the_newest(viewer: Any) -> None:
+def test_stalled_page_gets_two_frames_and_then_the_newest(viewer: Any) -> None:
     with visit(viewer) as socket:
         page = Page(socket)
         page.show()
@@ -49,7 +49,7 @@ def test_a_page_that_shows_nothing_gets_two_frames_and_then_the_newest(viewer: A
         assert difference(after, other.still()) < 0.01
 
 
-def test_confirming_frames_that_were_not_sent_opens_no_flood(viewer: Any) -> None:
+def test_false_confirmations_do_not_release_more_frames(viewer: Any) -> None:
     with visit(viewer) as socket:
         page = Page(socket)
         page.show()
@@ -60,9 +60,7 @@ def test_confirming_frames_that_were_not_sent_opens_no_flood(viewer: Any) -> Non
         assert len(page.frames) <= _AT_ONCE
 
 
-def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
-    viewer: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lossless_frame_does_not_delay_others(viewer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from dermis.apps.viewer.browser import canvas
 
     begun, gate, encode_image = threading.Event(), threading.Event(), canvas.encode_image
@@ -93,7 +91,7 @@ def test_frames_are_not_compressed_a_second_time(viewer: Any) -> None:
         assert socket.protocol.extensions == []
 
 
-def test_a_page_that_was_not_ready_for_the_still_picture_gets_it_when_it_is(viewer: Any) -> None:
+def test_busy_page_gets_the_still_picture_when_ready(viewer: Any) -> None:
     with visit(viewer) as socket:
         page = Page(socket)
         page.show()
@@ -110,7 +108,7 @@ def test_a_page_that_was_not_ready_for_the_still_picture_gets_it_when_it_is(view
             kind = page.frames[-1][1]
 
 
-def test_who_watches_takes_over_with_a_size_of_its_own(viewer: Any) -> None:
+def test_watcher_takes_over_with_its_size(viewer: Any) -> None:
     first = visit(viewer).__enter__()
     page = Page(first)
     page.show()
@@ -149,7 +147,7 @@ def test_a_motion_plays_in_the_page_until_a_key_pauses_it(
             session.history.undo()
 
 
-def test_a_lost_device_is_told_in_the_page_and_the_head_turns_on(viewer: Any) -> None:
+def test_lost_device_is_reported_in_the_page_and_recovered(viewer: Any) -> None:
     with visit(viewer) as socket:
         page = Page(socket)
         page.show()

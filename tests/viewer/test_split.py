@@ -38,7 +38,7 @@ def frozen(driver: InputDriver) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     return before, after
 
 
-def test_left_is_what_was_frozen_right_is_live_and_the_divider_is_dragged(driver: InputDriver) -> None:
+def test_left_side_is_frozen_right_is_live_and_the_divider_moves(driver: InputDriver) -> None:
     before, after = frozen(driver)
     assert np.abs(before[ROWS, LEFT:].astype(int) - after[ROWS, LEFT:]).mean() > 0.5
     assert_halves(driver.settled(), before, after, 300)
@@ -50,7 +50,7 @@ def test_left_is_what_was_frozen_right_is_live_and_the_divider_is_dragged(driver
     assert np.array_equal(driver.settled()[ROWS, LEFT:], after[ROWS, LEFT:])
 
 
-def test_the_camera_turns_both_sides(driver: InputDriver) -> None:
+def test_camera_applies_to_both_sides(driver: InputDriver) -> None:
     frozen(driver)
     split, session = driver.viewer.session.split, driver.viewer.session
     still = driver.settled()

@@ -82,7 +82,7 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_a_change_runs_only_what_depends_on_it(
+def test_change_runs_only_dependent_stages(
     name: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
     change, expected = CHANGES[name]
@@ -97,7 +97,7 @@ def jaw_open(state: ViewerState, weight: float) -> ViewerState:
     return state.with_pose(Pose({"jawOpen": weight}, {"neck": (0.0, 10.0, 0.0)}))
 
 
-def test_a_pose_runs_what_depends_on_the_shape(view_renderer: ViewRenderer, rigged: ViewerState) -> None:
+def test_pose_runs_shape_dependent_stages(view_renderer: ViewRenderer, rigged: ViewerState) -> None:
     stages(view_renderer, jaw_open(rigged, 0.1))
     assert stages(view_renderer, jaw_open(rigged, 0.2)) == SHAPE
     assert stages(view_renderer, jaw_open(rigged, 0.2)) == set()
@@ -105,7 +105,7 @@ def test_a_pose_runs_what_depends_on_the_shape(view_renderer: ViewRenderer, rigg
     assert stages(view_renderer, turned(rigged)) == SHAPE
 
 
-def test_a_pose_loads_nothing(view_renderer: ViewRenderer, rigged: ViewerState, made: list[str]) -> None:
+def test_pose_loads_no_files(view_renderer: ViewRenderer, rigged: ViewerState, made: list[str]) -> None:
     for weight in (0.1, 0.2):
         stages(view_renderer, jaw_open(rigged, weight), moving=True)
     made.clear()
@@ -120,7 +120,7 @@ def test_the_atlas_view_follows_the_pose(view_renderer: ViewRenderer, rigged: Vi
     assert stages(view_renderer, flat.with_pose(Pose({"jawOpen": 0.9}))) >= {"shape", "irradiance"}
 
 
-def test_light_all_around_is_told_the_profile_and_lights_anew(
+def test_environment_light_is_recomputed_for_a_new_profile(
     view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
     """Surrounding skin reflects light, and more so with a pale profile."""
@@ -153,7 +153,7 @@ def _counted(call: Callable[..., Any], name: str, log: list[str]) -> Callable[..
 
 
 @pytest.mark.parametrize("name", ["camera", "light", "roughness", "mix", "exposure", "nothing"])
-def test_a_move_loads_nothing(
+def test_camera_move_loads_no_files(
     name: str, view_renderer: ViewRenderer, state: ViewerState, made: list[str]
 ) -> None:
     change, _ = CHANGES[name]
@@ -215,7 +215,7 @@ def test_a_camera_lights_neither_side_of_the_divider(
     assert recorded == []
 
 
-def test_shadows_of_another_size_have_light_of_their_own(
+def test_other_shadow_size_has_separate_light(
     view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Frames in motion differ from still ones only in this size."""
@@ -229,7 +229,7 @@ def test_shadows_of_another_size_have_light_of_their_own(
         assert stages(view_renderer, turned(state, angle), moving) == {"visibility"} | PICTURE
 
 
-def test_only_frames_that_shade_set_the_pace(
+def test_only_shading_frames_adjust_quality(
     view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     noted: list[float] = []
@@ -263,7 +263,7 @@ def test_states_in_motion_and_still_are_recorded_once(
 
 
 @pytest.mark.parametrize("view", ["irradiance", "blur 1", "atlas"])
-def test_views_of_levels_show_the_live_state_s_light(
+def test_level_views_show_light_of_the_live_state(
     view: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
     """Also after the light of another state was blurred in between, and after its profile is restored."""

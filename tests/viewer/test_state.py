@@ -23,14 +23,14 @@ def full_state(state: ViewerState) -> ViewerState:
     return state.with_camera(state.scene.camera.model_copy(update={"frame_mm": 123.4567}))
 
 
-def test_a_saved_state_comes_back_whole(state: ViewerState, tmp_path: Path) -> None:
+def test_saved_state_is_restored_completely(state: ViewerState, tmp_path: Path) -> None:
     before = full_state(state)
     save_state(tmp_path / "scene.toml", before)
     after = load_state(tmp_path / "scene.toml", before)
     assert states_equal(replace(before, rig=""), after)
 
 
-def test_render_takes_the_saved_file(state: ViewerState, tmp_path: Path) -> None:
+def test_render_command_accepts_the_saved_file(state: ViewerState, tmp_path: Path) -> None:
     before = full_state(state)
     save_state(tmp_path / "scene.toml", before)
     scene, settings = load_scene(tmp_path / "scene.toml")
@@ -45,7 +45,7 @@ def test_a_scene_without_lights_stays_without(state: ViewerState, tmp_path: Path
     assert load_scene(tmp_path / "dark.toml")[0].lights == ()
 
 
-def test_files_of_a_scene_are_found_from_another_folder(
+def test_scene_files_are_found_from_another_folder(
     state: ViewerState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "there").mkdir()
@@ -59,7 +59,7 @@ def test_files_of_a_scene_are_found_from_another_folder(
     assert scene.skin.profile == str(tmp_path / "there" / "mine.csv")
 
 
-def test_regions_keep_what_they_say(head: Head, head_file: Path, tmp_path: Path) -> None:
+def test_regions_round_trip(head: Head, head_file: Path, tmp_path: Path) -> None:
     before = ViewerState(Scene(head), head={"name": str(head_file), "regions": "default"})
     save_state(tmp_path / "scene.toml", before.with_skin(oiliness=0.5))
     text = (tmp_path / "scene.toml").read_text()
@@ -83,7 +83,7 @@ def test_impossible_values_are_refused(state: ViewerState) -> None:
         state.with_skin(roughness=7.0)
 
 
-def test_pigments_add_up(state: ViewerState) -> None:
+def test_pigment_changes_accumulate(state: ViewerState) -> None:
     found = state.with_pigments(melanin=0.1).with_pigments(blood=0.02).scene.skin.pigments
     assert found == Pigments(melanin=0.1, blood=0.02)
 
@@ -103,7 +103,7 @@ def test_undo_and_redo_walk_through_the_states(state: ViewerState) -> None:
     assert not history.can_redo
 
 
-def test_a_gesture_is_one_step(state: ViewerState) -> None:
+def test_gesture_is_one_undo_step(state: ViewerState) -> None:
     history = UndoHistory(state)
     for mix in (0.1, 0.2, 0.3):
         history.change(state.with_skin(mix=mix), "slide")
@@ -115,7 +115,7 @@ def test_a_gesture_is_one_step(state: ViewerState) -> None:
     assert history.state is state
 
 
-def test_a_change_forgets_what_was_undone(state: ViewerState) -> None:
+def test_change_clears_the_redo_history(state: ViewerState) -> None:
     history = UndoHistory(state)
     history.change(state.with_skin(mix=0.1))
     history.undo()
@@ -123,7 +123,7 @@ def test_a_change_forgets_what_was_undone(state: ViewerState) -> None:
     assert not history.can_redo
 
 
-def test_no_change_is_no_step_and_the_past_has_an_end(state: ViewerState) -> None:
+def test_unchanged_state_is_no_step_and_history_is_limited(state: ViewerState) -> None:
     history = UndoHistory(state)
     history.change(state.with_skin(mix=state.scene.skin.mix))
     assert not history.can_undo

@@ -69,7 +69,7 @@ def server(tmp_path: Path) -> Server:
     return Server(tmp_path)
 
 
-def test_a_file_comes_whole_and_its_name_is_no_path(server: Server, tmp_path: Path) -> None:
+def test_uploaded_file_is_complete_and_its_name_has_no_path(server: Server, tmp_path: Path) -> None:
     assert server.send("a head.obj", b"v 0 0", b" 0\n") == (200, "")
     assert server.got == [tmp_path / "1" / "upload.obj"] and server.names == ["a head.obj"]
     assert server.got[0].read_bytes() == b"v 0 0 0\n"
@@ -91,7 +91,7 @@ def test_a_file_comes_whole_and_its_name_is_no_path(server: Server, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["a.exe", "a.zip", "a", "a.obj.py", ".obj/../b.html"])
-def test_other_files_are_refused_with_a_sentence(name: str, server: Server) -> None:
+def test_other_files_are_refused_with_a_message(name: str, server: Server) -> None:
     status, said = server.send(name, b"x")
     assert status != 200 and server.got == []
     if status == 400:
@@ -104,13 +104,13 @@ def test_only_the_page_that_has_control_may_send(ticket: str, server: Server, tm
     assert status == 400 and "control" in said and not any(tmp_path.iterdir())
 
 
-def test_another_site_may_not(server: Server) -> None:
+def test_other_sites_may_not_send(server: Server) -> None:
     assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 403
     assert server.send("a.obj", b"x", origin="null")[0] == 403
     assert server.got == []
 
 
-def test_large_files_are_refused_before_and_while_they_come(
+def test_large_files_are_refused_before_and_during_upload(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(uploads, "MAX_FILE_BYTES", 1 << 20)
@@ -125,15 +125,13 @@ def test_large_files_are_refused_before_and_while_they_come(
 _MUCH = [bytes(1 << 19)] * 3
 
 
-def test_nothing_is_left_of_a_file_that_ends_early(server: Server, tmp_path: Path) -> None:
+def test_truncated_upload_leaves_nothing(server: Server, tmp_path: Path) -> None:
     status, said = server.send("a.obj", b"v 0", whole=False)
     assert status == 400 and "complete" in said and server.got == [] and not list(tmp_path.rglob("*.obj"))
     assert server.send("a.obj", b"v")[0] == 200
 
 
-def test_a_file_that_does_not_go_on_is_given_up(
-    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stalled_upload_is_cancelled(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uploads, "IDLE_TIMEOUT_S", 0.05)
 
     async def never() -> Any:
@@ -145,12 +143,12 @@ def test_a_file_that_does_not_go_on_is_given_up(
     assert server.send("a.obj", b"v")[0] == 200
 
 
-def test_only_so_many_files_are_taken(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_number_of_uploads_is_limited(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uploads, "MAX_FILES", 2)
     assert [server.send("a.obj", b"v")[0] for _ in range(3)] == [200, 200, 400]
 
 
-def test_a_full_disk_is_told(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_reported(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any, **__: Any) -> Any:
         raise OSError(28, "No space left on device")
 
@@ -161,7 +159,7 @@ def test_a_full_disk_is_told(server: Server, monkeypatch: pytest.MonkeyPatch) ->
     assert server.send("a.obj", b"v")[0] == 200
 
 
-def test_nothing_is_taken_before_there_is_a_viewer(server: Server, tmp_path: Path) -> None:
+def test_uploads_before_the_viewer_starts_are_refused(server: Server, tmp_path: Path) -> None:
     server.canvas.on_file = None
     status, said = server.send("a.obj", b"v")
     assert status == 400 and "being prepared" in said and not any(tmp_path.iterdir())

@@ -73,7 +73,7 @@ CHANGES: dict[str, Callable[[ViewerState], ViewerState]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_what_is_kept_never_shows(
+def test_reused_results_do_not_change_pictures(
     name: str, view_renderer: ViewRenderer, fresh: Renderer, state: ViewerState
 ) -> None:
     image(view_renderer, state)
@@ -85,14 +85,14 @@ def test_what_is_kept_never_shows(
     assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere
 
 
-def test_a_camera_does_not_light_the_atlas_again(view_renderer: ViewRenderer, state: ViewerState) -> None:
+def test_camera_change_does_not_relight_the_atlas(view_renderer: ViewRenderer, state: ViewerState) -> None:
     first = image(view_renderer, state)
     second = image(view_renderer, turned(state))
     assert not LIT & stages(view_renderer) and "shade" in stages(view_renderer)
     assert np.abs(first - second).mean() > 1.0
 
 
-def test_a_light_lights_it_again_and_loads_no_map(view_renderer: ViewRenderer, state: ViewerState) -> None:
+def test_light_change_relights_without_loading_maps(view_renderer: ViewRenderer, state: ViewerState) -> None:
     image(view_renderer, state)
     before = prepared(view_renderer, state)
     image(view_renderer, brighter(state))
@@ -100,7 +100,7 @@ def test_a_light_lights_it_again_and_loads_no_map(view_renderer: ViewRenderer, s
     assert_same_textures(before, prepared(view_renderer, brighter(state)))
 
 
-def test_pigments_fit_again_and_load_nothing(view_renderer: ViewRenderer, state: ViewerState) -> None:
+def test_pigment_change_refits_without_loading_files(view_renderer: ViewRenderer, state: ViewerState) -> None:
     skin = state.with_skin(profile="light")
     before = prepared(view_renderer, skin.with_pigments(melanin=0.02))
     after = prepared(view_renderer, skin.with_pigments(melanin=0.021))
@@ -109,7 +109,7 @@ def test_pigments_fit_again_and_load_nothing(view_renderer: ViewRenderer, state:
     assert before.layouts[0].translucency.pairs is after.layouts[0].translucency.pairs
 
 
-def test_pigments_that_spread_light_farther_get_their_own_pairs(
+def test_wider_pigments_get_new_pairs(
     view_renderer: ViewRenderer, fresh: Renderer, state: ViewerState
 ) -> None:
     pale, dark = (
@@ -136,7 +136,7 @@ def assert_same_textures(a: Any, b: Any) -> None:
         assert a.layouts[0].atlas.resources[name] is b.layouts[0].atlas.resources[name], name
 
 
-def test_going_back_and_forth_between_two_sizes_lights_each_once(
+def test_alternating_sizes_are_lit_once_each(
     view_renderer: ViewRenderer, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(QUALITY_LEVELS[2], atlas=64)
@@ -158,7 +158,7 @@ def test_an_unchanged_state_is_not_drawn_again(view_renderer: ViewRenderer, stat
     assert view_renderer.rendered is before
 
 
-def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState) -> None:
+def test_diffuse_and_specular_add_up_to_the_picture(fresh: Renderer, state: ViewerState) -> None:
     whole, below, over = (
         fresh.render(state.scene, **SETTINGS.model_dump() | {"size": SIZE, "parts": parts})
         for parts in ("all", "diffuse", "specular")
@@ -170,7 +170,7 @@ def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState
 @pytest.mark.parametrize(
     "view", [view for view in VIEW_NAMES if view not in ("picture", "blur 6", ATLAS_VIEW_NAME)]
 )
-def test_each_view_shows_the_head_and_another_picture(
+def test_each_view_shows_a_distinct_picture_of_the_head(
     view: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
     picture, found = image(view_renderer, state), image(view_renderer, state.with_view(view))
@@ -180,7 +180,7 @@ def test_each_view_shows_the_head_and_another_picture(
     assert np.abs(found - picture)[head].mean() > 0.5
 
 
-def test_a_level_of_light_is_what_the_atlas_holds(view_renderer: ViewRenderer, state: ViewerState) -> None:
+def test_level_view_shows_the_atlas_light(view_renderer: ViewRenderer, state: ViewerState) -> None:
     """A wider blur gives a smoother picture."""
     rough = [
         np.abs(np.diff(image(view_renderer, state.with_view(f"blur {k}")), axis=1)).sum() for k in (1, 5)
@@ -193,7 +193,7 @@ def test_normals_are_those_of_the_ellipsoid(view_renderer: ViewRenderer, state: 
     assert np.abs(middle - (127.5, 127.5, 255.0)).max() < 40.0
 
 
-def test_screenshots_have_any_size_and_the_state_s_own_view(
+def test_screenshots_have_any_size_and_the_current_view(
     view_renderer: ViewRenderer, state: ViewerState, tmp_path: Path
 ) -> None:
     view_renderer.screenshot(tmp_path / "a.png", state, (50, 40))
@@ -204,8 +204,6 @@ def test_screenshots_have_any_size_and_the_state_s_own_view(
     assert found[1].dtype == np.float32 and float(np.abs(found[0][..., :3] - found[2]).max()) > 0.0
 
 
-def test_settings_of_the_window_are_those_of_the_pace(
-    view_renderer: ViewRenderer, state: ViewerState
-) -> None:
+def test_window_settings_follow_the_quality(view_renderer: ViewRenderer, state: ViewerState) -> None:
     image(view_renderer, state.with_settings(size=(4000, 4000)))
     assert isinstance(view_renderer.settings, Settings) and view_renderer.settings.size == SIZE

@@ -34,7 +34,7 @@ def test_the_head_is_in_the_window_beside_the_panel(driver: InputDriver) -> None
     assert image[5:20, 380:395].mean() < 2.0
 
 
-def test_a_drag_turns_the_head_and_is_one_step_back(driver: InputDriver) -> None:
+def test_drag_orbits_the_head_as_one_undo_step(driver: InputDriver) -> None:
     before = driver.settled()
     driver.drag(ON_HEAD, TO_THE_LEFT)
     after = driver.settled()
@@ -45,7 +45,7 @@ def test_a_drag_turns_the_head_and_is_one_step_back(driver: InputDriver) -> None
     assert not driver.viewer.session.history.can_undo
 
 
-def test_shift_carries_the_light_and_leaves_the_camera(driver: InputDriver) -> None:
+def test_shift_drag_moves_the_light_and_not_the_camera(driver: InputDriver) -> None:
     before, state = driver.settled(), driver.viewer.session.state
     driver.drag(ON_HEAD, TO_THE_LEFT, modifiers=("Shift",))
     after = driver.viewer.session.state
@@ -54,7 +54,7 @@ def test_shift_carries_the_light_and_leaves_the_camera(driver: InputDriver) -> N
     assert difference(before, driver.settled()) > 0.5
 
 
-def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(driver: InputDriver) -> None:
+def test_wheel_zooms_and_double_click_sets_the_pivot(driver: InputDriver) -> None:
     camera = driver.viewer.session.state.scene.camera
     driver.event("wheel", x=300.0, y=240.0, dx=0.0, dy=-200.0)
     driver.settled()
@@ -65,7 +65,7 @@ def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(driver
     assert driver.viewer.session.state.scene.camera.target != near.target
 
 
-def test_two_fingers_that_part_come_nearer(driver: InputDriver) -> None:
+def test_pinch_zooms_in(driver: InputDriver) -> None:
     camera = driver.viewer.session.state.scene.camera
     driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
     driver.frame()
@@ -78,7 +78,7 @@ def test_two_fingers_that_part_come_nearer(driver: InputDriver) -> None:
     assert driver.viewer.session.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
 
 
-def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
+def test_keys_select_presets_undo_and_the_panel(driver: InputDriver) -> None:
     session = driver.viewer.session
     start, plain = session.state, driver.settled()
     driver.event("key_down", key="3")
@@ -99,7 +99,7 @@ def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
     )
 
 
-def test_a_slider_changes_the_picture_and_is_one_step(driver: InputDriver) -> None:
+def test_slider_changes_the_picture_as_one_undo_step(driver: InputDriver) -> None:
     before = driver.settled()
     x, y = driver.position("roughness")
     driver.drag((x, y), (x + 40.0, y))
@@ -109,21 +109,21 @@ def test_a_slider_changes_the_picture_and_is_one_step(driver: InputDriver) -> No
     assert not driver.viewer.session.history.can_undo
 
 
-def test_a_choice_changes_the_picture(driver: InputDriver) -> None:
+def test_drop_down_changes_the_picture(driver: InputDriver) -> None:
     before = driver.settled()
     driver.choose("show", "normals")
     assert driver.viewer.session.state.view == "normals"
     assert difference(before, driver.settled()) > 10.0
 
 
-def test_a_drag_that_begins_on_the_panel_stays_there(driver: InputDriver) -> None:
+def test_drag_started_on_the_panel_does_not_orbit(driver: InputDriver) -> None:
     camera = driver.viewer.session.state.scene.camera
     x, y = driver.position("mix")
     driver.drag((x, y), (380.0, 150.0))
     assert driver.viewer.session.state.scene.camera == camera
 
 
-def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(driver: InputDriver) -> None:
+def test_touch_on_the_head_after_the_panel_orbits_it(driver: InputDriver) -> None:
     """No frame is drawn in between in which the panel could notice that the pointer left."""
     camera = driver.viewer.session.state.scene.camera
     driver.click((150.0, 243.0))  # a label
@@ -143,7 +143,7 @@ def test_melanin_darkens_the_skin(driver: InputDriver) -> None:
     assert dark[200:280, 210:240].mean() < 0.7 * light[200:280, 210:240].mean()
 
 
-def test_an_impossible_state_is_told_and_the_last_picture_stays(driver: InputDriver) -> None:
+def test_invalid_state_is_reported_and_keeps_the_last_picture(driver: InputDriver) -> None:
     session = driver.viewer.session
     before = driver.settled()
     session.change(session.state.with_skin(profile="nothing.csv"))
@@ -166,7 +166,7 @@ def test_buttons_save_load_and_take_pictures(driver: InputDriver, tmp_path: Path
     assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in session.message
 
 
-def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> None:
+def test_window_may_be_resized_or_minimised(driver: InputDriver) -> None:
     driver.settled()
     driver.canvas.set_logical_size(200, 300)
     assert driver.settled().shape == (300, 200, 3)
@@ -176,7 +176,7 @@ def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> Non
     assert driver.settled().shape == (480, 400, 3)
 
 
-def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -> None:
+def test_lost_device_is_recreated(make_driver: Callable[[], InputDriver]) -> None:
     driver = make_driver()
     before = driver.settled()
     lost = driver.viewer.session.view_renderer
@@ -189,7 +189,7 @@ def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -
     assert np.abs(driver.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # not "redo"
 
 
-def test_changes_leave_no_memory_behind(driver: InputDriver) -> None:
+def test_changes_leak_no_memory(driver: InputDriver) -> None:
     """Memory of the process, in which leaks of every frame would add up."""
     session = driver.viewer.session
     start = session.state

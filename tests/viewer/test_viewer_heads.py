@@ -45,7 +45,7 @@ def wait(driver: InputDriver) -> None:
         driver.frame()
 
 
-def test_the_picture_goes_on_while_a_person_is_opened(driver: InputDriver, gate: Any) -> None:
+def test_viewer_stays_responsive_while_a_person_loads(driver: InputDriver, gate: Any) -> None:
     session = driver.viewer.session
     first = session.state
     driver.press("dice")
@@ -62,7 +62,7 @@ def test_the_picture_goes_on_while_a_person_is_opened(driver: InputDriver, gate:
     assert session.state.scene.head is first.scene.head
 
 
-def test_the_last_choice_wins(driver: InputDriver, gate: Any) -> None:
+def test_last_choice_is_loaded(driver: InputDriver, gate: Any) -> None:
     session = driver.viewer.session
     for number in (3, 4, 5):
         session.heads.open(f"human:{number}")
@@ -86,7 +86,7 @@ def test_a_file_is_opened_by_its_path_and_listed(driver: InputDriver, tmp_path: 
 @pytest.mark.parametrize(
     ("name", "said"), [("nobody.obj", "neither"), ("human:x", "SEED"), ("gone.toml", "gone.toml")]
 )
-def test_what_cannot_be_opened_is_told_and_the_head_stays(name: str, said: str, driver: InputDriver) -> None:
+def test_failed_load_is_reported_and_the_head_stays(name: str, said: str, driver: InputDriver) -> None:
     session = driver.viewer.session
     first = session.state
     session.heads.open(name)
@@ -95,7 +95,7 @@ def test_what_cannot_be_opened_is_told_and_the_head_stays(name: str, said: str, 
     session.message = ""
 
 
-def test_a_pose_stays_where_the_names_are_the_same(rigged: ViewerState, rigged_file: Path) -> None:
+def test_pose_is_kept_for_equal_names(rigged: ViewerState, rigged_file: Path) -> None:
     posed = rigged.with_pose({"jawOpen": 0.5})  # type: ignore[arg-type]
     for name, kept in ((str(rigged_file), True), (str(rigged_file.with_name("bare.obj")), False)):
         if not kept:

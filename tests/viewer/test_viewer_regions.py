@@ -32,7 +32,7 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.human.regions.apply.MIN_MAP_SIDE", 64)
 
 
-def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: ViewerState, table: str) -> None:
+def test_table_adds_maps_and_none_removes_them(state: ViewerState, table: str) -> None:
     found = apply_regions(state, table)
     maps = found.scene.head.maps
     assert maps.specular is not None and np.ptp(maps.specular) > 0.05
@@ -42,7 +42,7 @@ def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: Viewe
     assert bare.scene.skin.rho_s == Skin().rho_s
 
 
-def test_heads_that_are_there_are_not_made_again(state: ViewerState, table: str) -> None:
+def test_loaded_heads_are_not_rebuilt(state: ViewerState, table: str) -> None:
     found = apply_regions(state, table)
     assert apply_regions(found, AUTO, [state, found]).scene.head is state.scene.head
     assert apply_regions(state, table, [state, found]).scene.head is found.scene.head

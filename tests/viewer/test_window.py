@@ -74,7 +74,7 @@ def still(display: str, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[n
     raise AssertionError("the screen never shows that")
 
 
-def test_the_window_shows_the_head_turns_it_and_follows_its_size(
+def test_window_shows_and_orbits_the_head_and_follows_its_size(
     display: str, window: subprocess.Popen[str]
 ) -> None:
     name = ""

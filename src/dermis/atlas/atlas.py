@@ -12,10 +12,9 @@ from dermis.mesh.mesh import Mesh
 
 _ALL_ROWS = slice(None)
 GUTTER_TEXELS = 3  # gutter width in the mesh's own layout, so that interpolation at chart edges finds light
-GUTTER_MM = (
-    8.0  # in stitched layouts: 3.4 standard deviations of the widest incremental blur [dEonLuebke2007]
-)
-MAX_SHEAR = 0.9  # larger shear is clipped to this in the blur
+# gutter width in stitched layouts: 3.4 standard deviations of the widest incremental blur [dEonLuebke2007]
+GUTTER_MM = 8.0
+MAX_SHEAR = 0.9  # largest shear that the blur takes into account; larger values are clipped
 
 
 @dataclass(frozen=True)

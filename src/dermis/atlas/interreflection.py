@@ -22,10 +22,10 @@ SAMPLES_PER_PATCH = 8
 """Number of sample points of a patch, at which its radiosity is computed."""
 # Number of directions of parallel lines; fewest and most lines along a bundle's side.
 LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
-_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # to find out whether any skin faces other skin
+_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # for a test whether any skin faces other skin
 _CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
-_MAX_TRACED_TRIANGLES = 300_000  # of finer meshes, points closer than some lines are merged
-_MERGED_LINES = 1.5
+_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES are merged
+_MERGED_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
@@ -42,7 +42,8 @@ class FormFactors:
     cell_target, cell_factor : (k,) index of the patch that the cell faces, and (k,) float32 form factor, 0 to
         1 [-]
     nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
-    confidence : (CELLS_PER_SIDE^2,) float32 number of lines leaving each cell, over the median, at most 1 [-]
+    confidence : (CELLS_PER_SIDE^2,) float32 ratio of the number of lines that leave each cell to the median
+        number, at most 1 [-]
     patch_first, patch_target, patch_factor : sparse matrix of the form factors from patches to patches
     sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle index of the sample points
     sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner
@@ -67,11 +68,12 @@ class FormFactors:
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
     """Return the form factors that `compute_form_factors` computes, cached on disk."""
+    cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
     digest = hashlib.sha256(
         f"{_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
         f"{LINE_BUNDLES} {LINES_PER_SIDE} {_MIN_FORM_FACTOR}".encode()
     )
-    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped)):
+    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped), *cut_out):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [field.name for field in fields(FormFactors)]
 
@@ -90,13 +92,14 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     another is the fraction of the lines leaving the first patch that meet the second one next.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none
+    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, but triangles
+        with an opacity map, such as hair cards, are ignored
     """
-    facing, left = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
+    facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
     if len(facing):
         lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE))
-        facing, left = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
-    return _form_factors(facing, left, mesh, corner_uv, mapped)
+        facing, line_counts = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
+    return _form_factors(facing, line_counts, mesh, corner_uv, mapped)
 
 
 def _trace_lines(
@@ -107,15 +110,17 @@ def _trace_lines(
     bundles : number of bundles of parallel lines, one per direction
     lines : number of lines along each side of a bundle
     """
-    used, corner = np.unique(mesh.triangles, return_inverse=True)
+    blocks = ~mesh.cut_out
+    corner_uv, mapped = corner_uv[blocks], mapped[blocks]
+    used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
     if len(corner) > _MAX_TRACED_TRIANGLES:
         vertices, corner = merge_near_points(vertices, corner, _MERGED_LINES / per_mm)
-        solid = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
-        corner, corner_uv, mapped = corner[solid], corner_uv[solid], mapped[solid]
-    rng, left, facing = (
+        proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
+        corner, corner_uv, mapped = corner[proper], corner_uv[proper], mapped[proper]
+    rng, line_counts, facing = (
         np.random.default_rng(_SEED),
         np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE),
         [np.zeros((0, 2), np.int64)],
@@ -125,9 +130,9 @@ def _trace_lines(
         points = vertices @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
         line, depth, outward, triangle, weights = intersect_lines(points[corner])
         cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
-        left += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
+        line_counts += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
         facing.append(_facing_cells(line, depth, outward, cell))
-    return np.concatenate(facing), left
+    return np.concatenate(facing), line_counts
 
 
 def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
@@ -141,8 +146,8 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
     x, y, z = np.ascontiguousarray(points.transpose(2, 1, 0))
     (left, width), (bottom, height) = _integer_range(x), _integer_range(y)
     count = width * height
-    triangle, number = expand_runs(np.zeros_like(count), count)
-    row, column = np.divmod(number, width[triangle])
+    triangle, line_in_box = expand_runs(np.zeros_like(count), count)
+    row, column = np.divmod(line_in_box, width[triangle])
     line_x, line_y = left[triangle] + column, bottom[triangle] + row
     (ax, bx, cx), (ay, by, cy) = x[:, triangle] - line_x, y[:, triangle] - line_y
     a, b, c = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
@@ -157,9 +162,9 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
 
 
 def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
-    """Return the lowest integer between each triangle's three corners (f,), and the number of such integers.
+    """Return the lowest integer within each triangle's extent along one axis (f,), and how many there are.
 
-    corner : (3, f) one coordinate of the corners
+    corner : (3, f) coordinate of the triangles' corners along this axis
     """
     low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
     high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
@@ -174,7 +179,7 @@ def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> In
     """
     order = np.lexsort((depth, line))
     line, outward, cell = line[order], outward[order], cell[order]
-    # Light leaves a body where it faces along the line, and meets one that faces against it.
+    # Light leaves a body where the surface faces along the line, and meets the next one where it faces back.
     through_air = (line[1:] == line[:-1]) & outward[:-1] & ~outward[1:]
     pair = np.stack([cell[:-1][through_air], cell[1:][through_air]], axis=1)
     return np.concatenate([pair, pair[:, ::-1]])
@@ -206,24 +211,26 @@ def _line_axes(direction: Doubles, angle: float) -> Doubles:
     return np.stack([c * right + s * up, c * up - s * right, direction])
 
 
-def _form_factors(facing: Index, left: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
+def _form_factors(
+    facing: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
+) -> FormFactors:
     """Return the form factors that result from counts of lines between cells.
 
     facing : (m, 2) pairs of cells that lines connect
-    left : (CELLS_PER_SIDE^2,) number of lines that left each cell
+    line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
     count = len(triangle) // SAMPLES_PER_PATCH
     has_texels = (facing >= 0).all(axis=1)
     cell, target = facing[has_texels, 0], patch_of[facing[has_texels, 1]]
     patch, known = patch_of[cell], target >= 0
-    left_patch = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count).astype(np.float64)
-    usual = np.median(left[left > 0]) if (left > 0).any() else 1.0
+    left_patch = np.bincount(patch_of[patch_of >= 0], line_counts[patch_of >= 0], count).astype(np.float64)
+    usual = np.median(line_counts[line_counts > 0]) if (line_counts > 0).any() else 1.0
     known_patch = known & (patch >= 0)
     return FormFactors(
-        *_sparse_rows(cell[known], target[known], left, count),
+        *_sparse_rows(cell[known], target[known], line_counts, count),
         _nearest_patch(patch_of),
-        np.minimum(left / usual, 1.0).astype(np.float32),
+        np.minimum(line_counts / usual, 1.0).astype(np.float32),
         *_sparse_rows(patch[known_patch], target[known_patch], left_patch, count),
         triangle,
         weights,
@@ -241,26 +248,30 @@ def _nearest_patch(patch_of: Index) -> Words:
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
-def _sparse_rows(row: Index, target: Index, left: Doubles, patches: int) -> tuple[Words, Words, Floats]:
+def _sparse_rows(
+    row: Index, target: Index, line_counts: Doubles, patches: int
+) -> tuple[Words, Words, Floats]:
     """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
 
     row : (m,) index of the cell or patch that each line left
     target : (m,) index of the patch that the line met next
-    left : (r,) number of lines that left each cell or patch
+    line_counts : (r,) number of lines that left each cell or patch
     patches : number of patches
     """
     entry, lines = np.unique(row * max(patches, 1) + target, return_counts=True)
     row, column = entry // max(patches, 1), entry % max(patches, 1)
-    factor = lines / left[row]
+    factor = lines / line_counts[row]
     large = factor >= _MIN_FORM_FACTOR
-    total, total_large = (np.bincount(row[some], factor[some], len(left)) for some in (slice(None), large))
+    total, total_large = (
+        np.bincount(row[some], factor[some], len(line_counts)) for some in (slice(None), large)
+    )
     factor = factor[large] * (total / np.maximum(total_large, 1e-12))[row[large]]
-    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(left)))])
+    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(line_counts)))])
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
 def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
-    """Return the patch of each cell, and triangles and weights of all patches' sample points.
+    """Return the patch of each cell, and the triangles and weights of the sample points of all patches.
 
     The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels.
     """
@@ -269,12 +280,12 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[I
     patch = (cell // CELLS_PER_SIDE // 2) * half + cell % CELLS_PER_SIDE // 2
     order = np.lexsort((rank, patch))
     occupied, first, size = np.unique(patch[order], return_index=True, return_counts=True)
-    number = np.full(half * half, -1, np.int64)
-    number[occupied] = np.arange(len(occupied))
+    patch_index = np.full(half * half, -1, np.int64)
+    patch_index[occupied] = np.arange(len(occupied))
     chosen = order[(first[:, None] + np.arange(SAMPLES_PER_PATCH) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(CELLS_PER_SIDE * CELLS_PER_SIDE), CELLS_PER_SIDE)
-    patch_of = number[(y // 2) * half + x // 2]
+    patch_of = patch_index[(y // 2) * half + x // 2]
     words = packed[:, 1] | (packed[:, 2] << np.uint32(16))
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 

@@ -21,7 +21,7 @@ def find_charts(mesh: Mesh) -> Ints:
 
     A chart is a set of triangles connected by edges that are shared both in space and in uv.
     """
-    # vertices are compared by position and uv, as one that is split only for its normal is no seam
+    # vertices are compared by position and uv: where they differ only in their normals, there is no seam
     corner = weld(np.hstack((mesh.positions, mesh.uv)))
     _, edge_of_side, _ = edges(corner[mesh.triangles])
     faces = np.tile(np.arange(len(mesh.triangles)), 3)
@@ -82,7 +82,8 @@ def covered_texels(
 
     p : (t, 3, 2) corners of the triangles [texel], integers at texel centres
     shape : height and width of the grid of texels
-    margin : smallest distance of a covered centre from the edges, along rows and columns [texel]
+    margin : smallest distance of a covered centre from the edges, along rows and columns; if negative,
+        centres just outside count as covered [texel]
     """
     height, width = shape
     low, high = p[..., 1].min(axis=1), p[..., 1].max(axis=1)
@@ -99,11 +100,11 @@ def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> 
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]:
+def _row_interval(p: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
     """Return the lowest and highest x at which each row y of texels intersects its triangle.
 
     p : (t, 3, 2) corners of the triangles [texel]
-    which : (n,) triangle index of each row
+    triangle : (n,) triangle index of each row
     y : (n,) row index
     """
     lowest = np.full(len(y), -np.inf)
@@ -114,7 +115,7 @@ def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]
     slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
     offsets = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
     for k in range(3):
-        slope, offset = slopes[which, k], offsets[which, k] + across[which, k] * y
+        slope, offset = slopes[triangle, k], offsets[triangle, k] + across[triangle, k] * y
         crossing = -offset / np.where(slope == 0, 1.0, slope)
         np.maximum(lowest, crossing, out=lowest, where=slope > 0)
         np.minimum(highest, crossing, out=highest, where=slope < 0)
@@ -123,7 +124,7 @@ def _row_interval(p: Doubles, which: Index, y: Index) -> tuple[Doubles, Doubles]
 
 
 def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
-    """Build the atlas of a mesh's own uv layout, so that its texels are those of the mesh's maps."""
+    """Build the atlas of a mesh in the mesh's own uv layout, in which the mesh's maps are drawn too."""
     chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
     usable = usable_triangles(mesh, size) & skin[mesh.material]
@@ -201,9 +202,9 @@ def _dilate_owners(owner: Ints) -> Ints:
 
 
 def _interpolable_triangles(mesh: Mesh, size: int, owner: Ints) -> Mask:
-    """Return the mask (f,) of triangles with an owner for each of the four texels around each corner.
+    """Return the mask (f,) of triangles around whose corners all texels have an owner.
 
-    Only such corners can be interpolated bilinearly; slivers may have no texels.
+    Bilinear interpolation at a corner reads the four texels around it, some of which may be empty at slivers.
     """
     low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
@@ -216,7 +217,7 @@ def _interpolable_triangles(mesh: Mesh, size: int, owner: Ints) -> Mask:
 def _texel_weights(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
     """Return the barycentric weights at each texel centre, (n, n, 2) [1/65535].
 
-    A gutter texel has those of the nearest point of its triangle.
+    A gutter texel has the weights of the nearest point of its triangle.
     """
     y, x = np.nonzero(owner >= 0)
     weights = barycentric_weights(texel_corners(mesh, size, owner[y, x]), np.column_stack((x, y)))
@@ -270,7 +271,7 @@ def _edge_distance(chart: Ints) -> NDArray[np.uint16]:
 
 
 def run_lengths(joined: Mask) -> tuple[Ints, Ints]:
-    """Return the number of connected texels before and after each texel of its row, (h, w) each.
+    """Return the number of connected texels before and after each texel in its row, (h, w) each.
 
     joined : (h, w) mask of texels that are connected to the texel before them in the row
     """

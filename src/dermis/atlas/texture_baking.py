@@ -18,24 +18,24 @@ from dermis.images.filters import mip_chain
 from dermis.images.io import read_image
 from dermis.mesh.mesh import Mesh
 
-_STRIP_TEXELS = 1 << 22  # texels that are sampled at once, to limit memory
-_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
+_STRIP_TEXELS = 1 << 22  # texels that are sampled at a time, to limit memory
+_ROLE_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
     "colour": (1.0, 1.0, 1.0),
     "normal": (0.0, 0.0),
     "roughness": (1.0,),
     "metalness": (1.0,),
     "emission": (1.0, 1.0, 1.0),
 }
-"""Values where a material has no picture, to which its factors apply."""
+"""Value of each role for a material without a picture; the material's factor multiplies it."""
 
 
 @dataclass(frozen=True, eq=False)
 class PackedTextures:
     """Common layout and maps of several materials.
 
-    vertices, uv : (n,) and (n, 2) vertices of the mesh and their uv in the common maps
-    maps : (side, side, k) values by role, factors included; only roles that a picture or a factor sets
-    notes : sentences on what is not exact
+    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) their uv in the common maps
+    maps : by role, such as colour or roughness, the map (side, side, k), multiplied by the materials' factors
+    notes : sentences for users about lost detail
     """
 
     vertices: Numbers
@@ -51,10 +51,10 @@ def pack_textures(
     members: Mask,
     required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
-    """Return the common layout and maps of some materials of a mesh.
+    """Return the common layout and maps of selected materials of a mesh.
 
-    surface, materials : of the file that the mesh comes from
-    members : (m,) materials of the mesh that share the maps
+    surface, materials : surface data and materials of the mesh's file
+    members : (m,) mask of the mesh's materials that share the maps
     required : roles that have a map even if no material has a picture for them
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
@@ -70,7 +70,7 @@ def pack_textures(
 
 @dataclass(frozen=True, eq=False)
 class _Baker:
-    """Maps over a layout of tiles."""
+    """Baker of maps for a layout of tiles."""
 
     mesh: Mesh
     surface: FileSurface
@@ -79,13 +79,13 @@ class _Baker:
     side: int
 
     def roles(self, required: Sequence[Role]) -> list[Role]:
-        """Return the roles for which a material has a picture, and those required."""
+        """Return the required roles and those for which a material has a picture."""
         used = {role for tile in self.tiles for role in self._material(tile).textures}
-        return [role for role in _DEFAULTS if role in used or role in required]
+        return [role for role in _ROLE_DEFAULTS if role in used or role in required]
 
     def bake(self, role: Role) -> Floats:
         """Return the common map (side, side, k) of a role."""
-        default = np.array(_DEFAULTS[role], np.float32)
+        default = np.array(_ROLE_DEFAULTS[role], np.float32)
         channels = len(default) + (role == "colour")  # opacity
         baked = np.zeros((self.side, self.side, channels), np.float32)
         for tile in self.tiles:
@@ -99,32 +99,32 @@ class _Baker:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
     def _tile_values(self, tile: Tile, role: Role) -> Floats:
-        """Return the values (h, w, k) of a role over a tile, factors included."""
+        """Return the values (h, w, k) of a role on a tile's texels, multiplied by the material's factors."""
         material, (width, height) = self._material(tile), tile.size
         texture = material.textures.get(role)
-        factor = _factor(material, role, self.surface.colours is not None)
+        factor = _material_factor(material, role, self.surface.colours is not None)
         if texture is None:
-            default = np.array([*_DEFAULTS[role], *((1.0,) if role == "colour" else ())], np.float32)
+            default = np.array([*_ROLE_DEFAULTS[role], *((1.0,) if role == "colour" else ())], np.float32)
             values = np.broadcast_to(default, (height, width, len(default))).copy()
         else:
-            values = self._sampled(tile, texture, role)
+            values = self._sample_picture(tile, texture, role)
         values *= factor
         if role == "colour":
             self._finish_colours(tile, values)
         return values
 
     def _finish_colours(self, tile: Tile, values: Floats) -> None:
-        """Multiply colours and opacity (h, w, 4) by vertex colours and a picture of the opacity."""
+        """Multiply colours and opacity (h, w, 4) by vertex colours and the opacity picture, in place."""
         material = self._material(tile)
         if "opacity" in material.textures:
-            values[..., 3:] *= self._sampled(tile, material.textures["opacity"], "opacity")
+            values[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
         is_opaque = material.alpha_mode == "opaque"
         values[..., 3] = 1.0 if is_opaque else values[..., 3] + 0.5 - material.cutoff
         if self.surface.colours is not None:
-            values[..., :3] *= self._interpolated(tile, self.surface.colours[tile.vertices])
+            values[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
-    def _sampled(self, tile: Tile, texture: Texture, role: Role) -> Floats:
-        """Return the values (h, w, k) of a picture over a tile."""
+    def _sample_picture(self, tile: Tile, texture: Texture, role: Role) -> Floats:
+        """Return a picture resampled to the texels of a tile, (h, w, k)."""
         picture = read_role(texture, role)
         base = base_texture(self._material(tile))
         if base is not None and base.mapping == texture.mapping:
@@ -132,12 +132,15 @@ class _Baker:
             u = tile.low[0] + (np.arange(width) + 0.5) / width * span[0]
             v = tile.low[1] + (np.arange(height) + 0.5) / height * span[1]
             return sample_grid(picture, u, v, texture.wrap)
-        own = texture.map_uv(file_uv(self.mesh, self.surface, texture.uv_set, tile.vertices))
-        position = self._interpolated(tile, own)
+        vertex_uv = texture.map_uv(file_uv(self.mesh, self.surface, texture.uv_set, tile.vertices))
+        position = self._interpolate_to_texels(tile, vertex_uv)
         return sample_points(picture, position, texture.wrap)
 
-    def _interpolated(self, tile: Tile, values: Numbers) -> Floats:
-        """Return values of the tile's vertices (n, k) at its texels (h, w, k), continued beyond triangles."""
+    def _interpolate_to_texels(self, tile: Tile, values: Numbers) -> Floats:
+        """Interpolate values (n, k) of a tile's vertices to its texels (h, w, k).
+
+        Texels outside all triangles have the value of the nearest texel inside one.
+        """
         from scipy.ndimage import distance_transform_edt
 
         width, height = tile.size
@@ -168,8 +171,8 @@ def _barycentric(corners: Doubles, points: Doubles) -> Doubles:
     return np.asarray(np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0))
 
 
-def _factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
-    """Return the factor of a material for a role, (k,)."""
+def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
+    """Return the factor (k,) by which a material multiplies its values of a role."""
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else GREY)
     factors: dict[Role, Sequence[float]] = {
@@ -183,7 +186,7 @@ def _factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Flo
 
 
 def read_role(texture: Texture, role: Role) -> Floats:
-    """Return the picture of a role as linear values (H, W, k)."""
+    """Return a texture's picture as linear values (H, W, k), converted as its role requires."""
     if role == "normal":
         return slope_map(texture.picture, "up")
     if role in ("colour", "emission"):
@@ -207,12 +210,12 @@ def _unit_range(image: Numbers) -> Floats:
 
 
 def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return a picture (h, w, k) at all pairs of positions u (w,) and v (h,), 0 to 1 within it, filtered."""
+    """Return samples (h, w, k) of a picture with mip filtering, on a grid of positions u (w,) and v (h,)."""
     step = (
         max(abs(float(u[-1] - u[0])) / max(len(u) - 1, 1), 1e-9),
         max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
     )
-    picture = _reduced(picture, min(step[0] * picture.shape[1], step[1] * picture.shape[0]))
+    picture = _matching_mip(picture, min(step[0] * picture.shape[1], step[1] * picture.shape[0]))
     left, right, across = _neighbours(u, picture.shape[1], wrap[0])
     top, bottom, down = _neighbours(v, picture.shape[0], wrap[1])
     if not across.any() and not down.any():
@@ -221,18 +224,18 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
     rows = max(1, _STRIP_TEXELS // max(len(u), 1))
     weight = across[None, :, None].astype(np.float32)
     for start in range(0, len(v), rows):
-        own = slice(start, start + rows)
+        strip = slice(start, start + rows)
         upper, lower = (
-            picture[line[own, None], left] * (1 - weight) + picture[line[own, None], right] * weight
+            picture[line[strip, None], left] * (1 - weight) + picture[line[strip, None], right] * weight
             for line in (top, bottom)
         )
-        blend = down[own, None, None].astype(np.float32)
-        sampled[own] = upper * (1 - blend) + lower * blend
+        blend = down[strip, None, None].astype(np.float32)
+        sampled[strip] = upper * (1 - blend) + lower * blend
     return sampled
 
 
 def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return a picture (h, w, k) at positions (..., 2), 0 to 1 within it, interpolated."""
+    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
     left, right, across = _neighbours(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
     top, bottom, down = _neighbours(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
     x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)
@@ -241,22 +244,22 @@ def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) ->
     return np.asarray(upper * (1 - y) + lower * y)
 
 
-def _reduced(picture: Floats, texels_per_sample: float) -> Floats:
-    """Return the mip level of a picture that has about one texel for each sample."""
+def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
+    """Return the mip level of a picture that has about one texel per sample."""
     level = int(np.floor(np.log2(max(texels_per_sample, 1.0)) + 0.1))
     return mip_chain(picture)[level] if level else picture
 
 
 def _neighbours(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
-    """Return the two texels around positions, 0 to 1 within a picture, and the weight of the second."""
+    """Return the two texels around each position in [0, 1] along one axis, and the weight of the second."""
     texel = position * size - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * size, np.rint(texel), texel)
     first = np.floor(texel)
     index = first.astype(np.int64)
-    return _wrapped(index, size, wrap), _wrapped(index + 1, size, wrap), texel - first
+    return _wrap_index(index, size, wrap), _wrap_index(index + 1, size, wrap), texel - first
 
 
-def _wrapped(index: Numbers, size: int, wrap: Wrap) -> Numbers:
+def _wrap_index(index: Numbers, size: int, wrap: Wrap) -> Numbers:
     if wrap == "clamp":
         return np.clip(index, 0, size - 1)
     if wrap == "repeat":

@@ -17,12 +17,12 @@ from dermis.mesh.geometry import components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
-"""Part of a picture by which uv may leave it without the layout showing more than the picture [-]."""
+"""Distance by which uv may lie outside [0, 1] without the picture being repeated there [-]."""
 PADDING = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
-_PLAIN_SIDE = 16  # texels of a tile without a picture that is not skin
-_MIN_SKIN_SIDE = 256  # texels of a tile of skin without a picture
-_GROWTH = 1.02  # of the side of the map until all tiles fit
+_PLAIN_SIDE = 16  # side of a tile without pictures that is not skin [texel]
+_MIN_SKIN_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
+_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class Tile:
     """Rectangle of the common map that shows one material of the mesh.
 
     material : index of the file's material, -1 for none
-    vertices, triangles : indices of the mesh
+    vertices, triangles : indices of vertices and triangles in the mesh
     uv : (n, 2) positions of the vertices in the material's pictures, v down
-    low, high : (2,) part of the picture that the tile shows
+    low, high : (2,) lowest and highest position in the pictures that the tile shows
     size : width and height [texel]
     corner : left and top texel in the map, without the padding
     """
@@ -53,7 +53,7 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose mapping determines the layout of a material: its colour, else the first."""
+    """Return the texture whose mapping determines a material's layout: its colour, or else its first one."""
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
@@ -66,10 +66,12 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 def lay_out_tiles(
     mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
 ) -> tuple[list[Tile], int, float]:
-    """Return the tiles of some materials, the side of their common map, and the scale of their pictures.
+    """Return the tiles of selected materials, and the side of their common map.
 
-    surface : of the file that the mesh comes from
-    members : (m,) materials of the mesh that share the map
+    The third result is the factor, at most 1, by which their pictures are reduced to fit into the map.
+
+    surface : surface data of the file that the mesh comes from
+    members : (m,) mask of the mesh's materials that share the map
     """
     of_file = np.array(surface.in_file)[mesh.material]
     member = members[mesh.material]
@@ -81,7 +83,7 @@ def lay_out_tiles(
                 mesh, surface, materials[index] if index >= 0 else FileMaterial(), index, triangles
             )
         )
-    tiles = _with_plain_sizes(mesh, tiles, materials)
+    tiles = _set_plain_sizes(mesh, tiles, materials)
     return _pack(tiles)
 
 
@@ -110,7 +112,7 @@ def _picture_size(material: FileMaterial) -> tuple[int, int]:
 def _move_charts(
     mesh: Mesh, texture: Texture, uv: Doubles, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
 ) -> Doubles:
-    """Return uv with charts moved by whole pictures towards the first one where pictures repeat."""
+    """Return uv (n, 2) in which the charts of repeating textures are shifted by whole periods into [0, 1]."""
     if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
         return uv
     corner = np.searchsorted(vertices, mesh.triangles[triangles])
@@ -124,16 +126,16 @@ def _move_charts(
     return np.asarray(uv - period * np.floor(middle / np.where(period > 0, period, 1.0)))
 
 
-def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
-    """Return tiles in which those without pictures have a size: as fine as the others if they are skin."""
-    area = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
-    density = [tile.size[0] * tile.size[1] / max(own, 1e-9) for tile, own in zip(tiles, area, strict=True)]
-    usual = float(np.median([own for own in density if own > 0] or [0.0]))
+def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
+    """Return the tiles with sizes for those without pictures: skin gets the others' median texel density."""
+    areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
+    density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
+    usual = float(np.median([value for value in density if value > 0] or [0.0]))
     sized = []
-    for tile, own in zip(tiles, area, strict=True):
+    for tile, mm2 in zip(tiles, areas, strict=True):
         if tile.size == (0, 0):
             is_skin = mesh.materials[int(mesh.material[tile.triangles[0]])].kind == "skin"
-            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * own)))) if is_skin else _PLAIN_SIDE
+            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * mm2)))) if is_skin else _PLAIN_SIDE
             tile = Tile(
                 tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)
             )
@@ -142,11 +144,11 @@ def _with_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMat
 
 
 def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
-    """Return placed tiles, the side of the map, and the scale of tiles that makes them fit."""
+    """Pack the tiles; return them with positions, the side of the map, and the scale at which they fit."""
     scale = 1.0
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
-        side, corners = _shelves(sizes)
+        side, corners = _pack_in_rows(sizes)
         if side <= MAX_SIDE:
             break
         scale *= 0.98 * MAX_SIDE / side
@@ -157,8 +159,8 @@ def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
     return placed, side, scale
 
 
-def _shelves(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
-    """Return the side of the smallest square into which shelves of rectangles fit, and their corners."""
+def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
+    """Pack rectangles in rows; return the side of the smallest square that holds them, and their corners."""
     padded = np.array(sizes) + 2 * PADDING
     order = np.argsort(-padded[:, 1], kind="stable")
     side = float(max(padded.max(), np.sqrt(padded.prod(axis=1).sum())))

@@ -17,7 +17,7 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
     """Check before a long computation that a file can be written to a path, and return the path.
 
     suffixes : allowed suffixes of the name, such as ".png"
-    advice : last sentence of the error for another suffix
+    advice : what to do about another suffix; last sentence of the error
 
     Raises DermisError for another suffix, and when the folder is missing or not writable.
     """
@@ -84,7 +84,7 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(target: Path) -> Iterator[Path]:
-    """Yield a new empty folder next to `target`, which is deleted with its files at the end of the block.
+    """Yield a new empty folder next to `target`; it is deleted with its content at the end of the block.
 
     Raises DermisError when the folder cannot be created, or when writing into it fails.
     """
@@ -133,10 +133,10 @@ def _temporary_name(target: Path) -> Path:
     return target.with_name(f".dermis-{secrets.token_hex(6)}{target.suffix}")
 
 
-def check_folder(folder: Path, summary: str) -> None:
+def check_folder(folder: Path, json_name: str) -> None:
     """Create a folder before a long computation and check that it is writable.
 
-    summary : name of the .json file that will be written into it
+    json_name : name of the .json file that will be written into it
 
     Raises DermisError when the folder cannot be created or is not writable.
     """
@@ -148,4 +148,4 @@ def check_folder(folder: Path, summary: str) -> None:
         refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Create it first")
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(folder, fault)
-    check_output(folder / summary, (".json",))
+    check_output(folder / json_name, (".json",))

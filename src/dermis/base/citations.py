@@ -51,7 +51,7 @@ def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, st
     for entry in _bibtex_entries(text, source):
         head = _ENTRY_HEAD.match(entry)
         if head is None:
-            refuse(source, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Mend it")
+            refuse(source, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Correct it")
         if head["key"] in found:
             refuse(source, "each key once", f"{head['key']} is there twice", "Rename or remove one of them")
         found[head["key"]] = entry

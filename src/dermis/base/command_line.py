@@ -1,4 +1,4 @@
-"""Framework of the command-line programs: a function per command, one-line errors with exit status 2."""
+"""Framework of command-line programs: a command is a function; an error is one line, with exit status 2."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TYPE_TEXTS = {float: "a number", int: "a whole number", NoneType: ""}
 _OUT_OF_MEMORY_TEXTS = (
     "failed to map segment",
     "allocate memory",
-)  # in the messages of libraries that cannot be loaded
+)  # parts of messages of libraries that cannot be loaded
 
 
 def make_app(name: str, help_text: str | None) -> App:
@@ -68,7 +68,7 @@ def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | N
     """Run a script as a command-line program, with its docstring as help, and exit.
 
     run : function of the program; or for several commands, their summaries by "module:function"
-    name : of the program; by default the name of the script's file
+    name : name of the program; by default the name of the script's file
     """
     name, help_text = name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
     if isinstance(run, Mapping):
@@ -124,7 +124,7 @@ def _show_notes() -> None:
 def usage_message(error: CycloptsError, name: str) -> str:
     """Return the error message for an invalid command line: what was expected, what was given, where help is.
 
-    name : of the program
+    name : name of the program
     """
     command = " ".join((name, *(error.command_chain or ())))
     culprit, expected, actual = (shorten(part, _MAX_TEXT_LENGTH) for part in _describe_error(error, command))

@@ -36,7 +36,7 @@ def compiled(function: Function) -> Function:
     return cast(Function, dispatcher)
 
 
-_HOLDS_ADDRESSES = attrgetter("library.has_dynamic_globals")  # addresses of this process
+_embeds_addresses = attrgetter("library.has_dynamic_globals")  # memory addresses, valid only in this process
 
 
 class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
@@ -48,7 +48,7 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
     def __init__(self, function: Callable[..., Any]) -> None:
         file = Path(function.__code__.co_filename)
         identity = function.__module__, function.__qualname__, function.__code__.co_firstlineno
-        # functions and constants that the loop takes from other files of its folder belong to the key
+        # the key depends on all files of the folder, because the loop may use their functions and constants
         self._source_key = f"{identity} {_source_hash(file.parent)} {numba.__version__} {sys.version}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -61,7 +61,7 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Cache the machine code for a signature, unless it contains addresses of this process."""
-        if data.lifted or _HOLDS_ADDRESSES(data):
+        if data.lifted or _embeds_addresses(data):
             return
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
         try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_ARRAY_NAME: code})

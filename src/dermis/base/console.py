@@ -39,7 +39,7 @@ def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str
     """Print the result of a command as JSON or as text.
 
     as_json : whether to print `report` as JSON
-    lines : returns the lines of the text
+    lines : function that returns the lines of the text
     """
     if as_json:
         print_json(report)

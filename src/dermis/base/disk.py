@@ -1,4 +1,4 @@
-"""Disk cache of arrays; the key of an entry is a hash of the inputs of a computation.
+"""Disk cache of arrays; the key of an entry is a hash of the inputs from which the arrays are computed.
 
 The first line of a file is the SHA-256 of the second. The second line is JSON with the file's key, the types
 and shapes of its arrays, and the SHA-256 of each block of the bytes that follow. Files that do not match are
@@ -31,7 +31,7 @@ Arrays = dict[str, Array]
 _SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
 _MAX_FOLDER_BYTES = 2 << 30
 _RECENT_USE_S = 300.0  # longer than a process takes to read all its cached files
-_MAX_WRITE_S = 24 * 3600.0  # older unfinished files are of processes that were killed
+_MAX_WRITE_S = 24 * 3600.0  # older unfinished files were left by processes that were killed
 _DAMAGE_ERRORS = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
 _PLAIN_KINDS = "biufcSU"  # NumPy kinds without pointers
 _BLOCK_BYTES = 2 << 20  # bytes that a thread reads or hashes at once
@@ -41,7 +41,7 @@ _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
-    """Return the array that `make` computes from `sources`, from the disk cache if it is there.
+    """Return the array that `make` computes from `sources`; if the disk cache has it, it is read from there.
 
     parameters : text with everything else that the result depends on, part of the key
     """
@@ -51,10 +51,10 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callab
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `make` computes from `sources`, from the disk cache if they are there.
+    """Return the arrays that `make` computes from `sources`; if the disk cache has them, they are read there.
 
     parameters : text with everything else that the result depends on, part of the key
-    names : of the arrays in the result
+    names : names of the arrays in the result
     """
     sources = [sources] if isinstance(sources, np.ndarray) else sources
     return load_or_make("arrays", array_key(sources, parameters), names, make)
@@ -76,7 +76,7 @@ def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arr
     """Return arrays from the disk cache; without a valid entry, compute them with `make` and cache them.
 
     folder : name of a folder of the cache
-    names : of the arrays in the result
+    names : names of the arrays in the result
     """
     arrays = load_arrays(folder, key, names)
     if arrays is None:
@@ -160,7 +160,7 @@ def _has_room(folder: Path, size: int) -> bool:
 
 
 def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
-    """Return path and status of the files in a folder that have a suffix.
+    """Return the path and the status of each file in a folder whose name ends with `suffix`.
 
     Files that another process deletes meanwhile are skipped.
     """
@@ -211,7 +211,7 @@ def _read_block(path: Path, block: memoryview, offset: int) -> str:
     """Read a block of bytes of a file into memory and return its SHA-256.
 
     block : memory to be filled
-    offset : of the block in the file
+    offset : position of the block in the file [bytes]
     """
     with open_private_file(path) as file:
         file.seek(offset)

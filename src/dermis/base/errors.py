@@ -11,7 +11,7 @@ _MAX_NAME, _MAX_TEXT = 300, 400  # characters in a message
 
 
 class DermisError(Exception):
-    """Error that the caller can fix: the message says what was expected, what was found and what to do.
+    """Error that the caller can fix; the message says what was expected, what was received and what to do.
 
     The command line prints the message without a traceback and exits with status 2.
 
@@ -28,7 +28,10 @@ class DermisError(Exception):
 
 @contextmanager
 def error_context(culprit: object) -> Iterator[None]:
-    """Prefix errors raised in the block with the name of a file, option or object, unless they contain it."""
+    """Put the name of a file, option or object before the message of errors raised in the block.
+
+    Messages that already contain the name are unchanged.
+    """
     try:
         yield
     except DermisError as error:
@@ -47,7 +50,7 @@ def notify(message: str) -> None:
 
 
 def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn:
-    """Raise a `DermisError` with what was expected, what was found and what to do.
+    """Raise a `DermisError` that says what was expected, what was received and what to do.
 
     The message is "culprit: expected EXPECTED, but ACTUAL. ADVICE."
 
@@ -79,7 +82,7 @@ def format_value(value: object, max_length: int = 60) -> str:
 
 
 def error_text(error: Exception) -> str:
-    """Return the message of an error in one line; for an OSError without its path, which callers add."""
+    """Return the first line of an error's message; that of an OSError lacks the path, which callers add."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text.splitlines()[0].rstrip(".")
 

@@ -22,10 +22,10 @@ from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
 _CPU_S, _SMALL_BYTES = 8.0, 64 << 20
-"""CPU time for files up to a size; that of larger ones is proportional [s, bytes]."""
-_MAX_WAIT = 3.0  # elapsed time relative to the CPU time, on a busy machine
-_MEMORY_BYTES = 2 << 30  # of the address space, of which libraries of USD take a third
-_ANSWER_BYTES = 1 << 30  # of the answer, and of each temporary file
+"""Limit of CPU time [s] for files of up to `_SMALL_BYTES`; for larger files it grows with their size."""
+_MAX_WAIT = 3.0  # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
+_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
+_ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
 _REFUSED, _FAILED = "refused", "failed"
 _MAX_MESSAGE = 2000  # characters
 _DAMAGED_ADVICE = "The file is damaged: export it again"
@@ -34,11 +34,11 @@ _REMOVED_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTH
 
 
 def run_decoder(module: str, request: Arrays, size: int, culprit: object, expected: str) -> Arrays:
-    """Return the answer of a decoder.
+    """Run a decoder in a separate process and return its answer.
 
-    module : its name; it runs with an empty temporary folder as its working directory
-    request : arrays by name, of numbers
-    size : of the data to decode, which determines the time that it may take [bytes]
+    module : module of the decoder, which runs in an empty temporary folder
+    request : numeric arrays by name
+    size : size of the data to decode, which determines the time limit [bytes]
     culprit, expected : the file, and what it should be, for errors
 
     Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
@@ -73,9 +73,10 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
 
 
 def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
-    """Answer the request on standard input on standard output; the main function of a decoder.
+    """Read a request from standard input, and write its answer to standard output; main function of decoders.
 
-    decode : raises DermisError to refuse the data; other exceptions mean that the data are damaged
+    decode : function that returns the answer; it raises DermisError to refuse the data, and any other
+        exception if the data are damaged
     """
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries print messages
@@ -92,12 +93,12 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
 
 
 def as_text(array: Bytes) -> str:
-    """Return the text of an array of a request or an answer."""
+    """Decode an array of a request or an answer as text."""
     return array.tobytes().decode("utf-8", "replace")
 
 
 def from_text(text: str) -> Bytes:
-    """Return a text as an array for a request or an answer."""
+    """Encode a text as an array of a request or an answer."""
     return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
 
 

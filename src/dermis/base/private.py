@@ -13,7 +13,7 @@ from pathlib import Path
 _READ_FLAGS = os.O_RDONLY | sum(
     getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY")
 )
-_MAX_LINKS = 40  # as in Linux
+_MAX_LINKS = 40  # symbolic links in the resolution of one path, as in Linux
 _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -59,7 +59,7 @@ def other_writers(folder: Path) -> str:
         except FileNotFoundError:
             return ""
         if not stat.S_ISDIR(status.st_mode) and not stat.S_ISLNK(status.st_mode):
-            return ""  # a file has no content below it
+            return ""  # a file, below which nothing can be stored
         if status.st_uid not in (0, os.geteuid()):
             return f"{path} belongs to another user"
         sticky = status.st_mode & stat.S_ISVTX and path != components[-1]  # only owners rename and remove

@@ -1,4 +1,4 @@
-"""Checks that numbers of callers and files are finite and in a range; conversion to Python types."""
+"""Checks that numbers from callers or files are finite and in a range, and conversion to Python types."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 def _has_text(values: Any, dimensions: int) -> bool:
     """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
-    dimensions : of the expected array; lists nested more deeply count as text
+    dimensions : number of dimensions of the expected array; lists nested more deeply count as text
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Safe reading of files that users name, and of files that those refer to.
+"""Safe reading of files that users name, and of files to which these refer.
 
 Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
 the file.
@@ -23,9 +23,9 @@ from dermis.base.errors import DermisError, error_text, refuse
 
 MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
-MAX_TEXT_BYTES = 1 << 20  # of settings: scenes, lights, tables
+MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
-_MAX_BITS = 64  # of an integer, as in TOML; each can be converted to a float
+_MAX_BITS = 64  # of integers, as in TOML; all can be converted to float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
 _LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
@@ -39,7 +39,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
     expected : what the file should be, for error messages
     max_bytes : largest accepted size
-    name : of the file in error messages; by default its path
+    name : name of the file in error messages; by default its path
 
     Raises DermisError when the file is missing, not regular, too large or unreadable.
     """
@@ -51,7 +51,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
                 max_bytes, max(size, _MIN_READ_BYTES)
             )  # system files such as /proc report a size of 0
             data = file.read(limit + 1) if size <= max_bytes else b""
-    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; not a name
+    except (OSError, ValueError, TypeError) as fault:  # ValueError: a NUL in the name; TypeError: no name
         refuse(culprit, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")

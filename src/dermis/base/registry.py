@@ -22,7 +22,7 @@ class Registry(Mapping[str, T], Generic[T]):
     kind : str
         What an entry is, for error messages, such as "technique".
     entries : Mapping of str to object or str, optional
-        First entries by name.
+        Initial entries by name.
     advice : str, optional
         What to do about a name that is not registered, for error messages.
 
@@ -127,9 +127,9 @@ class RegisteredName:
     Parameters
     ----------
     registry : Registry
-        Registry of the accepted names, as it is when a value is checked.
+        Registry whose names are accepted, including names registered later.
     *words : str
-        Further accepted words, such as "none".
+        Words that are accepted in addition, such as "none".
     """
 
     def __init__(self, registry: Registry[Any], *words: str) -> None:
@@ -137,7 +137,7 @@ class RegisteredName:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return all accepted names: those of the registry and the further words."""
+        """Return all accepted names: those in the registry, then the additional words."""
         return (*self.registry, *self.words)
 
     def check(self, name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-_MAX_ITEMS = 6  # of a collection that is written out
+_MAX_ITEMS = 6  # longest collection whose items are written
 _MAX_LENGTH = 60  # characters of a value
 
 

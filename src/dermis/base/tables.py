@@ -20,7 +20,7 @@ Rows = list[dict[str, str]]
 def read_rows(package: str, name: str) -> Rows:
     """Return the rows of a CSV table in a package, as dictionaries by column name.
 
-    package : such as "dermis.environment"
+    package : name of the package, such as "dermis.environment"
     name : path of the table in the package, without .csv
     """
     return parse_rows(resources.files(package).joinpath(f"{name}.csv").read_text("utf-8"))
@@ -32,16 +32,16 @@ def parse_rows(text: str) -> Rows:
 
 
 def column_separator(line: str) -> str:
-    """Return the separator of a line of a table: a tab, a semicolon or a comma, the first of these in it.
+    """Return the separator of a line of a table: a tab if it has one, else a semicolon, else a comma.
 
-    Beside tabs and semicolons commas are decimal signs.
+    In lines with tabs or semicolons, commas are decimal signs.
     """
     return next((mark for mark in "\t;" if mark in line), ",")
 
 
 @lru_cache(4096)
 def plain_key(key: str) -> str:
-    """Return a key or column name without case and punctuation: timestamp_ms and timestampMs are one."""
+    """Return a key or column name in lower case without punctuation: timestampms for timestamp_ms."""
     return re.sub(r"[\W_]", "", key).casefold()
 
 

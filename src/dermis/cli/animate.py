@@ -45,7 +45,10 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene at each frame; what the clip does not animate keeps the pose of the scene."""
+        """Yield the scene at each frame; targets and bones that the clip does not move keep the scene's pose.
+
+        numbers : numbers of the frames
+        """
         from dermis.mesh.pose import merge_poses
 
         for frame in numbers:
@@ -115,7 +118,7 @@ def animate(
         Print one JSON object with the number of frames and the timings.
     """
     if names:
-        return _list_names(head, scene, as_json)
+        return _print_names(head, scene, as_json)
     started = time.perf_counter()
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check(scene.settings.get("size", (2, 2)))
@@ -180,9 +183,10 @@ def _common_exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
 
 
 def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
-    """Return a hash of everything that determines the frames, by which images of earlier runs are reused.
+    """Return a hash of everything that determines the frames; images of earlier runs with it are reused.
 
-    files : head and motion as named on the command line; of files, size and modification time are hashed
+    files : head and motion as named on the command line; if a file has the name, its size and modification
+        time are hashed too
     """
     scene = animation.scene
     names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
@@ -211,7 +215,7 @@ def _summary_line(report: Options) -> str:
     return f"{report['file']}  {frames}{reused} at {report['fps']:g}/s  {report['seconds']:.1f} s{device}"
 
 
-def _list_names(name: str, options: SceneOptions, as_json: bool) -> int:
+def _print_names(name: str, options: SceneOptions, as_json: bool) -> int:
     with spinner("loading"):
         names = animatable_names(name, assemble_scene(name, options)[0].head)
     lines = (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
@@ -227,8 +231,8 @@ class TimeSpan:
     """Time span and frame rate from the options of `dermis animate`; fields of omitted options are None.
 
     begin, end : first and last time within the motion [s]
-    rate : frame rate of the animation, of --fps [1/s]
-    motion_rate : frame rate of motion files that have no time stamps, of --motion-fps [1/s]
+    rate : frame rate of the animation, from --fps [1/s]
+    motion_rate : frame rate of motion files that have no time stamps, from --motion-fps [1/s]
     """
 
     begin: Fraction | None
@@ -302,7 +306,7 @@ def load_clip(
     name : head or scene file as named on the command line
     motion, clip : motion file, and name of one of its clips
     head_options : options of the head, of which `unit_mm`, `up` and `front` also apply to mesh sequences
-    span : time span, of which the frame rates are used
+    span : time span, whose frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion

@@ -71,8 +71,8 @@ def compare(
 ) -> int:
     """Compare scattering techniques with a reference solution, or the specular models with each other.
 
-    Techniques are compared with the colour of the diffusion profile, without maps, surface reflection or
-    energy conservation.
+    Techniques are compared on skin in the colour of the diffusion profile, without maps, surface reflection
+    or energy conservation.
 
     Examples:
 
@@ -224,7 +224,7 @@ _INCIDENT_COLOURS = {
 }  # angles of incidence [degrees] and plot colours
 _DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
 _PLOT_COLUMNS = 4
-_PLOT_RADIUS = 1.8  # least radius of the plots: square root of the intensity over the peak of kelemen
+_PLOT_RADIUS = 1.8  # smallest radius of the plots: square root of the intensity relative to kelemen's peak
 _NORMAL = np.array([0.0, 0.0, 1.0])
 
 

@@ -47,8 +47,8 @@ def fit(
     Parameters
     ----------
     photo:
-        Photograph: JPEG, HEIC, PNG, TIFF, WebP or AVIF, turned by its EXIF and converted by its colour
-        profile; or EXR or HDR (linear).
+        Photograph: JPEG, HEIC, PNG, TIFF, WebP or AVIF, rotated by its EXIF orientation and converted by its
+        colour profile; or EXR or HDR (linear).
     head:
         human, human:SEED, a person (.json), a sample or a mesh file; or a scene (.toml) with head, camera and
         pose.

@@ -25,7 +25,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 
 
 def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return the choice that was typed; other text is accepted too, as plug-ins may register it later."""
+    """Return the choice that was typed; it is checked only now, as plug-ins may have registered more."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field)):
@@ -77,12 +77,12 @@ def model_options(
 ) -> Any:
     """Return a parameter type for cyclopts that has one option per field of a settings model.
 
-    Type, choices, bounds and help of each option are those of the field; fields that hold other models have
-    no option. The parameter's value is a dictionary of the given options by field name.
+    Each option has the type, choices, bounds and help of its field; fields that hold other models have no
+    option. The parameter's value is a dictionary of the given options by field name.
 
     only, without : names of the fields to include (all by default) and to exclude
     names : option names by field, where they differ from the name of the field
-    defaults : defaults to show in the help instead of those of the model
+    defaults : defaults by field, which the help shows instead of the model's
     """
     from dermis.scene.frozen_model import field_heading
 

@@ -53,7 +53,7 @@ class FrameOutputs:
             refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs")
         self.image = image
         self.names = check_outputs(_split_names(typed)) if typed is not None else ()
-        self.together = image.suffix.lower() == ".exr" and file_format in (None, "exr")
+        self.in_image_file = image.suffix.lower() == ".exr" and file_format in (None, "exr")
         if not self.names:
             self.paths: dict[str, Path] = {}
             return
@@ -61,7 +61,7 @@ class FrameOutputs:
 
         check_formats(self.names, file_format or "exr")
         self.paths = {
-            name: image if self.together else output_path(image, name, file_format or "exr")
+            name: image if self.in_image_file else output_path(image, name, file_format or "exr")
             for name in self.names
         }
         for path in self.paths.values():
@@ -77,7 +77,7 @@ class FrameOutputs:
         """
         from dermis.frame.output_files import write_multipart, write_output
 
-        if self.together:
+        if self.in_image_file:
             assert picture is not None
             write_multipart(self.image, picture, values)
             return

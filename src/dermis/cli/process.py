@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # of the null device, for closed stdin, stdout, stderr
+_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # for null devices that replace closed standard streams
 
 
 class StandardStreams:
@@ -37,8 +37,8 @@ class StandardStreams:
 
     def __enter__(self) -> Self:
         """Replace sys.stdout and sys.stderr."""
-        for number, mode in enumerate(_OPEN_MODES):
-            _reserve_descriptor(number, mode)
+        for descriptor, mode in enumerate(_OPEN_MODES):
+            _reserve_descriptor(descriptor, mode)
         self._original = sys.stdout, sys.stderr
         self._raw: list[_GuardedStream] = []
         if sys.stdout is sys.__stdout__:
@@ -59,24 +59,24 @@ class StandardStreams:
     def stdout_error(self) -> OSError | None:
         """Return the first error of a write to stdout, or None; a closed pipe does not count as an error."""
         sys.stdout.flush()
-        faults = [raw.fault for raw in self._raw if raw.number == 1]
+        faults = [raw.fault for raw in self._raw if raw.descriptor == 1]
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
         """Discard the buffered output to stdout after an interruption, as its reader may be blocked."""
         for raw in self._raw:
-            if raw.number == 1:
+            if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()
 
-    def _guarded(self, original: TextIO | None, number: int) -> TextIO:
-        inner: Any = original.buffer if original else io.FileIO(number, "w", closefd=False)
-        raw = _GuardedStream(getattr(inner, "raw", inner), number)
+    def _guarded(self, original: TextIO | None, descriptor: int) -> TextIO:
+        inner: Any = original.buffer if original else io.FileIO(descriptor, "w", closefd=False)
+        raw = _GuardedStream(getattr(inner, "raw", inner), descriptor)
         self._raw.append(raw)
         return io.TextIOWrapper(
             io.BufferedWriter(raw),
             encoding=original.encoding if original else "utf-8",
             errors="backslashreplace",  # for characters outside the encoding, and undecodable file names
-            line_buffering=number == 2 or raw.isatty(),
+            line_buffering=descriptor == 2 or raw.isatty(),
         )
 
 
@@ -84,12 +84,12 @@ class _GuardedStream(io.RawIOBase):
     """Raw output stream that discards all data after the first failed write.
 
     inner : raw stream that receives the data
-    number : file descriptor
+    descriptor : file descriptor
     fault : error of the first failed write; None until then
     """
 
-    def __init__(self, inner: io.RawIOBase, number: int) -> None:
-        self._inner, self.number = inner, number
+    def __init__(self, inner: io.RawIOBase, descriptor: int) -> None:
+        self._inner, self.descriptor = inner, descriptor
         self.fault: OSError | None = None
 
     def write(self, data: ReadableBuffer, /) -> int:
@@ -98,7 +98,7 @@ class _GuardedStream(io.RawIOBase):
             try:
                 if (written := self._inner.write(data)) is not None:
                     return written
-                select.select([], [self.number], [])  # wait: the stream is non-blocking and full
+                select.select([], [self.descriptor], [])  # wait: the stream is non-blocking and full
             except OSError as fault:
                 self.fault = fault
         return memoryview(data).nbytes
@@ -109,30 +109,30 @@ class _GuardedStream(io.RawIOBase):
 
     def fileno(self) -> int:
         """Return the file descriptor of the stream."""
-        return self.number
+        return self.descriptor
 
     def isatty(self) -> bool:
         """Return whether the stream is a terminal."""
         return self._inner.isatty()
 
 
-def _reserve_descriptor(number: int, mode: int) -> None:
+def _reserve_descriptor(descriptor: int, mode: int) -> None:
     """Open the null device at a file descriptor, 0 to 2, unless that descriptor is already open."""
     try:
-        os.fstat(number)
+        os.fstat(descriptor)
     except OSError:
         null_device = os.open(os.devnull, mode)
-        if null_device != number:
-            os.dup2(null_device, number)
+        if null_device != descriptor:
+            os.dup2(null_device, descriptor)
             os.close(null_device)
         else:
-            os.set_inheritable(number, True)
+            os.set_inheritable(descriptor, True)
 
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
 _RETRY_S = 0.02
-_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # half-imported modules, and callbacks from Rust
+_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
@@ -157,11 +157,11 @@ class Interruption:
         """Install the signal handlers; no effect outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
-        for number in _SIGNALS:
-            handler = signal.getsignal(number)
+        for signal_number in _SIGNALS:
+            handler = signal.getsignal(signal_number)
             if handler in (signal.SIG_DFL, signal.default_int_handler):
-                self._original[number] = handler
-                signal.signal(number, self._handle)
+                self._original[signal_number] = handler
+                signal.signal(signal_number, self._handle)
         self._original_hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
         self._reading, self._writing = socket.socketpair()
         self._writing.setblocking(False)
@@ -176,16 +176,16 @@ class Interruption:
         """Restore the previous signal handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
-        for number, handler in self._original.items():
-            signal.signal(number, signal.SIG_DFL if self.code else handler)
+        for signal_number, handler in self._original.items():
+            signal.signal(signal_number, signal.SIG_DFL if self.code else handler)
         signal.set_wakeup_fd(self._original_fd)
         sys.unraisablehook = self._original_hook
         self._writing.send(_END)
         self._thread.join()
         self._writing.close()
 
-    def _handle(self, number: int, frame: FrameType | None) -> None:
-        self.code = self.code or _SIGNAL_EXIT_BASE + number
+    def _handle(self, signal_number: int, frame: FrameType | None) -> None:
+        self.code = self.code or _SIGNAL_EXIT_BASE + signal_number
         if self._is_raised:
             return
         if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
@@ -234,11 +234,11 @@ class Interruption:
 
     def _send_again(self) -> None:
         self._resent += 1
-        number = self.code - _SIGNAL_EXIT_BASE
+        signal_number = self.code - _SIGNAL_EXIT_BASE
         if hasattr(signal, "pthread_kill"):
-            signal.pthread_kill(threading.main_thread().ident or 0, number)
+            signal.pthread_kill(threading.main_thread().ident or 0, signal_number)
         else:
-            signal.raise_signal(number)
+            signal.raise_signal(signal_number)
 
 
 def _interrupt() -> None:

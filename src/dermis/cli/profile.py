@@ -28,7 +28,7 @@ _OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return help text for the default of each pigment option, with the pigments of named skins."""
+    """Return the default of each pigment option for the help, with the values of named skins that differ."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -186,7 +186,9 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
 def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, is_traced: bool) -> Options:
     """Return the keyword arguments of the Monte Carlo simulation.
 
-    Prints a note if they are given, but no simulation will run.
+    Prints a note if any of them is given although no simulation will run.
+
+    is_traced : whether a simulation will run
     """
     if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")

@@ -75,7 +75,7 @@ class ProfileReport:
     radial : diffusion profile
     tissue : tissue that the profile describes; None for a table of Gaussians
     fit : fitted Gaussians and their error
-    other : Burley or separable fit; None if not requested
+    other_fit : Burley or separable fit; None if not requested
     through_mm : thicknesses at which the transmitted colour is reported [mm]
     model_error : error of the diffusion model relative to Monte Carlo, None if unknown
     spectrum : (31,) total reflectance by wavelength; None for tissue given by RGB coefficients [-]
@@ -84,7 +84,7 @@ class ProfileReport:
     radial: RadialProfile
     tissue: Tissue | None
     fit: GaussianFit
-    other: BurleyFit | SeparableFit | None
+    other_fit: BurleyFit | SeparableFit | None
     through_mm: tuple[float, ...]
     model_error: ModelError | None = None
     spectrum: Floats | None = None
@@ -170,15 +170,15 @@ class ProfileReport:
         return [*lines, f"           {_format_row(error.largest)}  at most, on {', '.join(error.tissues)}"]
 
     def _other_fit_lines(self) -> list[str]:
-        if self.other is None:
+        if self.other_fit is None:
             return []
-        if isinstance(self.other, BurleyFit):
-            lines = [f"Burley     {_format_row(self.other.profile.shape)}  s [1/mm]"]
+        if isinstance(self.other_fit, BurleyFit):
+            lines = [f"Burley     {_format_row(self.other_fit.profile.shape)}  s [1/mm]"]
         else:
-            kernel = self.other.kernel
+            kernel = self.other_fit.kernel
             pairs = zip(kernel.variance_mm2, kernel.weight, strict=True)
             lines = [f"separable  {_format_row(v)}  mm2, weights {_format_row(w)}" for v, w in pairs]
-        fit_error = f"rings      {_format_row(self.other.error)}  its error in the light through rings"
+        fit_error = f"rings      {_format_row(self.other_fit.error)}  its error in the light through rings"
         return [*lines, fit_error, f"rings      {_format_row(self.ring_error)}  error of the Gaussians"]
 
     def save(self, path: Path) -> None:
@@ -219,12 +219,14 @@ class ProfileReport:
         return values
 
     def _other_fit_json(self) -> dict[str, object]:
-        if self.other is None:
+        if self.other_fit is None:
             return {}
-        values = asdict(self.other)
-        if not isinstance(self.other, BurleyFit):
+        values = asdict(self.other_fit)
+        if not isinstance(self.other_fit, BurleyFit):
             return {"separable": values}
-        engines = {f.__name__: asdict(f(self.other.profile)) for f in (unity_parameters, unreal_parameters)}
+        engines = {
+            f.__name__: asdict(f(self.other_fit.profile)) for f in (unity_parameters, unreal_parameters)
+        }
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
@@ -313,9 +315,9 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
         terms = len(fit.weight) if report.fit.shared else np.count_nonzero(fit.weight[:, channel])
         label = f"{name}, {terms} Gaussians, error {report.fit.error[channel]:.2%}"
         axes.plot(r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASHES, label=label)
-        if isinstance(report.other, BurleyFit):
-            other = r * report.other.profile.radiant_exitance(r)[:, channel]
-            label = f"{name}, Burley, error {report.other.error[channel]:.1%} of rings"
+        if isinstance(report.other_fit, BurleyFit):
+            other = r * report.other_fit.profile.radiant_exitance(r)[:, channel]
+            label = f"{name}, Burley, error {report.other_fit.error[channel]:.1%} of rings"
             axes.plot(r, other, color=colour, linewidth=1.0, linestyle=":", label=label)
     return peak
 

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 
-_MAX_UNSCATTERED = 0.05  # fraction of triangles; closed eyes and other collapsed charts of scans are below
-_MAX_CLIPPED = 0.02  # fraction of pixels
+_MAX_UNSCATTERED = 0.05
+"""Fraction of the skin's triangles above which a note says that they are lit without scattering; closed eyes
+and other collapsed charts of scans stay below it."""
+_MAX_CLIPPED = 0.02
+"""Fraction of the head's pixels above which a note says that they are overexposed."""
 
 
 def render(
@@ -124,7 +127,7 @@ def render(
 
 @contextlib.contextmanager
 def _gc_disabled() -> Iterator[None]:
-    """Disable garbage collection in a context, as scanning all libraries saves little in one picture."""
+    """Disable garbage collection in a context: for one picture, it takes time and frees little memory."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -148,7 +151,7 @@ def _write_images(
         write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
     else:
         linear = rendered.linear_rgba() if with_alpha else rendered.linear()
-        if not (outputs.names and outputs.together):
+        if not (outputs.names and outputs.in_image_file):
             write_image(output, linear)
     if outputs.names:
         outputs.write(linear, values)
@@ -157,8 +160,8 @@ def _write_images(
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
     """Print notes on stderr about lighting that may surprise users.
 
-    These are skin triangles lit without scattering, sun-like peaks of the environment, and the setting gamma
-    "wrong".
+    There is one each for skin triangles lit without scattering, for sun-like peaks of the environment, and
+    for the setting gamma "wrong".
     """
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
     if technique.uses_atlas and technique.stitches_seams and rendered.unscattered_fraction > _MAX_UNSCATTERED:

@@ -56,7 +56,7 @@ if not TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """Scene options from the command line; field values of settings models are dictionaries by field name."""
+    """Options of a scene on the command line; the options of a model are a dictionary by field name."""
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
@@ -116,7 +116,9 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     environment = _merge_environment(scene.environment, options.environment)
     assembled = Scene(
         scene.head,
-        lights=_select_lights(scene, options.lights, environment, replaced="name" in options.environment),
+        lights=_select_lights(
+            scene, options.lights, environment, replaces_environment="name" in options.environment
+        ),
         camera=scene.camera if options.camera is None else load_camera(options.camera, scene.head),
         skin=Skin(**(scene.skin.model_dump() | SKIN_PRESETS[options.surface or "default"] | options.skin)),
         environment=environment,
@@ -200,16 +202,16 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 
 
 def _select_lights(
-    scene: Scene, name: str | None, environment: Environment | None, *, replaced: bool
+    scene: Scene, name: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
     """Return the lights of --lights; none if only --env is given; otherwise those of the scene.
 
-    replaced : whether --env replaces the environment
+    replaces_environment : whether --env replaces the environment
     """
     from dermis.scene import load_lights
 
     if name is None:
-        return () if replaced else tuple(scene.lights)
+        return () if replaces_environment else tuple(scene.lights)
     lights = load_lights(name, scene.head)
     if not lights and environment is None:
         refuse("--lights", "at least one light", f"{name!r} has none", "Add --env, or choose another rig")

@@ -42,7 +42,7 @@ def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
 
     The array of order m is (degree + 1 - m, c); as the panorama is real, negative orders are redundant.
 
-    radiance : (h, w, c)
+    radiance : (h, w, c) radiance of the panorama
     """
     height, width = radiance.shape[:2]
     weighted = radiance * (_row_weights(height) * 2.0 * np.pi / width)[:, None, None]
@@ -59,8 +59,8 @@ def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
 def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     """Return the factors (degree + 1,) by which convolution with a kernel multiplies harmonic coefficients.
 
-    kernel : isotropic kernel as function of the angle theta in 0..pi/2, 0 beyond; the factor of degree 0 is
-        its integral over the sphere
+    kernel : isotropic kernel as a function of the angle theta in 0..pi/2, taken as 0 beyond; the factor of
+        degree 0 is the kernel's integral over the sphere
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
@@ -70,9 +70,9 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c) from one set of coefficients with different factors.
+    """Return k panoramas (k, height, 2 height, c) from one set of coefficients, scaled by k sets of factors.
 
-    coefficients : of the spherical harmonics, see `analyse_panorama`
+    coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
     factors : (k, degree + 1) factor of each panorama for each degree, such as those of `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
@@ -91,7 +91,7 @@ def _complex_product(matrix: Floats, values: Complex) -> Complex:
     return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
 
-@lru_cache(maxsize=2)  # input and output size; 51 kB a row at degree 112
+@lru_cache(maxsize=2)  # sizes of input and output; at degree 112 a row takes 51 kB
 def _legendre_table(height: int, degree: int) -> list[Floats]:
     """Return the associated Legendre functions of all orders at the polar angles of a panorama's rows."""
     return legendre_functions(_polar_cosines(height), degree, degree + 1)

@@ -1,7 +1,7 @@
 """Least-squares fits of sums of isotropic lobes to specular lobes.
 
-A specular lobe is approximated for each node of a table of roughness and view angle. Five lobes have four
-parameters each, relative to the mean direction and the standard deviations of the specular lobe.
+At each node of a table over roughness and view angle, five isotropic lobes approximate the specular lobe.
+Each of them has four parameters, relative to the mean direction and standard deviations of the specular lobe.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from dermis.environment.lobe_harmonics import (
     IsotropicLobes,
@@ -30,14 +29,14 @@ ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT = 12, 16, 5
 LOBE_TABLE_ROUGHNESSES = np.geomspace(0.05, 1.0, ROUGHNESS_COUNT)
 """Roughnesses of the rows of the table."""
 LOBE_TABLE_COSINES = np.maximum(np.linspace(0.0, 1.0, VIEW_COUNT) ** 2, 0.02)
-"""Cosines of the view for the columns of the table; the first ones replace 0."""
+"""Cosines of the view angles, one for each column of the table, raised to at least 0.02."""
 _IN_PLANE_LOBES = (3,) * 10 + (2,) * 3 + (1,) * 3
-"""Number of lobes in the plane of incidence for each view, without the pair."""
+"""Number of lobes in the plane of incidence for each view angle, without the pair (`fit_isotropic_lobes`)."""
 _MIN_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
 _FIT_PASSES = 2
-_REGULARISATION = 0.01  # towards the mean of the neighbours, for undetermined parameters
+_REGULARISATION = 0.01  # strength of the pull of undetermined parameters to the mean of the neighbours
 _MAX_EVALUATIONS = 30
-_MAX_OFFSET = 5.0  # of positions in widths of the lobe, and of logarithms of weights
+_MAX_OFFSET = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
 _PAIR_SEPARATION = 0.4  # initial separation of a pair
 _POSITION, _OUT_OF_PLANE, _LOG_WIDTH, _LOG_WEIGHT = range(4)
 _INITIAL_LOBES = np.array(
@@ -58,9 +57,10 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
 
     Three lobes are in the plane of incidence; for steep views two or one have weight. The other two are a
     pair: on both sides of the plane, or in it where the specular lobe is elongated. The fit minimises the
-    expected difference of the reflections of random environments whose power falls with the degree of
-    harmonics, including light from below the horizon. Fits proceed from rough and grazing to smooth and
-    steep, each starting at the mean of its neighbours, so that lobes vary smoothly over the table.
+    expected difference between what the specular lobe and the sum of the isotropic lobes reflect. The
+    expectation is over random environments whose power falls with the harmonic degree, and which have light
+    below the horizon too. Fits proceed from rough and grazing to smooth and steep, each starting at the mean
+    of its neighbours, so that lobes vary smoothly over the table.
     """
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
@@ -163,6 +163,8 @@ def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbou
     start : initial parameters (4, 5)
     neighbours : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
     """
+    from scipy.optimize import least_squares
+
     scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
     free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
@@ -207,8 +209,8 @@ def _parameter_bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floa
     return low[kinds], high[kinds]
 
 
-def _to_isotropic_lobes(numbers: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
-    position, out_of_plane, log_width, log_weight = numbers
+def _to_isotropic_lobes(parameters: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
+    position, out_of_plane, log_width, log_weight = parameters
     weight = np.where(active, np.exp(log_weight - log_weight[active].max()), 0.0)
     return IsotropicLobes(
         target.mean_angle + position * target.along_deviation,

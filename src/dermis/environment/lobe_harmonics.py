@@ -1,6 +1,6 @@
 """Spherical harmonics of specular and isotropic lobes, with the normal of the plane of incidence as pole.
 
-Lobes are symmetric about that plane, so half of the harmonics vanish. n is the number of the others.
+Lobes are symmetric about that plane, so half of the harmonics vanish. n is the number of those that remain.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _FIT_DEGREES = (40, 80, 128)
 """Degrees up to which lobes are fitted."""
-_DEGREE_TIMES_WIDTH = 10.0  # the degree of a fit, times the lobe's deviation across the plane
-_SKY_POWER_FALLOFF = 1.0  # exponent of environment power per harmonic: 0 for lamps, 2 for smooth light
+_DEGREE_TIMES_WIDTH = 10.0  # least product of a fit's degree and the lobe's deviation across the plane
+_SKY_POWER_FALLOFF = 1.0  # exponent by which light falls with the degree: 0 for lamps, 2 for smooth light
 _DEGREE_1_WEIGHT = 10.0  # additional weight of degree 1, which determines the mean direction
 _ALONG_NODES, _ACROSS_NODES = 160, 40  # quadrature nodes along the plane of incidence and across
 _TABLE_STEP = np.radians(0.25)  # step of the tabulated angles from the plane
@@ -31,7 +31,7 @@ class LobeTarget(NamedTuple):
     """Specular lobe of unit integral for one roughness and view angle, to which isotropic lobes are fitted.
 
     degree : highest degree of its spherical harmonics
-    coefficients : (n,) coefficients of the harmonics of `harmonic_terms`
+    coefficients : (n,) coefficients of the harmonics that `harmonic_terms` lists
     mean_angle : angle between its mean direction and the surface normal [rad]
     along_deviation : standard deviation of the angle in the plane of incidence [rad]
     across_deviation : standard deviation of the sine of the angle from the plane of incidence [-]
@@ -62,7 +62,7 @@ class IsotropicLobes(NamedTuple):
 def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
     """Expand a specular lobe in spherical harmonics, as a fitting target.
 
-    cosine : of the angle between view and surface normal
+    cosine : cosine of the angle between view and surface normal
     m : roughness [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about it.
@@ -108,7 +108,8 @@ def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]
     """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
     Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives of each lobe
-    are those by angle, out-of-plane angle, log roughness, and log weight at a constant sum of the weights.
+    are with respect to its angle, out-of-plane angle, log roughness, and log weight (the sum of all weights
+    is constant).
     """
     order = harmonic_terms(degree)[1]
     azimuthal = np.exp(-1j * np.outer(np.arange(degree + 1), lobes.angle))[order]
@@ -130,7 +131,7 @@ def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]
 
 
 def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
-    """Return the associated Legendre functions (n, k) of the harmonics of `harmonic_terms`.
+    """Return the associated Legendre functions (n, k) of the harmonics that `harmonic_terms` lists.
 
     sine : (k,) sines of the angle from the plane of incidence, which are cosines of the polar angle
     """
@@ -172,7 +173,7 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
     The factors are interpolated between two prefiltered layers, as the shader does.
 
-    log_roughness : logarithm of the roughness, by which the derivatives are taken
+    log_roughness : logarithm of the roughness, with respect to which the derivatives are taken
     """
     layers, degrees = np.log(ROUGHNESSES), harmonic_terms(degree)[0]
     step = layers[1] - layers[0]
@@ -184,7 +185,7 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
 @cache
 def _layer_factor_table() -> Floats:
-    """Return the convolution factors of all prefiltered layers by degree, (layers, degrees).
+    """Return the convolution factors (layers, degrees) of each prefiltered layer for each degree.
 
     They are 0 above the highest degree of the layers.
     """

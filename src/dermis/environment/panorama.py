@@ -12,18 +12,18 @@ from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 from dermis.formats.samples import SAMPLES, fetch_sample
 from dermis.images.colour import luminance
-from dermis.images.io import mended_radiance, read_colours
+from dermis.images.io import read_colours, repaired_radiance
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _MIN_ROWS, _MAX_ROWS = 256, 512
-"""Rows of a loaded panorama: smaller ones are resampled for accurate integrals, larger ones averaged."""
-_MAX_RADIANCE = 1e12  # far above that of the sun; prevents overflow of single precision
+"""Least and largest number of rows of a loaded panorama; others are resampled, for accuracy and for speed."""
+_MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of single precision
 MAX_SUNS = 4
-_PEAK_FACTOR = 32.0  # of the mean radiance, above which a texel may belong to a sun
+_PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
 _CLUSTER_DEGREES = 8.0
-_MIN_SUN_FRACTION = 0.05  # of the irradiance of the mean radiance
+_MIN_SUN_FRACTION = 0.05  # least irradiance of a sun, relative to that of the mean radiance
 
 
 def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
@@ -32,7 +32,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     name : a sample, a file (.hdr, .exr), or "uniform"
     max_rows : largest h; larger pictures are reduced by averaging
 
-    A few infinite, NaN or negative pixels are mended, with a note.
+    A few infinite, NaN or negative pixels are repaired, with a note.
 
     Raises DermisError for any other name, and for a picture without radiance.
     """
@@ -43,7 +43,7 @@ def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = space.linear(mended_radiance(name, np.asarray(image[..., :3], np.float32)))
+    rgb = space.linear(repaired_radiance(name, np.asarray(image[..., :3], np.float32)))
     if (highest := float(rgb.max())) > _MAX_RADIANCE:
         refuse(name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again")
     height, width = rgb.shape[:2]
@@ -86,8 +86,8 @@ def resample(radiance: NDArray[np.floating], height: int) -> Floats:
 def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
     """Return means of a piecewise constant function over other intervals, along the first axis.
 
-    values : (n, ...) of the function between consecutive edges
-    edges : (n + 1,) increasing
+    values : (n, ...) values of the function between consecutive edges
+    edges : (n + 1,) increasing edges of these intervals
     target_edges : (k + 1,) edges of the intervals over which the k means are taken
     """
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
@@ -130,7 +130,7 @@ class Sun:
     """Bright peak of a panorama, rendered as a directional light.
 
     direction : (3,) unit vector towards the sun
-    irradiance : (3,) on a surface that faces the sun, linear Rec. 709
+    irradiance : (3,) irradiance of a surface that faces the sun, linear Rec. 709
     radius : angular radius [rad]
     """
 
@@ -174,7 +174,7 @@ def _luminance_sum(light: Floats) -> float:
 
 
 def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
-    """Return the sun for a cluster of n texels: a uniform disc with equal mean square radiance.
+    """Return the sun for a cluster of n texels: a uniform disc with the same light and mean square radiance.
 
     light : (n, 3) radiance of each texel times its solid angle
     towards : (n, 3) unit vectors to the texels
@@ -187,7 +187,7 @@ def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
 
 
 def _bright_clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Group n bright texels into clusters; return the mask (n,) of each, from the brightest peak on.
+    """Group n bright texels into clusters; return the mask (n,) of each, that of the brightest peak first.
 
     brightness : (n,) luminance
     towards : (n, 3) unit vectors to the texels

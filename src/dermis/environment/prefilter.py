@@ -26,8 +26,8 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
     theta : angle from the mirror direction [rad], 0 to pi / 2
     m : roughness [-]
 
-    This is the Kelemen lobe with n = v = r, normal, view and mirror direction [Karis2013], up to a constant
-    factor: the angle of the half vector is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
+    This is the Kelemen lobe for equal normal, view and mirror direction [Karis2013], up to a constant factor:
+    the angle of the half vector h is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
@@ -35,7 +35,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Return the values of environment.wgsl's `#fill` constants for the layers: number, roughness range."""
+    """Return the values of environment.wgsl's `#fill` constants for the layers: count and roughness range."""
     return {
         "reflections": len(ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
@@ -75,7 +75,7 @@ def prefilter(name: str) -> Prefiltered:
 
 
 def isotropic_kernel(m: float) -> Floats:
-    """Return the convolution factors (161,) by degree of the isotropic lobe of roughness m.
+    """Return the factors (161,), one per degree, of the convolution with an isotropic lobe of roughness m.
 
     The lobe is normalised to unit integral.
     """

@@ -1,4 +1,4 @@
-"""Axes of files: which of them points up, and along which the face looks.
+"""Coordinate axes of files: the axis that points up, and the axis along which the face looks.
 
 NumPy is imported on first use, so that help texts appear quickly.
 """
@@ -17,12 +17,18 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 class Axes(NamedTuple):
     """Axes of a file.
 
-    up : axis that points upwards
-    front : axis along which the face looks, across `up`; "auto" for -Y with Z up, as in Blender, else Z
+    up : axis that points upwards; None if the file does not state it, which means Y
+    front : axis along which the face looks, perpendicular to `up`; "auto" if it is not stated, which means -Y
+        if Z is up, as in Blender, and Z otherwise
     """
 
-    up: Axis = "y"
+    up: Axis | None = None
     front: Front = "auto"
+
+    @property
+    def top(self) -> Axis:
+        """Return the axis that points upwards."""
+        return self.up or "y"
 
     @property
     def face(self) -> Axis:
@@ -32,29 +38,45 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, which a user chooses, with those that a file states in place of the defaults.
+        """Return these axes, chosen by the user, with those that are not set taken from the file.
 
-        The front of the file applies only with its own up axis.
+        stated : axes that the file states
+
+        The file's front is used only if the resulting up axis is the file's as well.
         """
-        if self.up != "y":
-            return self
-        return Axes(stated.up, stated.front if self.front == "auto" else self.front)
+        chosen = self._replace(up=self.up or stated.up)
+        same = chosen.front == "auto" and chosen.top == stated.top
+        return chosen._replace(front=stated.front) if same else chosen
 
 
 DEFAULT_AXES = Axes()
 
 
 def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
-    """Rotate vectors (v, 3) of a file so that its up axis becomes +Y, and that of the face +Z."""
+    """Rotate vectors (v, 3) of a file so that the file's up axis becomes +Y and its front becomes +Z."""
     import numpy as np
 
-    if (axes.up, axes.face) == ("y", "z"):
+    if (axes.top, axes.face) == ("y", "z"):
         return vectors
-    (up, up_sign), (front, front_sign) = _split(axes.up), _split(axes.face)
+    (up, up_sign), (front, front_sign) = _split(axes.top), _split(axes.face)
     side = 3 - up - front
     side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
     columns = (side, side_sign), (up, up_sign), (front, front_sign)
     return np.column_stack([vectors[:, k] if sign > 0 else -vectors[:, k] for k, sign in columns])
+
+
+def file_axis(direction: Axis, axes: Axes) -> Axis:
+    """Return the axis of a file that `to_y_up` rotates to an axis of the head.
+
+    direction : axis of the head
+    axes : axes of the file
+    """
+    import numpy as np
+
+    index, sign = _split(direction)
+    along = sign * to_y_up(np.eye(3), axes)[:, index]
+    names: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
+    return names[int(np.concatenate((along, -along)).argmax())]
 
 
 def _split(axis: Axis) -> tuple[int, int]:

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 
 _MIN_DISPLACEMENT_MM = 1e-3  # smaller displacements count as 0
-_MIN_NORMAL_CHANGE = 2e-3  # of a unit normal, a tenth of a degree
+_MIN_NORMAL_CHANGE = 2e-3  # smaller changes of unit normals count as 0: a tenth of a degree
 _MIN_WEIGHT = 1e-6  # smaller weights count as 0
 _MAX_CANDIDATES = 8  # bones among which four are selected
-_PRIOR_MM2 = 1.0  # penalty for deviations from the interpolated weights
+_PRIOR_MM2 = 1.0  # penalty for the squared deviation from the interpolated weights
 
 
 class VertexTarget(NamedTuple):
-    """Morph target of a mesh, sparse: the vertices that change, and their changes at weight 1.
+    """Morph target of a mesh: the vertices that it changes, and their changes at weight 1.
 
     vertex : (n,) indices of the changed vertices
     delta_mm, normal : (n, 3) changes of position [mm] and of the unit normal

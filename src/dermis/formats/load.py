@@ -8,31 +8,35 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Numbers
+from dermis.base.arrays import Doubles, Floats, Mask, Numbers
 from dermis.base.disk import Arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
-from dermis.formats.axes import Axes, Axis, Front, to_y_up
+from dermis.formats.axes import Axes, Axis, Front, file_axis, to_y_up
 from dermis.formats.materials import FileMaterial
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
-from dermis.formats.mesh_repair import RawMesh, mend
+from dermis.formats.mesh_repair import RawMesh, repair_mesh
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_binary_gltf, is_gltf
 from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
 from dermis.formats.skin_groups import choose_skin, describe_choice
+from dermis.formats.text_files import listed
+from dermis.mesh.face_direction import face_direction
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, weld
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_CACHE_VERSION = 8  # increment when `load_rigged` returns other results for the same file
+_CACHE_VERSION = 9  # increment when `load_rigged` returns other results for the same file
 _MESH_FIELDS = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGET_FIELDS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON_FIELDS = [field.name for field in fields(Skeleton) if field.name != "names"]
@@ -41,6 +45,7 @@ _ARRAY_NAMES = [
     "outline",
     "colours",
     "other uv",
+    "file vertex",
     "metadata",
     "control",
     *(f"target {name}" for name in _TARGET_FIELDS),
@@ -63,23 +68,24 @@ def load_rigged(
     *,
     unit_mm: float | None = None,
     v_origin: Origin = "auto",
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
     skin_groups: tuple[str, ...] = (),
     opaque: tuple[str, ...] = (),
     eye_groups: tuple[str, ...] = (),
 ) -> RiggedMesh:
-    """Load mesh and rig of a file of one of `MESH_READERS`, in millimetres, with Y up and v down.
+    """Load the mesh and the rig of a file in one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
-    Which groups (materials, glTF meshes or OBJ `g`) are skin is found by `choose_skin`; others are opaque.
+    `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; others are opaque.
     The mesh is checked by `check_mesh`; its size is not checked.
 
-    unit_mm : length of the file's unit [mm]; None for that of the file or its format (`default_unit_mm`)
-    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" for that of the
+    unit_mm : length of the file's unit [mm]; None for the unit stated by the file or its format
+        (`default_unit_mm`)
+    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" selects by
         format
-    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`; those that
-        the file states replace the defaults
-    skin_groups : names of the groups that are skin; empty to find them
+    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`; by default
+        the up axis that the file states, and the front that `face_direction` finds
+    skin_groups : names of the groups that are skin; empty to detect them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
 
@@ -92,9 +98,9 @@ def load_rigged(
     load = partial(_load_uncached, source, unit, v_origin, axes, groups)
     is_glb = is_binary_gltf(source) and is_file(source)
     data = read_file(source, "a mesh file", MAX_FILE_BYTES) if is_glb else b""
-    if not data or b'"uri"' in data:  # parts of it are in other files
+    if not data or b'"uri"' in data:  # such meshes depend on other files
         return load()
-    default_name = source.stem  # of groups without a name
+    default_name = source.stem  # name of groups that have none
     return cached_rigged(data, repr((default_name, unit, v_origin, axes, groups)), load)
 
 
@@ -110,48 +116,77 @@ def _load_uncached(
         mesh_file = read_mesh_file(source)
         stated_mm = mesh_file.unit_mm or default_unit_mm(source)
         unit = stated_mm if unit_mm is None else unit_mm
-        axes = _settled_axes(axes, mesh_file.axes, source)
+        assigned, note = _assign_materials(mesh_file, groups, source)
         part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
+        counts = [len(part.triangles) for part in mesh_file.parts]
+        material = np.repeat(np.array(assigned.of_part, np.int32), counts)
+        axes, turned = _find_front(
+            _settled_axes(axes, mesh_file.axes, source), mesh_file, part, assigned.skin[material]
+        )
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
         positions = to_y_up(unit * part.positions, axes).astype(np.float32)
         normals = to_y_up(part.normals, axes)
         uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
         check_arrays(positions, uv, part.triangles, source)
-        assigned, note = _assign_materials(mesh_file, groups, source)
         used, corners = compact_vertices(part.triangles)
         vertices = select_vertices(part, used)
         point = weld(np.column_stack((positions, _weld_groups(mesh_file.parts)))[used])
         if mesh_file.is_deformable:
             point = split_points(point, vertices, to_head[:3, :3], source)
-        counts = [len(part.triangles) for part in mesh_file.parts]
-        material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
-        raw, mended = mend(RawMesh(*arrays), in_file)
+        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
+        raw, assigned, emptied = _without_empty(raw, assigned)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
         check_mesh(mesh, source, has_pictures=has_pictures)
         rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
         if rig is not None:
             check_rig(rig, source)
-    notes = (*((note,) if note else ()), *mesh_file.notes, *mended)
+    notes = (*filter(None, (note, turned)), *mesh_file.notes, *repairs, *emptied)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
     surface = FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv)
-    return RiggedMesh(mesh, rig, notes, surface, mesh_file.materials, stated_mm)
+    file_vertices = FileVertices(
+        len(used), raw.file_vertex.astype(np.int32), mesh.point, mesh.triangles, to_y_up(np.eye(3), axes).T
+    )
+    return RiggedMesh(mesh, rig, notes, surface, mesh_file.materials, stated_mm, file_vertices)
 
 
 def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
-    """Return the axes that a user chooses, or those that the file states.
+    """Return the axes that the user chose, with those that are not set taken from the file.
 
-    Raises DermisError for a chosen front along the up axis of the file.
+    Raises DermisError if the front is parallel to the up axis.
     """
     axes = chosen.or_stated(stated)
-    if axes.face[-1] == axes.up[-1]:
-        actual = f"front is {axes.front}, and up is {axes.up} in the file"
+    if axes.face[-1] == axes.top[-1]:
+        actual = f"front is {axes.front}, and up is {axes.top} in the file"
         refuse(source, "a front across the up axis of the file", actual, "Choose another front")
     return axes
+
+
+def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
+    """Detect the front from the shape; return the axes with it, and a note if it is not the default front.
+
+    A front that is already set is kept, and so is the default front of files that this package wrote.
+
+    part : mesh part with all vertices of the file
+    skin : (f,) mask of triangles that are skin
+    """
+    if axes.front != "auto" or any(one.maps is not None for one in mesh_file.materials):
+        return axes, ""
+    eyes = [one.positions[one.triangles.ravel()] for one in mesh_file.parts if is_eye_name(one.group.names)]
+    if not eyes and mesh_file.bones is not None:
+        of_eyes = [is_eye_name([name]) for name in mesh_file.bones.names]
+        eyes = [mesh_file.bones.world[of_eyes, :3, 3]]
+    positions, points = (to_y_up(one, axes) for one in (part.positions, np.vstack([np.empty((0, 3)), *eyes])))
+    direction = face_direction(positions, part.triangles[skin], points)
+    if direction is None or direction == "z":
+        return axes, ""
+    front = file_axis(direction, axes)
+    note = f"its face looks along {front} and is turned to the viewer; --front={axes.face} keeps it as it is"
+    return axes._replace(front=front), note
 
 
 def _weld_groups(parts: list[MeshPart]) -> Floats:
@@ -169,9 +204,9 @@ def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
 
 
 class _AssignedMaterials(NamedTuple):
-    """Materials of the mesh, and which of them each part of the file has.
+    """Materials of the mesh, and the material of each part of the file.
 
-    of_part : index of the material of each part
+    of_part : material index of each part
     in_file, has_uv : see `FileSurface`
     """
 
@@ -180,9 +215,14 @@ class _AssignedMaterials(NamedTuple):
     in_file: tuple[int, ...]
     has_uv: tuple[bool, ...]
 
+    @property
+    def skin(self) -> Mask:
+        """Return the mask (m,) of the materials that are skin."""
+        return np.array([one.kind == "skin" for one in self.materials])
+
 
 def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> tuple[_AssignedMaterials, str]:
-    """Return the materials of the mesh, in the order of the file, and a note on what was taken for skin."""
+    """Return the materials of the mesh, in the order of the file, and a note on which of them are skin."""
     parts, unnamed = mesh_file.parts, (source.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
     is_opaque = _match_groups(groups, names.opaque, "opaque", source)
@@ -220,10 +260,27 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     )
 
 
+def _without_empty(
+    mesh: RawMesh, assigned: _AssignedMaterials
+) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
+    """Remove the materials that have no triangles left; return mesh, materials and a note if any were."""
+    kept = np.bincount(mesh.material, minlength=len(assigned.materials)) > 0
+    if kept.all() or not kept[assigned.skin].any():
+        return mesh, assigned, ()
+    names = listed([one.name for one in compress(assigned.materials, ~kept)])
+    assigned = assigned._replace(
+        materials=tuple(compress(assigned.materials, kept)),
+        in_file=tuple(compress(assigned.in_file, kept)),
+        has_uv=tuple(compress(assigned.has_uv, kept)),
+    )
+    mesh = replace(mesh, material=(np.cumsum(kept) - 1)[mesh.material].astype(np.int32))
+    return mesh, assigned, (f"nothing remains of these groups: {names}",)
+
+
 def _match_groups(
     groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
 ) -> list[bool]:
-    """Return for each group of triangles whether its name is in `names`; a name that no group has is refused.
+    """Return for each group whether one of its names is in `names`; refuse names that no group has.
 
     option : argument of `load_rigged` with these names, for the error
     """
@@ -237,7 +294,7 @@ def _match_groups(
 
 
 class GroupNames(NamedTuple):
-    """Names of groups of a file that users state to be skin, not skin, or eyeballs."""
+    """Names of a file's groups that the user declares to be skin, not skin, or eyeballs."""
 
     skin: tuple[str, ...] = ()
     opaque: tuple[str, ...] = ()
@@ -245,12 +302,12 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """What the pictures of a mesh file need besides the mesh.
+    """Data of a mesh file that are needed, besides the mesh, to apply the file's materials and pictures.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
-    has_uv : (m,) whether the triangles of each material have uv in the file
+    has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : (v, 2) further uv coordinates by their index in the file
+    other_uv : additional uv sets (v, 2), by their index in the file
     """
 
     in_file: tuple[int, ...] = ()
@@ -262,9 +319,10 @@ class FileSurface(NamedTuple):
 class RiggedMesh(NamedTuple):
     """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
 
-    notes : sentences on what of the file is mended, replaced or left out, for users
-    materials : of the file, to which `surface` refers; empty if the mesh is from the disk cache
+    notes : sentences for users on content that was repaired, replaced or left out
+    materials : materials of the file, which `surface` indexes; empty if the mesh is from the disk cache
     unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
+    file_vertices : relation between the points of the mesh and the vertices of the file
     """
 
     mesh: Mesh
@@ -273,6 +331,7 @@ class RiggedMesh(NamedTuple):
     surface: FileSurface = FileSurface()
     materials: tuple[FileMaterial, ...] = ()
     unit_mm: float | None = None
+    file_vertices: FileVertices | None = None
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
@@ -280,7 +339,7 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 
     data : bytes of the file; the mesh must not depend on other files
     options : text with all options that influence the result, part of the cache key
-    load : reads the file
+    load : function that reads the file
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
     digest.update(data)
@@ -292,10 +351,13 @@ def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> 
 def _to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
     mesh, rig, notes, surface = rigged[:4]
+    assert rigged.file_vertices is not None
     metadata: dict[str, Any] = {"materials": [asdict(material) for material in mesh.materials]}
     metadata |= {"notes": notes, "in_file": surface.in_file, "has_uv": surface.has_uv}
     metadata["uv_sets"] = list(surface.other_uv)
+    metadata["file"] = rigged.file_vertices.count, rigged.file_vertices.to_head.tolist()
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
+    arrays["file vertex"] = rigged.file_vertices.vertex
     arrays["colours"] = _EMPTY_ARRAY if surface.colours is None else surface.colours
     arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _EMPTY_ARRAY
     rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
@@ -326,23 +388,26 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
     notes, colours = tuple(metadata["notes"]), arrays["colours"] if len(arrays["colours"]) else None
     other_uv = dict(zip(metadata["uv_sets"], arrays["other uv"], strict=True))
     surface = FileSurface(tuple(metadata["in_file"]), tuple(metadata["has_uv"]), colours, other_uv)
+    count, to_head = metadata["file"]
+    file_vertices = FileVertices(count, arrays["file vertex"], mesh.point, mesh.triangles, np.array(to_head))
+    rigged = RiggedMesh(mesh, None, notes, surface, file_vertices=file_vertices)
     if "targets" not in metadata:
-        return RiggedMesh(mesh, None, notes, surface)
+        return rigged
     values: dict[str, Numbers | None] = {name: arrays[f"target {name}"] for name in _TARGET_FIELDS}
     values["rest"] = values["rest"] if len(arrays["target rest"]) else None
     targets = MorphTargets(tuple(metadata["targets"]), **values)  # type: ignore[arg-type]
     if metadata["bones"] is None:
-        return RiggedMesh(mesh, Rig(arrays["control"], targets), notes, surface)
+        return rigged._replace(rig=Rig(arrays["control"], targets))
     skeleton = Skeleton(
         tuple(metadata["bones"]), **{name: arrays[f"bone {name}"] for name in _SKELETON_FIELDS}
     )
-    return RiggedMesh(mesh, Rig(arrays["control"], targets, skeleton), notes, surface)
+    return rigged._replace(rig=Rig(arrays["control"], targets, skeleton))
 
 
 def is_eye_name(names: Sequence[str]) -> bool:
-    """Return whether the names of a group denote an eyeball or a part of one: Eye_L, sclera, Std_Cornea_R.
+    """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    names : of the group, its material first; the first name with a known word decides
+    names : names of the group, with its material first; the first name with a known word decides
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """

@@ -30,11 +30,11 @@ PathLike = str | Path | EmbeddedPicture
 A = TypeVar("A", bound=Numbers)
 
 MAX_SIDE = 8192
-"""Largest number of texels along a side, which every device supports."""
+"""Largest number of texels along a side of a map; every device supports textures of this size."""
 _GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 MapLoader = Callable[[PathLike], Numbers]
-_MAX_PARALLEL_TEXELS = MAX_PIXELS  # of all maps together, so that they can be decoded in parallel
+_MAX_PARALLEL_TEXELS = MAX_PIXELS  # total of all maps that are decoded in parallel
 _MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is faster than decoding
 _CACHE_VERSION = 2  # increment when the same files result in other maps
 
@@ -84,7 +84,7 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 
 
 def mixture_map(path: PathLike) -> Floats:
-    """Read a map (H, W, 2) of the fractions of two additional diffusion profiles, each 0 to 1, sum at most 1.
+    """Read a map (H, W, 2) of the fractions of two additional diffusion profiles, which sum to at most 1.
 
     A colour picture gives the fractions in red and green; a grey picture gives the first, and the second is
     0.
@@ -101,7 +101,7 @@ def mixture_map(path: PathLike) -> Floats:
 def scalar_map(path: PathLike, role: str) -> Floats:
     """Read a grey map (H, W) of values from 0 to 1, without sRGB conversion [-].
 
-    role : description of the map for errors
+    role : description of the map for error messages
     """
     return _check_unit_range(path, role, _grey_levels(path, role, _read_picture(path, role)))
 
@@ -141,7 +141,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
 
 
 def _normal_statistics(normals: Floats) -> Doubles:
-    """Return (4,): numbers of all texels and of outward unit normals, and the sums of z over these sets."""
+    """Return (4,): number of texels, number of outward unit normals, and the sums of z over both sets."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
     outward = (np.abs(length - 1) < 0.15) & (z > 0)
@@ -149,7 +149,7 @@ def _normal_statistics(normals: Floats) -> Doubles:
 
 
 def _check_normals(path: PathLike, texels: float, outward: float, z: float, outward_z: float) -> None:
-    """Refuse a picture that is no tangent-space normal map: too few texels are outward unit normals.
+    """Refuse a picture with too few outward unit normals to be a tangent-space normal map.
 
     texels, outward : numbers of all texels and of outward unit normals
     z, outward_z : sums of the z components over all texels and over outward unit normals
@@ -218,7 +218,7 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any bit depth [mm]
+    height_mm : height difference of 1/255 of the full scale, one grey level of an 8-bit map [mm]
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels
     normal_y : "up" if green points to row 0 (OpenGL, Blender), "down" if away from it (DirectX)
@@ -261,8 +261,8 @@ def _texel_count(path: PathLike) -> int:
 def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
     """Return the map of a picture file, from the disk cache if the file is large; None without a file.
 
-    parameters : cache key besides the file: text of the map's role and options
-    load : reads the map from the file
+    parameters : text of the map's role and options, which is part of the cache key
+    load : function that reads the map from the file
     """
     if path is None:
         return None

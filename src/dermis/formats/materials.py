@@ -32,7 +32,7 @@ class Texture:
     uv_set : index of the uv coordinates of the vertices
     transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
     wrap : continuation beyond the picture along u and v
-    channel : channel of a scalar in a colour picture; None for the first channel of a grey picture
+    channel : index of the picture's channel that is used; None for colours, normals and grey pictures
     """
 
     picture: PathLike
@@ -43,7 +43,7 @@ class Texture:
 
     @property
     def mapping(self) -> tuple[int, UvTransform]:
-        """Return what determines the position in the picture of each point of the surface."""
+        """Return the uv set and the transform, which determine the texture coordinates."""
         return self.uv_set, self.transform
 
     def map_uv(self, uv: Doubles) -> Doubles:
@@ -54,18 +54,18 @@ class Texture:
 
 @dataclass(frozen=True)
 class FileMaterial:
-    """Material of a mesh file, as glTF's metallic-roughness model states it.
+    """Material of a mesh file, described by the parameters of glTF's metallic-roughness model.
 
-    names : of the material, empty for none
+    name : name of the material, empty for none
     textures : pictures by role; factors multiply them
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
     stated_metalness : factor of the metalness [-]; None where the file leaves it to the default of glTF, 1
-    emission, normal_scale : as in glTF
+    emission, normal_scale : emissiveFactor and normalTexture.scale of glTF
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
-    skin_only : properties that only the maps of skin have
-    missing : sentences on pictures that are not found, by role
+    skin_only : properties that are drawn on skin only; for other parts, a note lists them
+    missing : sentences on missing pictures, by role
     unused : properties that have no effect here, for the note
     """
 
@@ -96,16 +96,16 @@ class FileMaterial:
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` for skin that has the uv of its pictures."""
+        """Return keyword arguments of `load_maps` for skin whose uv are those of its pictures."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}
 
 
 def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
-    """Refuse materials whose pictures have too many texels together.
+    """Refuse materials whose pictures have too many texels in total.
 
-    path : of the file, for the error
+    path : path of the file, for error messages
     """
     pictures: dict[tuple[str, str], object] = {}
     for material in materials:
@@ -113,9 +113,11 @@ def check_pictures(path: Path, materials: Iterable[FileMaterial]) -> None:
         pictures |= {(role, str(picture)): picture for role, picture in used.items()}
     texels = 0
     for picture in pictures.values():
-        if isinstance(picture, EmbeddedPicture) or (isinstance(picture, Path) and is_file(str(picture))):
-            width, height = read_size(picture)
-            texels += width * height
+        if isinstance(picture, EmbeddedPicture | Path):
+            source = picture.data if isinstance(picture, EmbeddedPicture) else picture
+            if isinstance(source, bytes) or is_file(str(source)):
+                width, height = read_size(picture)
+                texels += width * height
     if texels > MAX_TOTAL_PIXELS:
         advice = "Resize them, or set them by options (--colour, ...)"
         limit = f"textures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"

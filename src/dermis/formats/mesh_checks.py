@@ -19,7 +19,7 @@ UV_TOLERANCE = 1e-4
 MAX_DISTANCE_MM = 1e6
 """Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
 MIN_RELATIVE_AREA = 1e-6
-"""Area over the squared longest side below which a triangle is degenerate in single precision [-]."""
+"""Ratio of a triangle's area to its squared longest side below which single precision is too coarse [-]."""
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
@@ -27,7 +27,7 @@ def check_mesh(mesh: Mesh, culprit: object, *, has_pictures: bool = False) -> No
     """Refuse a mesh that cannot be rendered as skin.
 
     culprit : source of the mesh for errors, usually its file
-    has_pictures : whether its file has pictures, which are packed so that uv outside [0, 1] are valid
+    has_pictures : whether the file has pictures; uv outside [0, 1] are then valid, as pictures are packed
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
     triangles, edges of more than two triangles, and a mesh without skin.
@@ -47,8 +47,8 @@ def check_arrays(
 ) -> None:
     """Refuse positions, uv and triangles from which no valid `Mesh` can be built.
 
-    positions : (v, 3) [mm]
-    uv : (v, 2)
+    positions : (v, 3) vertex positions [mm]
+    uv : (v, 2) vertex uv
     triangles : (f, 3) vertex indices
     culprit : source of the mesh for errors, usually its file
     """
@@ -66,11 +66,13 @@ def check_arrays(
         refuse(culprit, expected, f"one is {farthest:.3g} mm away", advice)
 
 
-def _check_finite(name: str, values: NDArray[np.floating], culprit: object, items: str = "vertices") -> None:
+def _check_finite(
+    quantity: str, values: NDArray[np.floating], culprit: object, items: str = "vertices"
+) -> None:
     lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if len(lost):
         actual = f"{len(lost)} {items} are NaN or infinite, first {lost[0]}"
-        refuse(culprit, f"finite {name}", actual, limits.DAMAGED_ADVICE)
+        refuse(culprit, f"finite {quantity}", actual, limits.DAMAGED_ADVICE)
 
 
 def check_rig(rig: Rig, culprit: object) -> None:
@@ -106,9 +108,9 @@ def check_uv_range(mesh: Mesh, culprit: object) -> None:
 
 
 def flat_triangles(positions: NDArray[np.floating], triangles: NDArray[np.integer]) -> Mask:
-    """Return which triangles have no area in single precision, (f,).
+    """Return the mask (f,) of triangles without area in single precision.
 
-    positions : (v, 3) [mm]
+    positions : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
     """
     columns = np.ascontiguousarray(positions.T, np.float64)

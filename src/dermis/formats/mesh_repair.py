@@ -1,4 +1,4 @@
-"""Mending of meshes from files: faults that other programs tolerate are corrected, each with a note."""
+"""Repair of meshes from files: faults that other programs tolerate are corrected, with a note on each."""
 
 from __future__ import annotations
 
@@ -28,23 +28,26 @@ from dermis.mesh.geometry import (
 )
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 
-_MAX_FLAT = 0.5
-"""Fraction of triangles without area above which a mesh is refused instead of mended [-]."""
-_MAX_CROWDED_EDGES = 100_000
-"""Edges of more than two triangles above which a mesh is refused instead of mended."""
+_MAX_FLAT_FRACTION = 0.5
+"""Fraction of triangles without area above which a mesh is refused instead of repaired [-]."""
+_MAX_NON_MANIFOLD_EDGES = 100_000
+"""Number of non-manifold edges above which a mesh is refused instead of repaired."""
 _MAX_PAIRED_SIDES = 8
-"""Edges of more triangles are cut open, instead of a search for the sheets that continue across them."""
+"""Number of triangles at an edge above which it is cut open without a search for sheets that cross it."""
 _MIN_CONVEXITY = -0.05
-"""Mean cosine between normals and directions from the centroid below which a piece may be inside out [-]."""
-_OPPOSED = -0.5
-"""Mean cosine between the normals of the file and those of triangles below which they are opposed [-]."""
-_SEEN_BALANCE = 0.25
-"""Excess of one side among the visible samples above which a piece shows that side to the outside [-]."""
-_MIN_SEEN, _MIN_VISIBLE, _MIN_SLOPE = 8, 0.02, 0.05  # samples, fraction of a piece alone, cosine
-_VIEWS, _VIEW_CELLS, _VIEW_SAMPLES = 20, 64, 120_000
-_DOUBTFUL_SAMPLES = 0.25  # fraction
+"""Mean cosine of normals and directions from the centroid: below it, a component may be inside out [-]."""
+_MAX_OPPOSITE_COSINE = -0.5
+"""Mean cosine of the file's normals and the triangles' normals: below it, they count as opposite [-]."""
+_MIN_BALANCE = 0.25
+"""Absolute visible balance above which the more visible side of a component is its outer side [-]."""
+_MIN_VISIBLE_SAMPLES = 8
+_MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
+_MIN_VISIBLE_FRACTION = 0.02  # relative to the visible samples of the same component without the others
+_VIEWS, _VIEW_CELLS = 20, 64  # number of views from outside, and of cells along a side of each view
+_SURFACE_SAMPLES = 120_000  # points on the mesh whose visibility is tested
+_DOUBTFUL_FRACTION = 0.25  # fraction of the samples that is reserved for components that may be inside out
 _MAX_UV_EXCESS = 0.02
-"""Distance from the tile up to which uv are clamped to it [-]."""
+"""Largest distance of uv from [0, 1] at which they are clamped [-]."""
 _NO_PERIOD = 1e9
 _PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD}
 
@@ -53,14 +56,15 @@ _PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD
 class RawMesh:
     """Triangles of a file in the head's space, before they become a `Mesh`.
 
-    positions : (v, 3) [mm]
-    normals : (v, 3) as in the file, NaN where it has none
-    uv : (v, 2) v down
-    point : (v,) index of the point of each vertex
+    positions : (v, 3) vertex positions [mm]
+    normals : (v, 3) normals of the file, NaN where it has none
+    uv : (v, 2) uv with v down
+    point : (v,) index of the point at which each vertex is
     triangles : (f, 3) vertex indices
-    material : (f,) index of the material of each triangle
+    material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    vertices : the same vertices in the file's space, with their morph targets and bones
+    vertices : the same vertices in the file's space, with morph targets and bones
+    file_vertex : (v,) index of each vertex among the vertices that the file's triangles use
     """
 
     positions: Floats
@@ -71,15 +75,16 @@ class RawMesh:
     material: Ints
     quads: Index
     vertices: MeshPart
+    file_vertex: Index
 
     def build(self, materials: tuple[Material, ...]) -> Mesh:
-        """Return the mesh with points and normals of its own."""
+        """Build the `Mesh`, with points and normals."""
         arrays = self.positions, self.uv, self.triangles, self.material
         return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
 
     @cached_property
     def corners(self) -> Index:
-        """Return the points of the corners of each triangle, (f, 3)."""
+        """Return the point index at each corner of the triangles, (f, 3)."""
         return self.point[self.triangles].astype(np.int64)
 
     @cached_property
@@ -87,13 +92,15 @@ class RawMesh:
         """Return the sides of the triangles, grouped by edge."""
         return _group_sides(self.corners)
 
-    def with_triangles(self, kept: Mask) -> RawMesh:
-        """Return the mesh with some of its triangles (f,)."""
-        quads = (np.cumsum(kept) - 1)[self.quads[kept[self.quads].all(axis=1)]]
-        return replace(self, triangles=self.triangles[kept], material=self.material[kept], quads=quads)
+    def with_triangles(self, selected: Mask) -> RawMesh:
+        """Return the mesh with the triangles that a mask (f,) selects."""
+        quads = (np.cumsum(selected) - 1)[self.quads[selected[self.quads].all(axis=1)]]
+        return replace(
+            self, triangles=self.triangles[selected], material=self.material[selected], quads=quads
+        )
 
     def with_corners(self, corners: Index) -> RawMesh:
-        """Return the mesh with other points at its corners (f, 3); vertices of several are repeated."""
+        """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
         triangles, stride = self.triangles.copy(), int(corners.max()) + 1
         moved = corners != self.point[triangles]
         copies, number = np.unique(triangles[moved] * stride + corners[moved], return_inverse=True)
@@ -103,7 +110,7 @@ class RawMesh:
         return replace(self._select(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
-        """Return the mesh without vertices and points that no triangle uses, and without broken quads."""
+        """Return the mesh without unused vertices and points, and without quads whose halves were parted."""
         used, triangles = compact_vertices(self.triangles)
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
@@ -111,42 +118,47 @@ class RawMesh:
         return replace(self._select(used), point=point, triangles=triangles, quads=self.quads[whole])
 
     def _select(self, source: Index) -> RawMesh:
-        """Return the mesh with other vertices (n,); its points and triangles are not changed."""
+        """Return the mesh with the vertices at the given indices (n,); points and triangles are unchanged."""
         return replace(
             self,
             positions=self.positions[source],
             normals=self.normals[source],
             uv=self.uv[source],
             vertices=select_vertices(self.vertices, source),
+            file_vertex=self.file_vertex[source],
         )
 
 
-def mend(mesh: RawMesh, materials: Sequence[FileMaterial | None]) -> tuple[RawMesh, tuple[str, ...]]:
-    """Return a mesh without the faults that can be mended, and a note on each fault.
+def repair_mesh(
+    mesh: RawMesh, materials: Sequence[FileMaterial | None], is_skin: Mask
+) -> tuple[RawMesh, tuple[str, ...]]:
+    """Return a mesh without the faults that can be repaired, and a note on each fault.
 
-    Triangles without area and repeated ones are dropped; sheets that meet at an edge of more than two
-    triangles become separate; pieces that are wound inside out are reversed; normals that point inwards are
-    turned; uv that are slightly outside the tile are clamped, and charts in other tiles are moved by whole
-    tiles. A mesh without faults is returned as it is.
+    Degenerate and repeated triangles are dropped. Sheets of the surface that meet at non-manifold edges (of
+    more than two triangles) are separated. Connected components that are wound inside out are reversed, and
+    inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and charts in other tiles are
+    moved by whole tiles. A mesh without faults is returned unchanged.
 
-    materials : of the file, for each material of the mesh; None for one that the file does not describe
+    materials : the file's description of each material of the mesh; None if it has none
+    is_skin : (m,) mask of the materials that are skin
     """
     notes: list[str] = []
     flat = flat_triangles(mesh.positions, mesh.triangles)
-    if flat.mean() > _MAX_FLAT:
+    if flat.mean() > _MAX_FLAT_FRACTION:
         return mesh, ()
-    mended = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, notes), notes), notes)
-    return _move_uv(mended if mended is mesh else mended.compact(), materials, notes), tuple(notes)
+    repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
+    return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
 
 
 def _counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
-def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
-    """Return the mesh without flat triangles (f,) and without repetitions within a material.
+def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) -> RawMesh:
+    """Return the mesh without the flat triangles of a mask (f,) and without duplicates.
 
-    Of triangles of the same three points the first is kept.
+    Among triangles of one material with the same three points, the first is kept. Among materials with
+    exactly the same triangles, skin is kept, else the first one.
     """
     if flat.any():
         notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
@@ -158,10 +170,26 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, notes: list[str]) -> RawMesh:
         again = (key[order][1:] == key[order][:-1]) & (np.diff(mesh.material[order]) == 0)
         kept = np.ones(len(key), bool)
         kept[order[1:][again]] = False
-        if again.any():
-            notes.append(f"left out {_counted(int(again.sum()), 'triangle')} that repeat others")
+        kept &= ~_duplicate_materials(key[kept], mesh.material[kept], is_skin)[mesh.material]
+        if not kept.all():
+            notes.append(f"left out {_counted(int((~kept).sum()), 'triangle')} that repeat others")
             mesh = mesh.with_triangles(kept)
     return mesh
+
+
+def _duplicate_materials(key: Index, material: Ints, is_skin: Mask) -> Mask:
+    """Return the mask (m,) of materials that have exactly the triangles of another material, which is kept.
+
+    key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
+    """
+    ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
+    triangles = np.split(key[np.lexsort((key, material))], ends[:-1])
+    is_duplicate, seen = np.zeros(len(is_skin), bool), {b""}
+    for index in np.argsort(~is_skin, kind="stable"):
+        content = triangles[index].tobytes()
+        is_duplicate[index] = content in seen
+        seen.add(content)
+    return is_duplicate
 
 
 class _Sides(NamedTuple):
@@ -170,7 +198,7 @@ class _Sides(NamedTuple):
     Side 3 t + k runs from corner k of triangle t to its next corner.
 
     side : (3f,) sides, ordered by edge
-    first, counts : (e,) index in `side` of the first side of each edge, and number of its sides
+    first, counts : (e,) for each of e edges, the index in `side` of its first side, and its number of sides
     start, end : (3f,) points at the ends of each side
     """
 
@@ -182,7 +210,7 @@ class _Sides(NamedTuple):
 
     @property
     def pairs(self) -> Index:
-        """Return the two sides of each edge of two triangles, (n, 2)."""
+        """Return the two sides of each edge that has exactly two triangles, (n, 2)."""
         first = self.first[self.counts == 2]
         return np.column_stack((self.side[first], self.side[first + 1]))
 
@@ -196,7 +224,7 @@ def _group_sides(corners: Index) -> _Sides:
     return _Sides(side, first, np.diff(first, append=len(key)), start, end)
 
 
-def _label(count: int, links: NDArray[np.integer]) -> Index:
+def _label_components(count: int, links: NDArray[np.integer]) -> Index:
     """Return the connected component of each node of a graph, (count,).
 
     links : (n, 2) nodes at the ends of each link
@@ -209,15 +237,15 @@ def _label(count: int, links: NDArray[np.integer]) -> Index:
 
 
 def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh with separate points for the sheets that meet at edges of more than two triangles."""
+    """Return the mesh with separate points for sheets that meet at non-manifold edges."""
     count = int((mesh.sides.counts > 2).sum())
-    if not 0 < count <= _MAX_CROWDED_EDGES:
+    if not 0 < count <= _MAX_NON_MANIFOLD_EDGES:
         return mesh
     notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
     links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
     mesh = mesh.with_corners(_split_points(mesh, links))
     sides = mesh.sides
-    if (sides.counts > 2).any():  # sheets that are joined elsewhere around both ends of an edge
+    if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
         kept[sides.side[sides.first[sides.counts == 1]]] = True
         kept[np.concatenate((sides.pairs, _continue_sheets(mesh, rounds=1)))] = True
@@ -228,12 +256,12 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
 
 
 def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Index:
-    """Return pairs of sides (n, 2) across which sheets continue at edges of more than two triangles.
+    """Return pairs of triangle sides (n, 2) across which sheets continue at non-manifold edges.
 
-    At each edge the pair of the same material, with opposite directions and the least angle is chosen first;
-    further ones must have opposite directions.
+    At each edge, the first pair preferably has the same material, opposite directions and the flattest
+    continuation; further pairs must have opposite directions.
 
-    rounds : most pairs of an edge
+    rounds : largest number of pairs at an edge
     """
     sides, material = mesh.sides, mesh.material
     crowded = np.flatnonzero((sides.counts > 2) & (sides.counts <= _MAX_PAIRED_SIDES))
@@ -244,7 +272,7 @@ def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Ind
     )
     table = -np.sort(-table, axis=1)
     inwards = _directions_from_sides(mesh, table)
-    forward, piece = sides.start < sides.end, _label(len(mesh.triangles), sides.pairs // 3)
+    forward, piece = sides.start < sides.end, _label_components(len(mesh.triangles), sides.pairs // 3)
     found = [np.empty((0, 2), np.int64)]
     for turn in range(rounds):
         best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
@@ -265,7 +293,7 @@ def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Ind
 
 
 def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
-    """Return for sides (...) the unit vectors (..., 3) in their triangles that are perpendicular to them."""
+    """Return the unit vectors (..., 3) perpendicular to triangle sides (...), into the triangles."""
     p, q, r = (mesh.positions[np.roll(mesh.triangles, -k, axis=1).ravel()[sides]] for k in range(3))
     along, inwards = q - p, r - p
     scale = (inwards * along).sum(axis=-1) / (along * along).sum(axis=-1)
@@ -274,10 +302,10 @@ def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
 
 
 def _split_points(mesh: RawMesh, links: Index) -> Index:
-    """Return the points of corners (f, 3) after splitting those at edges of more than two triangles.
+    """Return the point index at each corner (f, 3) after points at non-manifold edges were split.
 
-    Corners at a point remain together if their triangles are connected around it by `links`; the largest
-    group keeps the point, the others get new ones.
+    Corners at a point still share it if `links` connect their triangles around it. The largest group of
+    corners keeps the point, other groups get new points.
 
     links : (n, 2) pairs of sides across which sheets continue
     """
@@ -285,7 +313,7 @@ def _split_points(mesh: RawMesh, links: Index) -> Index:
     crowded = sides.side[sides.first[sides.counts > 2]]
     busy = np.zeros(int(flat.max()) + 1, bool)
     busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
-    first, second = links.T  # a side has the index of the corner at its start
+    first, second = links.T  # the index of a side is also that of the corner at its start
     following = [3 * (one // 3) + (one + 1) % 3 for one in (first, second)]
     crossed = flat[first] != flat[second]
     ends = np.concatenate((first, following[0]))
@@ -295,7 +323,7 @@ def _split_points(mesh: RawMesh, links: Index) -> Index:
     affected = np.flatnonzero(busy[flat])
     number = np.cumsum(busy[flat]) - 1
     used = busy[flat[ends]]
-    fan = _label(len(affected), number[np.column_stack((ends[used], others[used]))])
+    fan = _label_components(len(affected), number[np.column_stack((ends[used], others[used]))])
     point = np.zeros(int(fan.max()) + 1, np.int64)
     point[fan] = flat[affected]
     order = np.lexsort((-np.bincount(fan), point))
@@ -307,14 +335,16 @@ def _split_points(mesh: RawMesh, links: Index) -> Index:
 
 
 def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh with triangles that are wound consistently and with normals that point outwards."""
+    """Return the mesh with consistently wound triangles and outward normals."""
     piece, reverse = _find_pieces(mesh)
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
     surface = _Surface(piece, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normals(mesh))
-    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (agreement < _OPPOSED)
+    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (
+        agreement < _MAX_OPPOSITE_COSINE
+    )
     if doubtful.any():
         turned = _inside_out(surface, doubtful, agreement)
         reverse ^= turned[piece]
@@ -324,7 +354,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
-    inwards = np.unique(mesh.triangles[(agreement < _OPPOSED)[piece]])
+    inwards = np.unique(mesh.triangles[(agreement < _MAX_OPPOSITE_COSINE)[piece]])
     if len(inwards):
         notes.append(f"turned {_counted(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
@@ -334,22 +364,22 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
 
 
 def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
-    """Return the connected piece of each triangle (f,), and which to reverse for a consistent winding (f,).
+    """Return each triangle's connected component (f,), and the mask (f,) of triangles to reverse.
 
-    Of the two windings of a piece, that of the larger area is kept. A piece that has no consistent winding,
-    such as a Moebius strip, is not changed.
+    Their reversal makes the winding of each component consistent, in the sense that most of its area already
+    has. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
     """
     count, pairs = len(mesh.triangles), mesh.sides.pairs
     forward = mesh.sides.start < mesh.sides.end
     links = pairs // 3
     conflict = forward[pairs[:, 0]] == forward[pairs[:, 1]]
     if not conflict.any():
-        return _label(count, links), np.zeros(count, bool)
-    # each triangle is two nodes, one for each winding; links join the windings that agree
+        return _label_components(count, links), np.zeros(count, bool)
+    # graph with two nodes per triangle, one for each winding; edges connect consistent windings
     one, two = links.T
     first, second = np.concatenate((one, one + count)), np.concatenate((two, two + count))
     second = np.where(np.tile(conflict, 2), (second + count) % (2 * count), second)
-    kept, reversed_ = _label(2 * count, np.column_stack((first, second))).reshape(2, -1)
+    kept, reversed_ = _label_components(2 * count, np.column_stack((first, second))).reshape(2, -1)
     piece = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
     reverse = kept > reversed_
     size = triangle_areas(mesh.positions[mesh.triangles])
@@ -358,17 +388,17 @@ def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
 
 
 def _corner_normals(mesh: RawMesh) -> Doubles:
-    """Return the sum of the normals of the file at the corners of each triangle, as columns (3, f)."""
+    """Return the sum of the file's normals at the three corners of each triangle, as columns (3, f)."""
     normals = np.where(np.isfinite(mesh.normals), mesh.normals, 0).T
     return np.asarray(sum(normals.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T)))
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """Triangles with the connected pieces that they belong to.
+    """Triangles, and the connected component ("piece") of each.
 
-    piece : (f,) index of the piece of each triangle
-    area : (3, f) normals, as long as twice the area [mm²]
+    piece : (f,) index of each triangle's component
+    area : (3, f) normals with twice the triangle's area as their length [mm²]
     corners : (3, 3, f) positions of the three corners, as columns [mm]
     """
 
@@ -382,7 +412,7 @@ class _Surface:
         return np.sqrt(dot_columns(self.area, self.area))
 
     def outward_directions(self) -> Doubles:
-        """Return the direction of each triangle from the centroid of its piece, as columns (3, f)."""
+        """Return the vector from the component's centroid to each triangle, as columns (3, f)."""
         centre = self.corners.mean(axis=0)
         total = np.maximum(np.bincount(self.piece, self.size), np.finfo(np.float64).tiny)
         for axis in centre:
@@ -391,74 +421,79 @@ class _Surface:
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
-        """Return for each piece the mean cosine between its normals and a direction (3, f), 0 without one."""
+        """Return the mean cosine of normals and directions (3, f) for each component; 0 for null vectors."""
         length = np.bincount(self.piece, self.size * np.sqrt(dot_columns(direction, direction)))
         total = np.bincount(self.piece, dot_columns(self.area, direction))
         return total / np.where(length > 0, length, 1)
 
     def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
-        """Return the balance of front and back of each piece as seen from outside, and whether backs prevail.
+        """Return how much of each component's front and back is visible, and whether backs prevail.
 
-        The balance is 1 if only the front is seen, -1 if only the back is, and 0 if hardly anything is. Backs
-        prevail if they are two thirds of what is seen of all pieces.
+        The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
+        is, and 0 if hardly any of it is. Backs prevail if they are two thirds of all visible samples.
 
-        doubtful : pieces that get additional samples, so that small ones have enough
+        doubtful : mask of components that get additional samples, so that small components have enough
         """
-        own = np.bincount(self.piece, self.size)
-        more = _DOUBTFUL_SAMPLES * doubtful / (own * doubtful.sum())
+        size = np.bincount(self.piece, self.size)
+        more = _DOUBTFUL_FRACTION * doubtful / (size * doubtful.sum())
         triangle, sample = self._draw_samples(
-            self.size * ((1 - _DOUBTFUL_SAMPLES) / own.sum() + more[self.piece])
+            self.size * ((1 - _DOUBTFUL_FRACTION) / size.sum() + more[self.piece])
         )
         normal, piece = self.area[:, triangle] / self.size[triangle], self.piece[triangle]
-        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(own)), np.int64)
+        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(size)), np.int64)
         for view in fibonacci_sphere(_VIEWS):
             across = np.linalg.svd(view[None])[2][1:]
             cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
             nearest, order = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1), np.argsort(view @ sample)
-            nearest[tuple(cell[:, order])] = order  # of several in a cell, the last one remains
+            nearest[tuple(cell[:, order])] = order  # the last, nearest sample of a cell remains
             visible = nearest[nearest >= 0]
             cosine = view @ normal[:, visible]
-            for side, facing in zip(seen, (cosine > _MIN_SLOPE, cosine < -_MIN_SLOPE), strict=True):
-                side += np.bincount(piece[visible[facing]], minlength=len(own))
-        cells = own / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # covered by a convex piece alone, on average
-        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(own)) / 2)
+            facings = cosine > _MIN_VIEW_COSINE, cosine < -_MIN_VIEW_COSINE
+            for side, facing in zip(seen, facings, strict=True):
+                side += np.bincount(piece[visible[facing]], minlength=len(size))
+        cells = size / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # that a convex component would cover alone
+        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(size)) / 2)
         front, back = seen
-        is_seen = front + back >= np.maximum(_MIN_VISIBLE * alone, _MIN_SEEN)
+        is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
 
     def _draw_samples(self, weight: Doubles) -> tuple[Index, Doubles]:
-        """Return triangles drawn by weight (f,), and a point on each, (3, n), from the centre of all [mm]."""
+        """Return random points on the triangles: index of the triangle (n,), and position (3, n) [mm].
+
+        weight : (f,) relative probability of each triangle
+        Positions are relative to the centre of the mesh.
+        """
         total = np.cumsum(weight)
-        triangle = np.searchsorted(total, (np.arange(_VIEW_SAMPLES) + 0.5) / _VIEW_SAMPLES * total[-1])
-        shares = np.sort(np.random.default_rng(0).random((2, _VIEW_SAMPLES)), axis=0)
+        triangle = np.searchsorted(total, (np.arange(_SURFACE_SAMPLES) + 0.5) / _SURFACE_SAMPLES * total[-1])
+        shares = np.sort(np.random.default_rng(0).random((2, _SURFACE_SAMPLES)), axis=0)
         shares = np.diff(shares, axis=0, prepend=0, append=1)
         points = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
 def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
-    """Return which pieces are wound inside out, (pieces,).
+    """Return the mask of connected components that are wound inside out.
 
-    Pieces are judged by the side that is seen from outside; those that show both sides alike, by the normals
-    of the file; and those that are not seen as most of the mesh is.
+    A component is judged by the side that is visible from outside. If both sides are equally visible, the
+    normals of the file decide; if the component is hidden, it is treated as most of the mesh.
 
-    doubtful : pieces that may be inside out
-    agreement : mean cosine between the normals of the file and those of the triangles of each piece
+    doubtful : mask of components that may be inside out
+    agreement : mean cosine between the file's normals and the triangles' normals, by component
     """
     balance, backs_prevail = surface.visible_balance(doubtful)
-    opposed = (agreement < _OPPOSED) & (balance <= _SEEN_BALANCE)
-    return np.asarray((balance < -_SEEN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
+    opposed = (agreement < _MAX_OPPOSITE_COSINE) & (balance <= _MIN_BALANCE)
+    return np.asarray((balance < -_MIN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
-    """Return the mesh with its uv charts moved by whole tiles and clamped, where they then fit in."""
+    """Return the mesh with uv charts moved by whole tiles and clamped, if they then fit into [0, 1]."""
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
     place = weld(np.column_stack((mesh.point, mesh.uv)))
     corners = place[mesh.triangles]
     links = np.column_stack((corners.ravel(), np.roll(corners, -1, axis=1).ravel()))
-    chart = _label(int(place.max()) + 1, links)[place]
+    chart = _label_components(int(place.max()) + 1, links)[place]
     low, high = (np.full((int(chart.max()) + 1, 2), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, chart, mesh.uv)
     np.maximum.at(high, chart, mesh.uv)
@@ -480,7 +515,7 @@ def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: lis
 
 
 def _uv_periods(material: FileMaterial | None) -> tuple[float, float]:
-    """Return the number of tiles along u and v by which uv can move without a change of the pictures."""
+    """Return the number of tiles along u and v after which a material's pictures repeat."""
     periods = [(1.0, 1.0)]
     for texture in material.textures.values() if material else ():
         if texture.mapping == (0, IDENTITY):

@@ -14,7 +14,7 @@ from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
-from dermis.formats.obj_materials import MtlTexture, read_library, with_materials
+from dermis.formats.obj_materials import MtlTexture, picture_name, read_library, with_materials
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
@@ -23,7 +23,7 @@ from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
 
 _RELIEF_ROLES = ("normal", "height")
-_GREY_TEST_SAMPLES = 256  # texels that are compared along a side
+_GREY_TEST_SAMPLES = 256  # compared texels along a side
 
 
 def read_obj_text(path: Path) -> str:
@@ -47,7 +47,7 @@ def read_obj(path: Path) -> MeshFile:
 def parse_obj(path: Path, text: str) -> MeshFile:
     """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
 
-    path : of the file, for errors and to find its .mtl
+    path : path of the file, for errors and to find its .mtl
     """
     geometry = parse_geometry(path, text)
     library = read_library(path, geometry.statements)
@@ -70,14 +70,14 @@ def obj_maps(
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, list[str]]:
-    """Return the maps of skin that has one material with untransformed pictures, and notes on maps left out.
+    """Return the maps of skin with a single material and untransformed pictures, and notes on omitted maps.
 
     The statements map_Kd, norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals,
     as many programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
     root of the roughness m.
 
     material : name of the material in the .mtl files
-    overridden : roles of maps that the caller sets otherwise; those of the file are not read
+    overridden : roles of maps that the caller sets by other means, and which are not read from the file
     height_mm, normal_y : see `load_maps`
     """
     textures = read_library(path, read_obj_text(path)).materials[material].textures
@@ -88,7 +88,7 @@ def obj_maps(
     remaining = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in textures):
         texture = textures[role]
-        file = find_referenced_file(path, texture.name)
+        file = find_referenced_file(path, picture_name(texture))
         if file is None:
             continue
         try:
@@ -100,7 +100,7 @@ def obj_maps(
 
 
 def _checked_texel_count(file: Path, remaining: int) -> int:
-    """Return the number of texels of a picture after checking it against the number still allowed."""
+    """Return the number of texels of a picture after checking that it is at most `remaining`."""
     width, height = read_size(file)
     if width * height > remaining:
         expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
@@ -113,7 +113,7 @@ def _load_map(
 ) -> dict[str, Any]:
     """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
 
-    The result has the role as key. For "bump" it is "height" for a grey picture, else "normal".
+    The result is {role: map}; the role "bump" becomes "height" for a grey picture, else "normal".
     """
     if role == "bump":
         role = "height" if _is_grey(file) else "normal"

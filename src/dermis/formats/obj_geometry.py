@@ -1,6 +1,6 @@
 """Geometry of OBJ files: polygons with positions, uv, normals and colours, and the group of each polygon.
 
-Statements of numbers are parsed as arrays, all others one by one.
+Numeric statements are parsed as arrays, all others individually.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Mask
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
     Polygons,
     check_polygon_sizes,
     missing_uv,
     refuse_without_faces,
-    without_small,
+    without_small_polygons,
 )
 from dermis.formats.text_files import listed, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
@@ -34,28 +35,52 @@ _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILI
 _LINE_FEED, _SPACE, _SLASH = b"\n /"
 _VERTEX_KINDS = ("v", "vt", "vn")
 _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
-_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # position and colour; in a statement
+_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers in a statement that are used (position, colour) and allowed
 _POLYPAINT = "#MRGB"
-READ_STATEMENTS = ("v", "vt", "vn", "f", "usemtl", "g", "o", "mtllib", _POLYPAINT)
-STATEMENTS_WITHOUT_MEANING = ("s", "mg")
-"""Statements that say nothing about the look of a mesh; `s` does if there are no normals (`_unread`)."""
-_USED_STATEMENTS = frozenset(READ_STATEMENTS) | {"s"}
-LEFT_OUT = {
-    **dict.fromkeys(("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "con", "vp"), "curves"),
-    **dict.fromkeys(("parm", "trim", "hole", "scrv", "sp", "end"), "curves"),
-    "l": "lines",
-    "p": "points",
-}
-"""What some statements describe that are left out with a note, as all unknown ones are."""
+_CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
+_LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
+OBJ_PROPERTIES = (
+    drawn("`v x y z`", "position", "v"),
+    drawn_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
+    drawn("`v x y z r g b`", "sRGB colour from 0 to 1; vertices without one are white"),
+    drawn_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
+    noted("further numbers in `v`"),
+    drawn(f"`{_POLYPAINT}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT),
+    noted(f"`{_POLYPAINT}` beside colours in `v`, or for another number of vertices"),
+    drawn("`vt u v`", "uv", "vt"),
+    noted("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
+    drawn("`vn`", "normals; missing ones are computed", "vn"),
+    drawn(
+        "`f` with `v`, `v/vt`, `v//vn`, `v/vt/vn`",
+        "polygons, divided into fans; indices count from 1, or backwards from the last vertex",
+        "f",
+    ),
+    drawn_with_note("`f` without `vt` beside others with it", "as skin without uv"),
+    noted("`f` of one or two corners"),
+    refused("`f` with an index of 0 or beyond the file", "the error names the line"),
+    drawn_with_note("`usemtl`, `g`", "groups; the note lists those of skin", "usemtl", "g"),
+    drawn("`o`", "groups where neither `usemtl` nor `g` has a name", "o"),
+    drawn("`mtllib`", "[materials](#materials-and-parts)", "mtllib"),
+    noted("`mtllib` of a missing file"),
+    noted("`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"),
+    no_effect("`s` in a file with normals", "the normals decide"),
+    no_effect("`mg`", "for curves only", "mg"),
+    *(noted(f"{kind}: {in_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT.items()),
+    noted("other statements"),
+)
+"""Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
+_USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}
+_WITHOUT_EFFECT = keys_of(OBJ_PROPERTIES, "no effect")
+_KINDS_LEFT_OUT = {key: kind for kind, keys in _LEFT_OUT.items() for key in keys}
 
 
 @dataclass(frozen=True)
 class ObjGeometry:
     """Geometry of an OBJ file.
 
-    pairs, pair : names of `usemtl` and `g` that occur together, and the index of the pair of each polygon
-    statements : the other statements, as text
-    notes : sentences on what of the file is mended or left out
+    pairs, pair : combinations of `usemtl` and `g` names, and the index of each polygon's combination
+    statements : non-numeric statements, as text
+    notes : sentences on content that was repaired or left out
     """
 
     polygons: Polygons
@@ -73,9 +98,9 @@ _Statement = tuple[int, str, str]
 class _Rows:
     """Statements of one kind without their first word.
 
-    line : (n,) line of each, counted from 0
+    line : (n,) line of each statement, counted from 0
     text : ASCII codes, with a line feed at the end of each statement
-    start : (n,) position of each in the text
+    start : (n,) position of each statement in the text
     """
 
     line: Index
@@ -102,12 +127,12 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
         notes += faults
     counts, corners = _faces(path, rows)
     pairs, pair = _groups(path, others, rows["f"].line)
-    counts, corners, kept, faults = without_small(counts, corners)
+    counts, corners, kept, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
     uv = np.column_stack((uv[:, 0], np.where(np.isnan(uv[:, 1]), 0.0, uv[:, 1])))
     polygons = Polygons(counts, corners, positions, uv, normals[:, :3], colours)
-    notes += [*faults, *missing_uv(polygons), *_unread(unread, others, has_normals=len(normals) > 0)]
+    notes += [*faults, *missing_uv(polygons), *_unread_notes(unread, others, has_normals=len(normals) > 0)]
     statements = "\n".join(f"{key} {value}" for _, key, value in others)
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
@@ -115,7 +140,7 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
 def _plain_text(text: str) -> str:
     """Join continued lines; remove blanks at the start of lines and comments at their end.
 
-    Lines keep their numbers.
+    The number of lines is unchanged.
     """
     if "\\\n" in text:
         text = _CONTINUED_LINE.sub(lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), text)
@@ -126,7 +151,7 @@ def _plain_text(text: str) -> str:
 
 
 def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement], dict[str, None]]:
-    """Return the statements of numbers by kind, the others that are used, and the first words of the rest."""
+    """Return numeric statements by kind, other statements that are used, and the first words of the rest."""
     data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
@@ -167,9 +192,10 @@ def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
 
 
 def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str = "") -> NoReturn:
-    """Refuse statement `index` of a kind.
+    """Raise the error for one of the statements in `rows`; the message names its line.
 
-    actual : clause, by default the text of the statement
+    index : index of the statement in `rows`
+    actual : clause that says what is wrong; by default, it quotes the statement
     """
     ends = np.append(rows.start[1:], len(rows.text))
     words = " ".join(rows.text[rows.start[index] : ends[index]].tobytes().decode(errors="replace").split())
@@ -180,7 +206,7 @@ def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str
 def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
-    A fourth number alone is a weight, by which the others are divided; three further ones are a colour.
+    One number after the position is a weight, by which the position is divided; three are a colour.
     """
     table, counts = _table(path, rows, "v")
     positions, notes = table[:, :3], list[str]()
@@ -211,7 +237,7 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
 
 
 def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return the first numbers of statements, (n, 6), NaN where there are fewer, and how many each has."""
+    """Return each statement's first six numbers (n, 6), NaN for missing ones, and its number of them (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))
@@ -222,7 +248,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     try:
         values = parse_numbers(rows.text, len(words), np.float64)
     except ValueError:
-        _refuse_line(path, rows, _first_fault(rows, np.float64), expected)
+        _refuse_line(path, rows, _first_non_numeric(rows, np.float64), expected)
     column = np.arange(_USED_NUMBERS)
     table = np.full((len(counts), _USED_NUMBERS), np.nan)
     given = column < counts[:, None]
@@ -230,7 +256,7 @@ def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
     return table, counts
 
 
-def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
+def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
     for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
         try:
@@ -241,7 +267,7 @@ def _first_fault(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
 
 
 def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
-    """Return the number of corners of each face, and the indices (c, 3) of each corner, -1 for none."""
+    """Return each face's number of corners, and indices of position, uv, normal (c, 3) per corner or -1."""
     faces = rows["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
@@ -257,7 +283,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
     try:
         values = parse_numbers(spaced.text, len(index_start), np.int64)
     except ValueError:
-        _refuse_line(path, faces, _first_fault(spaced, np.int64), "faces by whole numbers")
+        _refuse_line(path, faces, _first_non_numeric(spaced, np.int64), "faces by whole numbers")
     refuse_at(values == 0, index_start, "faces by indices from 1", "there is a 0")
     corner = np.searchsorted(corner_start, index_start, side="right") - 1
     slashes = np.cumsum(slash, dtype=np.int32)
@@ -278,7 +304,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
 def _groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
-    """Return the pairs of `usemtl` and `g` names, and the index of the pair of each face.
+    """Return the combinations of `usemtl` and `g` names, and the index of each face's combination.
 
     face_line : (n,) lines of the faces
 
@@ -298,13 +324,13 @@ def _groups(
     return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
 
 
-def _unread(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
+def _unread_notes(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
     """Return notes on statements that have no effect.
 
     keys : first words of unknown statements
     """
-    keys = [key for key in keys if key not in STATEMENTS_WITHOUT_MEANING]
-    names = [f"{key} ({LEFT_OUT[key]})" if key in LEFT_OUT else key for key in keys]
+    kinds = {key: _KINDS_LEFT_OUT.get(key) for key in keys if key not in _WITHOUT_EFFECT}
+    names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
     notes = [f"statements are left out: {listed(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}
     if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):

@@ -1,4 +1,4 @@
-"""Materials of OBJ files, as their .mtl files state them."""
+"""Materials of OBJ files, from their .mtl files."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dermis.base.file_properties import drawn, keys_of, no_effect, noted
 from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import IDENTITY, FileMaterial, Role, Texture, UvTransform, Wrap
@@ -28,8 +29,45 @@ TEXTURE_ROLES = {
     "bump": "bump",
 }
 """Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
-_NUMBERS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
-_WITHOUT_MEANING = ("newmtl", "ka", "map_ka", "illum", "sharpness", "map_aat")
+NUMERIC_STATEMENTS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
+"""Number of values that each numeric statement of a material needs, by the statement in lower case."""
+MTL_PROPERTIES = (
+    drawn("`newmtl`", "begins a material", "newmtl"),
+    drawn("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
+    noted("`Kd` beside `map_Kd`", "no note for greys that programs usually write there"),
+    drawn("`map_Kd`", "colour", "map_Kd"),
+    drawn("UDIM tiles: `face.<UDIM>.png`", "a picture for each tile"),
+    noted("`Ke`, `map_Ke`", "emission", "Ke", "map_Ke", other_parts="drawn"),
+    noted("`d`, `Tr`, `map_d`", "opacity, cut at one half", "d", "Tr", "map_d", other_parts="drawn"),
+    noted("`Pr`, `Ns`", "roughness; skin has a measured one", "Pr", "Ns", other_parts="drawn"),
+    drawn("`map_Pr`", "roughness, squared for skin", "map_Pr"),
+    noted("`Pm`, `map_Pm`", "metalness", "Pm", "map_Pm", other_parts="drawn"),
+    drawn("`map_Ks`", "specular strength, of a single skin material", "map_Ks", other_parts="noted"),
+    drawn("`norm`", "normal map", "norm"),
+    drawn(
+        "`bump`, `map_Bump` with normals",
+        "of a single skin material",
+        "bump",
+        "map_Bump",
+        other_parts="noted",
+    ),
+    noted("`bump`, `map_Bump` with heights", "drawn for skin with `--height-mm`"),
+    drawn("options `-s`, `-o`, `-clamp`", "placement of a picture"),
+    drawn("option `-bm`", "factor of normals and heights"),
+    noted(
+        "options `-mm`, `-cc`, `-boost`, `-imfchan`, `-blendu`, `-blendv`, `-t`",
+        "no note for values that change nothing, such as `-mm 0 1`",
+    ),
+    no_effect("options `-texres`, `-type`", "pictures keep their size; `-type` is for reflections"),
+    noted("a picture that is missing"),
+    no_effect("`Ka`, `map_Ka`", "ambient light follows from the lights", "Ka", "map_Ka"),
+    no_effect(
+        "`illum`, `sharpness`, `map_aat`", "settings of old renderers", "illum", "sharpness", "map_aat"
+    ),
+    noted("other statements, such as `Ks`, `Ni`, `disp`"),
+)
+"""Statements of .mtl files."""
+_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
 _PART_ROLES: Mapping[str, Role] = {
     "colour": "colour",
     "roughness": "roughness",
@@ -43,14 +81,15 @@ _OPTION = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|clamp\s+(?P<clamp>\S+)"
-    r"|mm\s+\S+\s+\S+"
-    r"|(?:blendu|blendv|boost|cc|imfchan|texres|type)\s+\S+)\s+",
+    r"|(?P<unused>mm\s+\S+\s+\S+|(?:blendu|blendv|boost|cc|imfchan)\s+\S+)"
+    r"|(?:texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
+_NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER)
 _UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
-_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # that programs write beside a picture of the colour
+_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
 _MAX_LINE = 4096  # characters
 _LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 _UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
@@ -63,9 +102,9 @@ class MtlTexture:
     key : statement that references it, such as map_Kd
     name : file name as written
     factor : option -bm, by which the map is multiplied [-]
-    scale, offset : options -s and -o of u and v, with v up
+    scale, offset : options -s and -o along u and v, where v points up
     wrap : continuation beyond the picture, by option -clamp
-    has_turbulence : whether the picture is distorted (-t)
+    unused : options without effect, such as the turbulence -t
     """
 
     key: str
@@ -74,7 +113,7 @@ class MtlTexture:
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     wrap: Wrap = "repeat"
-    has_turbulence: bool = False
+    unused: tuple[str, ...] = ()
 
     @property
     def transform(self) -> UvTransform:
@@ -89,9 +128,9 @@ class MtlTexture:
 class MtlMaterial:
     """Material of an .mtl file.
 
-    numbers : values of the statements in `_NUMBERS`
+    numbers : values by statement, see `NUMERIC_STATEMENTS`
     textures : pictures by role, see `TEXTURE_ROLES`
-    unread : other statements
+    unread : first words of all other statements
     """
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
@@ -115,7 +154,7 @@ class MaterialLibrary:
 def read_library(path: Path, text: str) -> MaterialLibrary:
     """Read the .mtl files that an OBJ file references.
 
-    path, text : of the OBJ file
+    path, text : path and text of the OBJ file
     """
     library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
     for listed in library_names(text)[: limits.MAX_LIBRARIES]:
@@ -152,11 +191,16 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key in TEXTURE_ROLES and value.strip():
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
-        elif key in _NUMBERS and len(numbers := _numbers(value)) >= _NUMBERS[key]:
+        elif key in NUMERIC_STATEMENTS and len(numbers := _numbers(value)) >= NUMERIC_STATEMENTS[key]:
             current.numbers[key] = numbers
-        elif key not in _WITHOUT_MEANING:
+        elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
     return materials
+
+
+def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
+    """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
+    return _UDIM.sub(str(udim), texture.name)
 
 
 def _numbers(value: str) -> list[float]:
@@ -176,7 +220,7 @@ def _parse_texture(key: str, statement: str) -> MtlTexture:
     name, factor = statement[start:], texture.factor
     match name.rsplit(maxsplit=2):
         case [first, last, number] if last.lower() == "-bm" and _NUMBER_PATTERN.fullmatch(number):
-            factor, name = float(number), first  # some programs write the option after the name
+            factor, name = float(number), first  # some programs write options after the name
     return replace(texture, name=name, factor=factor)
 
 
@@ -186,10 +230,12 @@ def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
     if option["clamp"]:
         return replace(texture, wrap="clamp" if option["clamp"].lower() == "on" else "repeat")
     if not option["transform"]:
-        return texture
+        words = " ".join((option["unused"] or "").lower().split())
+        unused = (f"-{words}",) if words and words not in _NEUTRAL_OPTIONS else ()
+        return replace(texture, unused=texture.unused + unused)
     which, numbers = option["transform"].lower(), [float(number) for number in option["numbers"].split()]
     if which == "t":
-        return replace(texture, has_turbulence=any(numbers))
+        return replace(texture, unused=(*texture.unused, *["-t"] * any(numbers)))
     u, v = (*numbers, 1.0 if which == "s" else 0.0)[:2]
     return replace(texture, scale=(u, v)) if which == "s" else replace(texture, offset=(u, v))
 
@@ -197,12 +243,12 @@ def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
 def with_materials(
     path: Path, parts: Sequence[MeshPart], library: MaterialLibrary
 ) -> tuple[list[MeshPart], tuple[FileMaterial, ...], list[str]]:
-    """Return the parts of an OBJ file with their materials, and notes on pictures that are not found.
+    """Return the parts of an OBJ file with their materials, and notes on missing pictures.
 
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
-    path : of the OBJ file
-    parts : their first name is that of the material, if it has one
+    path : path of the OBJ file
+    parts : mesh parts; the first name of a part's group is the name of its material, if that has one
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
@@ -225,7 +271,7 @@ def with_materials(
 
 
 def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
-    """Return the triangles of a part by the UDIM tile that they are in."""
+    """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
     if part.uv is None or not len(part.triangles):
         return [(_FIRST_UDIM, part)]
     column, row = np.floor(part.uv[part.triangles].mean(axis=1)).astype(int).T
@@ -239,13 +285,13 @@ def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
     return pieces
 
 
-def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMaterial:
+def _file_material(path: Path, name: str, material: MtlMaterial, udim: int) -> FileMaterial:
     """Return a material of an .mtl file."""
-    textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(own.unread)
+    textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(material.unread)
     skin_only = list[str]()
     row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
-    for role, texture in own.textures.items():
-        written = _UDIM.sub(str(udim), texture.name)
+    for role, texture in material.textures.items():
+        written = picture_name(texture, udim)
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
@@ -256,14 +302,13 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
             if written != texture.name:
                 c, f = c - column, f + row
             textures[_PART_ROLES[role]] = Texture(file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap))
-        if texture.has_turbulence:
-            unused.append(f"turbulence (-t) of {written}")
-    numbers = {key: values[0] for key, values in own.numbers.items()}
+        unused += [f"option {option} of {written}" for option in texture.unused]
+    numbers = {key: values[0] for key, values in material.numbers.items()}
     alpha = numbers.get("d", 1.0 - numbers.get("tr", 0.0))
     roughness = numbers.get("pr")
     if roughness is None and "ns" in numbers:
         roughness = (2.0 / (max(numbers["ns"], 0.0) + 2.0)) ** 0.25
-    colour = None if own.colour == GREY else own.colour
+    colour = None if material.colour == GREY else material.colour
     if "colour" in textures and colour is not None:
         unused += [] if len(set(colour)) == 1 and round(colour[0], 3) in _USUAL_KD else ["Kd beside map_Kd"]
         colour = None
@@ -275,7 +320,8 @@ def _file_material(path: Path, name: str, own: MtlMaterial, udim: int) -> FileMa
         alpha_mode="blend" if alpha < 1.0 or "opacity" in textures else "opaque",
         roughness=roughness,
         stated_metalness=numbers.get("pm", 1.0 if "metalness" in textures else 0.0),
-        emission=parse_colour(own.numbers.get("ke", [float("emission" in textures)] * 3)),
+        emission=parse_colour(material.numbers.get("ke", [float("emission" in textures)] * 3)),
+        normal_scale=material.textures["normal"].factor if "normal" in material.textures else 1.0,
         skin_only=tuple(skin_only),
         missing=missing,
         unused=tuple(dict.fromkeys(unused)),

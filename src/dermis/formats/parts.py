@@ -22,12 +22,12 @@ GREY: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Return whether the suffix of a file is that of glTF: .glb, .gltf or .vrm."""
+    """Return whether a file has a suffix of glTF: .glb, .gltf or .vrm."""
     return is_binary_gltf(path) or Path(path).suffix.lower() == ".gltf"
 
 
 def is_binary_gltf(path: str | Path) -> bool:
-    """Return whether the suffix of a file is that of binary glTF: .glb, or .vrm for avatars."""
+    """Return whether a file has a suffix of binary glTF: .glb, or .vrm for avatars."""
     return Path(path).suffix.lower() in (".glb", ".vrm")
 
 
@@ -43,9 +43,9 @@ def default_unit_mm(path: str | Path) -> float:
 class MaterialGroup:
     """Names and colour of a group of triangles.
 
-    names : of the material if it has one, then of the mesh or OBJ group
+    names : name of the material if it has one, then name of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
-    material : index in the materials of the file, -1 for none
+    material : index of the file's material, -1 for none
     """
 
     names: tuple[str, ...]
@@ -61,16 +61,16 @@ class MaterialGroup:
 class MeshPart:
     """Triangles of one group in the rest pose, with the units and the v direction of the file.
 
-    positions : (v, 3)
-    uv : (v, 2), or None
-    normals : (v, 3), or None
+    positions : (v, 3) vertex positions
+    uv : (v, 2) uv of the vertices, or None
+    normals : (v, 3) normals of the vertices, or None
     triangles : (f, 3) vertex indices
     targets : morph targets by name: displaced vertices (n,), and their displacements (n, 3) at weight 1
     bone, weight : (v, k) bones of each vertex, and weights that sum to 1; None without bones
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    separate : whether its vertices must not be welded to coincident vertices of other parts
+    separate : whether the vertices must not be welded to coincident vertices of other parts
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : (v, 2) further uv coordinates by their index in the file, which textures use
+    other_uv : additional uv sets (v, 2) that textures use, by their index in the file
     """
 
     group: MaterialGroup
@@ -92,7 +92,7 @@ class Bones:
     """Bone hierarchy of a file, parents before children.
 
     parent : (b,) index of each bone's parent, -1 for a root
-    local, world : (b, 4, 4) transforms at rest from a bone's space to its parent's, and to that of the file
+    local, world : (b, 4, 4) rest transforms from a bone's space to its parent's space, and to file space
     """
 
     names: tuple[str, ...]
@@ -105,11 +105,11 @@ class Bones:
 class MeshFile:
     """Geometry and bones of a mesh file.
 
-    weights : default weights of morph targets by name, without those of weight 0
+    weights : default weights of morph targets by name; weights of 0 are omitted
     materials : materials of the file, to which the groups refer
-    notes : sentences on what of the file is mended, replaced or left out, for users
+    notes : sentences for users on content that was repaired, replaced or left out
     unit_mm : length unit that the file states [mm], or None
-    axes : axes that the file states, or the defaults
+    axes : axes that the file states
     """
 
     parts: list[MeshPart]

@@ -1,4 +1,4 @@
-"""PLY files: the columns of their elements as arrays, and the mesh that these describe."""
+"""PLY files: elements as arrays of columns, and the mesh that they describe."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Numbers
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import FileMaterial, Texture
@@ -22,7 +23,7 @@ from dermis.formats.polygons import (
     check_polygon_sizes,
     missing_uv,
     refuse_without_faces,
-    without_small,
+    without_small_polygons,
 )
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text, listed, parse_numbers, run_starts
@@ -50,20 +51,48 @@ _TYPES = {
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 _FACE_NAMES = ("vertex_indices", "vertex_index")
-PROPERTIES_WITHOUT_MEANING = {
+_SCALAR_PREFIX = "scalar_"  # prefix that CloudCompare writes before names of scanner values
+_ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
+_SCANNER_VALUES = (
     *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
     *("time", "timestamp", "id", "index", "original_index", "scan_index"),
     *("label", "class", "classification", "segment"),
-}
-"""Properties that scanners and point tools write and that say nothing about the look of a surface."""
-_SCALAR_PREFIX = "scalar_"  # of such properties in CloudCompare
-_ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
+)
+PLY_PROPERTIES = (
+    drawn("vertex: `x`, `y`, `z`", "positions"),
+    drawn("vertex: `nx`, `ny`, `nz`", "normals; missing ones are computed"),
+    drawn(f"vertex: {'; '.join(map(in_code, UV_NAMES))}", "uv"),
+    drawn(
+        f"vertex: {'; '.join(map(in_code, COLOUR_NAMES))}",
+        "sRGB colours; integers of any size, or floats from 0 to 1",
+    ),
+    drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
+    noted(f"vertex: {in_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
+    drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "polygons"),
+    noted("faces of one or two corners"),
+    drawn("face: `texcoord`", "uv of the corners of a face"),
+    drawn_with_note("face: an empty `texcoord`", "as skin without uv"),
+    drawn_with_note("face: `texnumber`", "the picture of most faces is used for all"),
+    drawn("tristrips: `vertex_indices`", "strips of triangles, with -1 between them"),
+    drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
+    noted("`comment TextureFile NAME` of a missing file"),
+    no_effect(
+        f"values of scanners: {in_code(_SCANNER_VALUES)}, `{_SCALAR_PREFIX}...`",
+        "they do not describe the look of a surface",
+        *_SCANNER_VALUES,
+    ),
+    no_effect("other comments"),
+    noted("other elements and properties"),
+    refused("a file without faces", "a cloud of points"),
+)
+"""Elements and properties of PLY files."""
+_WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
 _HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
 _STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=True))
 
 
 class _Property(NamedTuple):
-    """Property of an element; a list if the type of its length is not ""."""
+    """Property of an element; a list if `length_dtype` is not ""."""
 
     name: str
     dtype: str
@@ -78,7 +107,7 @@ class _Element:
 
 
 class _List(NamedTuple):
-    """Lists of all rows of an element: their lengths (n,), and the items of all of them."""
+    """List property of an element: lengths of the lists (n,), and the concatenated items."""
 
     lengths: Index
     items: Numbers
@@ -88,7 +117,7 @@ class _Header(NamedTuple):
     """Header of a PLY file.
 
     order : byte order, "=" for text
-    size : of the header in bytes
+    size : size of the header in bytes
     pictures : file names of pictures, in comments
     """
 
@@ -99,14 +128,14 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _List"]):
-    """Columns of an element by name; notes which of them are used."""
+    """Columns of an element by name; also records which columns were used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
     def take(self, names: Sequence[str]) -> Numbers | None:
-        """Return properties that are no lists side by side, (n, k); None unless all of them exist."""
+        """Return scalar properties as columns of an array (n, k); None unless all of them exist."""
         columns = [column for name in names if isinstance(column := self.get(name), np.ndarray)]
         if not columns or len(columns) < len(names):
             return None
@@ -114,11 +143,11 @@ class _Columns(dict[str, "Numbers | _List"]):
         return np.column_stack(columns)
 
     def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
-        """Return the first of several sets of properties that exists, (n, k)."""
+        """Return the first existing set of properties as an array (n, k)."""
         return next((one for names in choices if (one := self.take(names)) is not None), None)
 
     def take_list(self, names: Sequence[str]) -> _List | None:
-        """Return the first list property of some names that exists."""
+        """Return the first existing list property among some names."""
         for name in names:
             if isinstance(column := self.get(name), _List):
                 self.used.add(name)
@@ -143,13 +172,13 @@ def read_ply(path: Path) -> MeshFile:
     normals = vertices.take(("nx", "ny", "nz"))
     colours, notes = _colours(vertices)
     corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
-    counts, corners, _, faults = without_small(counts, corners)
+    counts, corners, _, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
     picture, unused = _picture(header.pictures, faces.take(("texnumber",)))
-    notes += [*faults, *missing_uv(polygons), *unused, *_unread(tables)]
+    notes += [*faults, *missing_uv(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
         materials = (FileMaterial(textures={"colour": Texture(file)}),)
@@ -192,9 +221,9 @@ def _read_header(path: Path, data: bytes) -> _Header:
 
 
 def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
-    """Return an element without its properties; an implausible count for a mesh or the file size is refused.
+    """Return an element without its properties; refuse a count too large for a mesh or for the file's size.
 
-    words : after "element"
+    words : words after "element"
     """
     name, count = words if len(words) == 2 else ("", "")
     if not (count.isdecimal() and len(count) < 12):
@@ -208,7 +237,7 @@ def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) ->
 def _declared_property(path: Path, words: Sequence[str]) -> _Property:
     """Return a property.
 
-    words : after "property"
+    words : words after "property"
     """
     is_list = words[:1] == ["list"]
     kinds = words[is_list:-1]
@@ -245,7 +274,7 @@ class _ElementReader:
     """Reader of the rows of an element.
 
     order : byte order
-    is_text : whether the data are numbers of a text as float64, one for each value
+    is_text : whether the data are the numbers of a text file, as float64
     """
 
     path: Path
@@ -257,7 +286,7 @@ class _ElementReader:
     def read(self, position: int) -> tuple[_Columns, int]:
         """Return the columns of the element, and the position after its last row.
 
-        position : of the first row [bytes]
+        position : position of the first row [bytes]
         """
         columns, properties = _Columns(), self.element.properties
         lists = [one for one in properties if one.length_dtype]
@@ -281,7 +310,7 @@ class _ElementReader:
         return np.dtype(np.float64 if self.is_text else self.order + name)
 
     def _fixed_size(self, properties: Sequence[_Property]) -> int:
-        """Return the size of properties without the items of lists [bytes]."""
+        """Return the size of a row's properties without the items of lists [bytes]."""
         return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
 
     def _check_end(self, end: int) -> None:
@@ -289,14 +318,15 @@ class _ElementReader:
             actual = f"it ends within its elements named {self.element.name!r}"
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
-    def _gather(self, start: Index, count: Index, dtype: str, size: Index) -> Numbers:
-        """Return `count` values of one type from each of the positions `start`, concatenated.
+    def _gather(self, start: Index, count: Index, dtype: str, row_size: Index) -> Numbers:
+        """Return the values of a property in all rows, concatenated.
 
-        size : of each row [bytes]
+        start, count : (n,) position of each row's first value [bytes], and number of its values
+        row_size : (n,) size of each row [bytes]
         """
         stored = self._dtype(dtype)
-        if (size == size[0]).all() and (count == count[0]).all():
-            shape, strides = (len(count), int(count[0])), (int(size[0]), stored.itemsize)
+        if (row_size == row_size[0]).all() and (count == count[0]).all():
+            shape, strides = (len(count), int(count[0])), (int(row_size[0]), stored.itemsize)
             values = np.ndarray(shape, stored, self.data, int(start[0]), strides).reshape(-1)
         else:
             row, item = expand_runs(np.zeros_like(count), count)
@@ -315,16 +345,16 @@ class _ElementReader:
                 skipped = []
         if not steps:
             return []
-        rest, count = self._fixed_size(skipped), self.element.count
-        lengths, end = self._walk(position, steps, rest, 1)
+        trailing_bytes, count = self._fixed_size(skipped), self.element.count
+        lengths, end = self._read_rows(position, steps, trailing_bytes, 1)
         if not self._is_uniform(position, end - position, steps, lengths[0]):
-            lengths, _ = self._walk(position, steps, rest, count)
+            lengths, _ = self._read_rows(position, steps, trailing_bytes, count)
         return list(np.broadcast_to(lengths, (count, len(steps))).T)
 
     def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
         """Return whether the lists of all rows have the lengths of the first row.
 
-        size : of the first row [bytes]
+        size : size of the first row [bytes]
         """
         start = position + size * np.arange(self.element.count)
         if start[-1] + size > len(self.data):
@@ -337,10 +367,12 @@ class _ElementReader:
             start = start + step.length.itemsize + length * step.item_size
         return True
 
-    def _walk(self, position: int, steps: Sequence[_ListStep], rest: int, rows: int) -> tuple[Index, int]:
-        """Return the lengths of the lists of some rows, (rows, lists), and the position after these rows.
+    def _read_rows(
+        self, position: int, steps: Sequence[_ListStep], trailing_bytes: int, rows: int
+    ) -> tuple[Index, int]:
+        """Read rows in sequence; return the lengths of their lists (rows, lists), and the next position.
 
-        rest : size of the properties after the last list [bytes]
+        trailing_bytes : size of the properties after the last list [bytes]
         """
         lengths, data, end = [], memoryview(self.data.tobytes()), len(self.data)
         readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in steps]
@@ -355,7 +387,7 @@ class _ElementReader:
                     (length,) = unpack(data, position)
                     lengths.append(length)
                     position += length_size + int(length) * item_size
-                position += rest
+                position += trailing_bytes
         except struct.error:
             position = end + 1
         self._check_end(end + 1 if lengths and min(lengths) < 0 else position)
@@ -363,7 +395,7 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """What precedes a list since the one before, the type of its length, and the size of an item [bytes]."""
+    """List in a row: bytes between the previous list and this one, type of its length, size of an item."""
 
     skip: int
     length: np.dtype[Any]
@@ -371,9 +403,9 @@ class _ListStep(NamedTuple):
 
 
 def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tuple[Index, Index]:
-    """Return the numbers of corners of faces and of the triangles of strips, and the vertex of each corner.
+    """Return the number of corners of each face and strip triangle, and the vertex of each corner.
 
-    points : number of vertices
+    points : number of vertices in the file
     """
     own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
     if faces and own is None:
@@ -392,7 +424,7 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
 
 
 def _strip_triangles(strips: _List) -> Index:
-    """Return the triangles (t, 3) of strips, in which -1 starts another strip; every second one is turned."""
+    """Return the triangles (t, 3) of strips that are separated by -1; every second triangle is reversed."""
     index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
@@ -406,9 +438,9 @@ def _strip_triangles(strips: _List) -> Index:
 def _uv(
     path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv (t, 2), and those of each corner, -1 for none.
+    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 for none.
 
-    counts, index : numbers of corners of polygons, and the vertex of each corner
+    counts, index : number of corners of each polygon, and the vertex of each corner
     """
     wedges = faces.take_list(("texcoord",))
     if wedges is None:
@@ -440,10 +472,10 @@ def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
 
 
 def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None, list[str]]:
-    """Return the picture that most faces have, and a note on the others.
+    """Return the picture that most faces use, and a note on the other pictures.
 
-    names : of the pictures
-    numbers : (n, 1) index of the picture of each face, or None
+    names : names of the pictures
+    numbers : (n, 1) picture index of each face, or None
     """
     if not names:
         return None, []
@@ -455,7 +487,7 @@ def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None,
     return chosen, [f"of several pictures {chosen} is used; left out: {listed(others)}"] if others else []
 
 
-def _unread(tables: Mapping[str, _Columns]) -> list[str]:
+def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
     """Return a note on elements and properties that have no effect."""
     ignored = [name for name, columns in tables.items() if not columns.used]
     ignored += [
@@ -463,7 +495,7 @@ def _unread(tables: Mapping[str, _Columns]) -> list[str]:
         for element, columns in tables.items()
         for name in columns
         if columns.used
-        and name not in columns.used | PROPERTIES_WITHOUT_MEANING
+        and name not in (*columns.used, *_WITHOUT_EFFECT)
         and not name.startswith(_SCALAR_PREFIX)
     ]
     return [f"these are left out: {listed(ignored)}"] if ignored else []

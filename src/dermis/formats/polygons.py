@@ -38,16 +38,16 @@ class Polygons:
     colours: Doubles | None = None
 
     def has_uv(self) -> Mask:
-        """Return whether all corners of each polygon have uv, (n,)."""
+        """Return the mask (n,) of polygons whose corners all have uv."""
         return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
 
     def parts(self, groups: Sequence[MaterialGroup], group: Index, order: TriangleOrder) -> list[MeshPart]:
         """Return a mesh part for each group with polygons, in the order of its first polygon.
 
-        groups, group : groups, and (n,) index of that of each polygon
-        order : of the triangles, see `triangulate`
+        groups, group : groups, and (n,) group index of each polygon
+        order : order of the triangles, see `triangulate`
 
-        Polygons without uv become parts of their own, whose uv is None.
+        Polygons without uv become separate parts, whose uv is None.
         """
         keys, first, key = np.unique(2 * group + ~self.has_uv(), return_index=True, return_inverse=True)
         by_first = np.argsort(first)
@@ -61,7 +61,7 @@ class Polygons:
         return [self._part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
 
     def _part(self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder) -> MeshPart:
-        """Return the part of some polygons: one vertex for each combination of position, normal and uv."""
+        """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():
             uv = np.zeros_like(uv)
@@ -101,10 +101,11 @@ def check_polygon_sizes(path: Path, counts: Index) -> None:
     limits.check_limit(path, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
 
 
-def without_small(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
-    """Leave out polygons of fewer than three corners.
+def without_small_polygons(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
+    """Remove polygons of fewer than three corners.
 
-    Returns the numbers of corners, the corners, which polygons are left, and a note if some are left out.
+    Returns `counts` and `corners` of the remaining polygons, the mask (n,) that selects them, and a list with
+    a note if any were removed.
     """
     kept = counts >= 3
     if kept.all():
@@ -116,7 +117,7 @@ def without_small(counts: Index, corners: Index) -> tuple[Index, Index, Mask, li
 def refuse_without_faces(path: Path, points: int) -> NoReturn:
     """Refuse a file without faces.
 
-    points : number of its points
+    points : number of points in the file
     """
     actual = "it is a cloud of points without faces" if points else "it has none"
     advice = "Make a mesh of the points first (in MeshLab: Filters > Remeshing)"
@@ -124,9 +125,9 @@ def refuse_without_faces(path: Path, points: int) -> NoReturn:
 
 
 def triangulate(counts: Index, order: TriangleOrder) -> tuple[Index, Index]:
-    """Divide polygons into fans; return the corners (f, 3) of triangles, and the pairs (q, 2) that are quads.
+    """Triangulate polygons as fans; return the corners of triangles (f, 3), and the halves of quads (q, 2).
 
-    counts : (n,) number of corners of each polygon, which are numbered consecutively
+    counts : (n,) number of corners of each polygon; corners are numbered consecutively
     order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, their second
         halves, and all other polygons; files of quads alone are always ordered by kind
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -14,30 +13,15 @@ from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file, parsing
 from dermis.formats import size_limits as limits
-from dermis.formats.gltf.triangles import read_gltf
 from dermis.formats.mesh_checks import check_arrays, check_counts
-from dermis.formats.obj import read_obj
+from dermis.formats.mesh_formats import find_format, mesh_suffixes
 from dermis.formats.parts import MeshFile, MeshPart
-from dermis.formats.ply import read_ply
-from dermis.formats.stl import read_stl
-from dermis.formats.usd.read import USD_SUFFIXES, read_usd
 from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
-"""Largest valid absolute uv coordinate; larger ones mean a damaged file, not tiles."""
+"""Largest valid absolute uv coordinate; larger ones are a sign of a damaged file, not of many tiles."""
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
-
-
-MESH_READERS: dict[str, Callable[[Path], MeshFile]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".vrm": read_gltf,
-    ".obj": read_obj,
-    ".ply": read_ply,
-    ".stl": read_stl,
-    **dict.fromkeys(USD_SUFFIXES, read_usd),
-}
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
 _OTHER_PROGRAMS = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
 _SUFFIX_ADVICE = {
@@ -50,7 +34,7 @@ _SUFFIX_ADVICE = {
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
-    """Join mesh parts into one; vertices without normals get NaN."""
+    """Join mesh parts into one; the normals of vertices that have none become NaN."""
     uv = [_part_uv(part, source) for part in parts]
     for part, part_uv in zip(parts, uv, strict=True):
         check_arrays(part.positions, part_uv, part.triangles, source)
@@ -81,23 +65,23 @@ def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
 
 
 def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
-    """Return the vertex colours of all parts, white for parts without; None if no part has any."""
+    """Join the vertex colours of all parts; parts without colours become white. None if no part has any."""
     if all(part.colours is None for part in parts):
         return None
     return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in parts])
 
 
 def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
-    """Return further uv coordinates of all parts, 0 for parts without."""
+    """Join an additional uv set of all parts, with zeros for parts that lack it."""
     return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
 
 
 def select_vertices(part: MeshPart, used: Index) -> MeshPart:
-    """Return a mesh part with some of its vertices, their morph targets and bones.
+    """Return a mesh part with the selected vertices, their morph targets and bones.
 
     used : (n,) indices of the vertices; they may repeat
 
-    Triangles, uv and normals are not changed.
+    Triangles, uv and normals still refer to the vertices of `part`.
     """
     order, count = np.argsort(used, kind="stable"), np.bincount(used, minlength=len(part.positions))
     first, targets = np.cumsum(count) - count, {}
@@ -157,16 +141,16 @@ def read_mesh_file(source: Path) -> MeshFile:
 
     Raises DermisError for every fault of the file.
     """
-    reader = MESH_READERS.get(source.suffix.lower())
-    if reader is None:
+    mesh_format = find_format(source)
+    if mesh_format is None:
         actual = f"the suffix is {source.suffix!r}"
         advice = _SUFFIX_ADVICE.get(source.suffix.lower(), "Export it as one of these")
-        refuse(source, f"a mesh file ({', '.join(MESH_READERS)})", actual, advice)
+        refuse(source, f"a mesh file ({', '.join(mesh_suffixes())})", actual, advice)
     if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     # readers may raise any exception for damaged files
     with parsing(source, f"a valid {source.suffix} mesh", Exception):
-        mesh_file = reader(source)
+        mesh_file = mesh_format.read(source)
         parts = [_without_unused_vertices(part) for part in mesh_file.parts if len(part.triangles)]
     if not parts:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
@@ -182,11 +166,11 @@ def read_mesh_file(source: Path) -> MeshFile:
 
 
 def _without_unused_vertices(part: MeshPart) -> MeshPart:
-    """Return a mesh part without the vertices that no triangle uses, whose numbers may be invalid."""
+    """Return a mesh part without unused vertices, whose coordinates may be invalid."""
     count, uv, normals = len(part.positions), part.uv, part.normals
     damaged = any(array is not None and len(array) != count for array in (uv, normals))
     if damaged or part.triangles.min() < 0 or part.triangles.max() >= count:
-        return part  # which is refused
+        return part  # `join_parts` refuses it
     used, triangles = compact_vertices(part.triangles)
     if len(used) == count:
         return part

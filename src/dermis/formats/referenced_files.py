@@ -14,10 +14,10 @@ _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer pa
 def find_referenced_file(path: Path, name: str) -> Path | None:
     """Return the existing file that a mesh file references by name, or None.
 
-    path : of the mesh file
-    name : relative to its folder; Windows separators are accepted
+    path : path of the mesh file
+    name : name relative to the folder of the mesh file; Windows separators are accepted
 
-    A name outside the folder is reduced to its last component, which is searched in the folder.
+    If the name leads outside the folder, its last component is looked up in the folder.
     """
     named = PureWindowsPath(name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):
@@ -30,7 +30,7 @@ def find_referenced_file(path: Path, name: str) -> Path | None:
 def resolve_uri(path: Path, uri: str) -> Path:
     """Return the path of a file that a glTF file references by a relative URI; it need not exist.
 
-    Raises DermisError for a file outside the folder, also through a link.
+    Raises DermisError for a file outside the folder, even if a link in the folder leads to it.
     """
     file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:

@@ -13,14 +13,15 @@ from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
 SPLIT_TOLERANCE_MM = 0.01
-"""Coincident vertices that a target separates by more, such as those of touching lips, are two points."""
-_MAX_COINCIDENT = 64
+"""Coincident vertices that a morph target moves further apart, such as those of touching lips, are separate
+points."""
+_MAX_COINCIDENT = 64  # vertices at one position that move differently
 _WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
-_MIN_DISPLACEMENT_MM = 1e-4  # rounding errors of vertices that do not move
+_MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
 def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
-    """Return point indices (v,) in which coincident vertices become separate points if they move differently.
+    """Return point indices (v,) in which coincident vertices that move differently are separate points.
 
     point : (v,) index of the point of each vertex, welded by position
     part : vertices with their morph targets and bone weights
@@ -44,7 +45,7 @@ def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) 
 
 
 def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
-    """Return for each pair of vertices whether some morph target moves them apart, (n,).
+    """Return the mask (n,) of vertex pairs that some morph target moves apart.
 
     first, second : (n,) vertex indices of the pairs
     linear : (3, 3) matrix from the file's space to the head's [mm]
@@ -58,7 +59,7 @@ def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles
 
 
 def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
-    """Return for each pair of vertices whether their bone weights differ, (n,).
+    """Return the mask (n,) of vertex pairs with different bone weights.
 
     first, second : (n,) vertex indices of the pairs
     """

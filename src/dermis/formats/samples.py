@@ -35,7 +35,7 @@ class Sample:
 
     kind : "head" for a mesh with maps, "environment" for a latitude-longitude picture
     folder : name of its folder below DERMIS_DATA, or below the cache
-    files : by role: mesh, colour, specular, normal, height, licence, or environment
+    files : files by role: mesh, colour, specular, normal, height, licence, or environment
     licence, attribution : terms of use, and the authors to credit
     unit_mm : length of one unit of the mesh [mm]
     v_origin : edge of the maps where v = 0, "top" or "bottom"
@@ -74,10 +74,10 @@ def fetch_sample(name: str) -> dict[str, Path]:
 
     If DERMIS_DATA is set, that folder must contain the files and nothing is downloaded.
 
-    Raises DermisError for an unknown sample, without network, and for files with another hash.
+    Raises DermisError for an unknown sample, without a network, and for files with unexpected hashes.
     """
     sample = _find_sample(name)
-    paths = {role: _folder(sample) / file.name for role, file in sample.files.items()}
+    paths = {role: _sample_folder(sample) / file.name for role, file in sample.files.items()}
     missing = [role for role, file in sample.files.items() if not _has_known_hash(paths[role], file)]
     if missing and _data_folder():
         _refuse_data(paths[missing[0]])
@@ -92,7 +92,8 @@ def is_available(name: str) -> bool:
     name : a key of `SAMPLES`
     """
     sample = _find_sample(name)
-    return all(_has_known_hash(_folder(sample) / file.name, file) for file in sample.files.values())
+    folder = _sample_folder(sample)
+    return all(_has_known_hash(folder / file.name, file) for file in sample.files.values())
 
 
 def _find_sample(name: str) -> Sample:
@@ -105,7 +106,7 @@ def _data_folder() -> str:
     return os.environ.get(DATA_VARIABLE, "")
 
 
-def _folder(sample: Sample) -> Path:
+def _sample_folder(sample: Sample) -> Path:
     base = _data_folder() or cache_folder() / "samples"
     return Path(base) / sample.folder
 
@@ -131,7 +132,7 @@ def _sha256(path: Path, size: int, mtime_ns: int) -> str:
 def _download(sample: Sample, roles: list[str]) -> None:
     import pooch
 
-    folder = _folder(sample)
+    folder = _sample_folder(sample)
     for count, role in enumerate(roles):
         file, progress = sample.files[role], _DownloadProgress(sample.files[role].name)
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
@@ -188,5 +189,5 @@ def _refuse_download(sample: Sample, roles: list[str], fault: Exception) -> NoRe
     raise DermisError(
         f"sample {sample.name!r}: expected to download it, but {reason}. "
         f"Download these files manually:\n{urls}\n"
-        f"into {_folder(sample)}, or into FOLDER/{sample.folder} with {DATA_VARIABLE}=FOLDER set."
+        f"into {_sample_folder(sample)}, or into FOLDER/{sample.folder} with {DATA_VARIABLE}=FOLDER set."
     ) from fault

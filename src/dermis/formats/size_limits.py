@@ -10,27 +10,27 @@ DECIMATE_ADVICE = "Decimate it (in Blender: Modifiers > Decimate)"
 MAX_FILE_BYTES = 512 << 20
 """Largest mesh file, and largest total size of the buffers of a glTF file."""
 MAX_TRIANGLES = 1_250_000
-"""Largest number of triangles of all groups; the parametric human has at most 856,064."""
+"""Largest total number of triangles in all groups; the parametric human has at most 856,064."""
 MAX_VERTICES = 1_250_000
 MAX_CORNERS = 4096
 """Largest number of corners of a polygon."""
 MAX_GROUPS = 4096
 """Largest number of materials, groups, or primitives of a glTF scene."""
 MAX_RELIEF_MM = 1.0
-"""Largest relief of one grey level of an 8-bit height map."""
+"""Largest height difference of one grey level of an 8-bit height map [mm]."""
 MAX_NODES, MAX_NODE_DEPTH = 1 << 16, 1024
 MAX_INFLUENCES = 16
-"""Largest number of bones of a vertex, of which the four with the largest weights are used."""
+"""Largest number of bones that a vertex may have; only the four with the largest weights are used."""
 MAX_DISPLACEMENTS = 6_000_000
-"""Largest number of displaced vertices of all targets."""
+"""Largest number of displaced vertices, summed over all morph targets."""
 MAX_BONES = 2048
 MAX_TARGETS = 4096
 MAX_CHANNELS = 1 << 14
 """Largest number of curves of an animation clip."""
 MAX_ACCESSOR_COMPONENTS = 1 << 27
-"""Largest number of accessor components that are read; each use of an accessor counts, as 512 or more."""
+"""Largest number of accessor components that are read in total; each read counts as at least 512."""
 MAX_JSON_VALUES = 1 << 21
-"""Largest number of values in the JSON of a glTF file."""
+"""Largest number of values in the JSON tree of a glTF file."""
 MAX_MTL_BYTES = 4 << 20
 """Largest total size of the .mtl files of an OBJ file."""
 MAX_LIBRARIES = 64

@@ -12,12 +12,12 @@ from dermis.mesh.geometry import triangle_areas
 
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 SKIN_WORDS = ("skin", "skins", "epidermis", "flesh")
-"""Words that make a group skin; all other groups are then not skin."""
+"""Words in the names of skin groups; if any group has such a word, groups without one are not skin."""
 BODY_WORDS = (
     *("face", "head", "body", "torso", "neck", "ear", "ears", "nose", "lip", "lips", "nostril", "nostrils"),
     *("arm", "arms", "hand", "hands", "leg", "legs", "foot", "feet", "limbs", "finger", "fingers", "forearm"),
 )
-"""Words that make a group skin in files where no group has one of `SKIN_WORDS`."""
+"""Words in the names of skin groups, for files in which no group has one of `SKIN_WORDS`."""
 OTHER_WORDS = (
     *("hair", "hairs", "brow", "brows", "eyebrow", "eyebrows", "lash", "lashes", "eyelash", "eyelashes"),
     *("beard", "mustache", "moustache", "scalp", "eye", "eyes", "eyeball", "eyeballs", "iris", "cornea"),
@@ -53,23 +53,23 @@ OTHER_WORDS = (
     *("earring", "earrings", "necklace", "jewelry", "jewellery", "nail", "nails", "accessory", "accessories"),
     *("eyeline", "eyeliner", "leather", "moleskin", "sheepskin", "horn", "horns", "background", "plinth"),
 )
-"""Words of groups that are never skin, unless another word of the group is in `SKIN_WORDS`."""
+"""Words in the names of groups that are not skin, unless another word of the name is in `SKIN_WORDS`."""
 HEAD_REGION = 0.3
-"""Part of a standing figure's height, from the top, in which the skin of the head is looked for [-]."""
-_MIN_COVERAGE = 0.1  # of the area of the head region
+"""Top fraction of a mesh's height that counts as the head when its skin is identified by area [-]."""
+_MIN_COVERAGE = 0.1  # smallest fraction of the head's area that a part covers if it is skin
 
 
 def choose_skin(
     parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
 ) -> list[bool]:
-    """Return for each mesh part whether it is skin.
+    """Return whether each mesh part is skin.
 
-    The first of these rules that applies to a part decides: materials that scatter light; names with words of
-    `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `OTHER_WORDS`; parts without a word of
-    `OTHER_WORDS` that cover a tenth of the head or more. If none applies, all parts are skin.
+    The first of these rules that applies to any part decides: parts whose materials scatter light; names with
+    words of `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `OTHER_WORDS`; parts that cover at
+    least a tenth of the head and have no word of `OTHER_WORDS`. If no rule applies, all parts are skin.
 
     groups : names of the parts
-    scatters : whether the file states that light scatters below the surface of a part
+    scatters : whether the file states that light scatters below the surface, for each part
     """
     words = [_words(group) for group in groups]
     is_other = [bool(own & set(OTHER_WORDS)) for own in words]
@@ -87,13 +87,13 @@ def _words(group: MaterialGroup) -> set[str]:
 
 
 def _has_skin_word(words: set[str]) -> bool:
-    """Return whether a word is that of skin, or a compound such as faceskin."""
+    """Return whether any word means skin, alone or in a compound such as faceskin."""
     own = {word for word in words if word.endswith(("skin", "skins")) and word not in OTHER_WORDS}
     return bool(own | (words & set(SKIN_WORDS)))
 
 
 def _covers_head(parts: Sequence[MeshPart], is_other: Sequence[bool]) -> list[bool]:
-    """Return for each mesh part whether it covers a notable fraction of the area of the head."""
+    """Return whether each mesh part covers a notable fraction of the head's area."""
     heights = np.concatenate([part.positions[:, 1] for part in parts])
     lowest = heights.max() - HEAD_REGION * np.ptp(heights)
     area = np.zeros(len(parts))
@@ -105,7 +105,7 @@ def _covers_head(parts: Sequence[MeshPart], is_other: Sequence[bool]) -> list[bo
 
 
 def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
-    """Return the note on what was taken for skin, and how to change it; empty for a single group."""
+    """Return a note on the groups treated as skin, and how to change this; empty for a single group."""
     names = [group.names[0] for group in groups]
     skin = list(dict.fromkeys(name for name, own in zip(names, is_skin, strict=True) if own))
     other = [name for name in dict.fromkeys(names) if name not in skin]

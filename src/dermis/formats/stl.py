@@ -9,6 +9,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, no_effect, noted
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart
@@ -17,6 +18,14 @@ from dermis.formats.text_files import parse_numbers
 _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CORNER_LINE = re.compile(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
+
+STL_PROPERTIES = (
+    drawn("corners of triangles", "coincident ones become one vertex"),
+    no_effect("normals of triangles", "they are computed from the corners"),
+    noted("attribute bytes", "colours of triangles in some programs"),
+    no_effect("name or header", "names the part or the program"),
+)
+"""Properties of STL files."""
 
 
 def read_stl(path: Path) -> MeshFile:
@@ -36,7 +45,7 @@ def read_stl(path: Path) -> MeshFile:
 def _binary_corners(path: Path, data: bytes, count: int) -> tuple[Doubles, tuple[str, ...]]:
     """Return the corners (3f, 3) of a binary file, and notes.
 
-    count : of triangles that its header states
+    count : number of triangles that the header states
     """
     _check_count(path, count)
     if len(data) < _HEADER_BYTES + count * _RECORD.itemsize:

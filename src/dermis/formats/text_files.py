@@ -21,9 +21,9 @@ T = TypeVar("T", np.float64, np.int64)
 
 
 def decode_text(data: bytes) -> str:
-    """Return a text with line feeds as its only line ends.
+    """Decode a text, with line feeds as the only line ends.
 
-    data : UTF-8, or UTF-16 after its byte order mark; lines that are not UTF-8 are Latin-1
+    data : UTF-8, or UTF-16 with a byte order mark; lines that are not valid UTF-8 are read as Latin-1
 
     Raises ValueError for damaged UTF-16.
     """
@@ -46,14 +46,14 @@ def _decode_line(line: bytes) -> str:
 
 
 def listed(names: Collection[str]) -> str:
-    """Return names of a file for a message, without those beyond the first few."""
+    """Return the first eight names as text for a message, with the number of further names."""
     first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
     shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
 def run_starts(inside: Mask) -> Index:
-    """Return the positions of the first elements of runs of True in an array (n,)."""
+    """Return the index at which each run of consecutive True values in a mask (n,) starts."""
     first = inside.copy()
     first[1:] &= ~inside[:-1]
     return np.flatnonzero(first)
@@ -63,11 +63,11 @@ def parse_numbers(text: Bytes, count: int, dtype: type[T]) -> NDArray[T]:
     """Return the numbers in a text, separated by blanks and line feeds.
 
     text : ASCII codes
-    count : of the words in the text
+    count : number of words in the text
 
     Raises ValueError if a word is not a number.
     """
-    # NumPy parses blanks alone as a number, and some versions only warn of a word that is none
+    # NumPy parses blanks alone as a number, and some versions only warn about words that are not numbers
     try:
         values = np.fromstring(text.tobytes(), dtype, sep=" ") if count else np.empty(0, dtype)
     except (ValueError, DeprecationWarning):

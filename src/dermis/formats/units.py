@@ -18,20 +18,21 @@ from dermis.mesh.skull import MAX_ELONGATION, is_standing_figure, principal_size
 WITHOUT_UNIT = (".obj", ".ply", ".stl")
 """Suffixes of formats that do not state a unit."""
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
-_SIZE_MM = (1.0, 3000.0)  # smallest and largest that is accepted
-_SIZE_IN_MM = (100.0, 1000.0)  # of files whose unit is taken to be the millimetre
+_SIZE_MM = (1.0, 3000.0)  # smallest and largest accepted size
+_SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit is assumed to be the millimetre
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
-_FLATNESS = 0.25  # thickness relative to length below which a mesh is a piece of skin or a hand
-_INCH, _INCH_PENALTY = 25.4, {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # of the size's logarithm
-_EXPORTED_UNITS_MM = (1.0, 10.0)  # that programs write although a format states metres
-_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # sizes of figures and of others
+_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
+_INCH = 25.4
+_INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of the log size
+_EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
+_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
 
 
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
-    """Return the mesh of a file in millimetres, with a note if its unit is a guess or its size unusual.
+    """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.
 
-    rigged : mesh and rig as read from the file with this unit; formats without a unit have no rigs
-    unit_mm : unit of the file that the user states [mm]; None for that of the format
+    rigged : mesh and rig, read from the file with `unit_mm`; formats without a unit have no rigs
+    unit_mm : unit of the file as the user states it [mm]; None for the default of the format
     culprit : source of the mesh, for errors
 
     Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.
@@ -56,9 +57,9 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely unit of a mesh whose file states none [mm].
 
-    It is a millimetre if that makes the mesh 100 to 1000 mm large, unless it is a standing figure. Otherwise
-    it is the unit of `UNITS_MM` that brings the size closest to that of an adult, of a head, or of a hand for
-    what is flat or slender.
+    It is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Else it is the
+    unit of `UNITS_MM` for which the size is closest to that of an adult or a head, or of a hand if the mesh
+    is flat or slender.
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices
@@ -81,9 +82,9 @@ def _is_in_mm(positions: Floats) -> bool:
 
 
 def _described(sizes: Floats) -> str:
-    """Return the height of a mesh, or its length if it lies, as text with a unit.
+    """Return the height of a mesh, or the length of a lying one, as text with a unit.
 
-    sizes : (3,) of the bounding box [mm]
+    sizes : (3,) sides of the bounding box [mm]
     """
     longest = float(sizes.max())
     length = f"{longest / 1000:.3g} m" if longest >= 1000 else f"{longest:.3g} mm"
@@ -91,9 +92,9 @@ def _described(sizes: Floats) -> str:
 
 
 def _refuse_size(mesh: Mesh, unit: float, culprit: object) -> None:
-    """Refuse a mesh of impossible size; the advice names a unit only if it makes the size a usual one.
+    """Refuse a mesh of impossible size; the advice names units with which the size would be usual.
 
-    unit : millimetres per unit of the file with which the mesh was read [mm]
+    unit : unit of the file with which the mesh was read [mm]
     """
     low, high = _ADVISED_MM[is_standing_figure(mesh.positions, mesh.triangles)]
     advice = "Set the millimetres per unit of the file with --unit-mm"

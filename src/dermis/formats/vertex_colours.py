@@ -9,7 +9,7 @@ from dermis.images.colour import decode_srgb
 
 
 def linear_colours(values: Numbers) -> tuple[Doubles, list[str]]:
-    """Return linear colours (n, 3) from 0 to 1 for those of a file, and notes for users.
+    """Convert vertex colours of a file to linear colours (n, 3) from 0 to 1; also return notes for users.
 
     values : (n, 3) sRGB; integers are divided by the largest value of their type, floats by 255 if one is
         larger than 1; vertices whose values are NaN are white

@@ -1,4 +1,4 @@
-"""Allocation of the resources of a frame, independent of the camera and of the positions of the lights."""
+"""Allocation of those resources of a frame that depend on neither the camera nor the lights' positions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import cached_atlas
 from dermis.frame.features import diffusion, hair, outputs, post, shape
-from dermis.frame.features.atlas.gutters import GutterTracing, make_gutter_tracing, with_own_gutters
+from dermis.frame.features.atlas.gutters import GutterTracing, make_gutter_tracing, with_separate_gutters
 from dermis.frame.features.atlas.lit_atlas import GutterUpdate
 from dermis.frame.features.atlas.textures import AtlasTextures, upload_atlas
 from dermis.frame.features.hair.resources import placeholder_strand_shadows
@@ -31,6 +31,7 @@ from dermis.frame.features.surface.maps import detail_bindings, has_parts, uploa
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
+from dermis.frame.features.translucency.pair_shape import pair_positions_mm
 from dermis.frame.features.visibility.layers import ViewLayers, make_layers
 from dermis.frame.lights.environment import environment_record
 from dermis.frame.limits import check_limits
@@ -48,7 +49,7 @@ LayoutAtlas = tuple[Atlas, AtlasTextures]
 
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
-    """Return the textures, buffers and records that a request needs; unchanged ones come from the cache.
+    """Return the textures, buffers and records that a request needs, from the cache if nothing has changed.
 
     Raises DermisError for sizes over the device's limits.
     """
@@ -70,7 +71,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         _make_layout(memo, device, request, technique, atlas, shapes, bindings, k)
         for k, atlas in enumerate(atlases)
     )
-    own = technique.make(memo, device, settings, request.profile)
+    resources = technique.make(memo, device, settings, request.profile)
     thin = [layout.translucency for layout in layouts]
     scattered = layouts[0].scattered
     if len(layouts) > 1:
@@ -83,14 +84,14 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         shadow_maps=shadow_maps,
         diffusion=diffusion.make(memo, device, request, technique, [textures for _, textures in atlases]),
         scattered=scattered,
-        technique=own,
+        technique=resources,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
         sky=_cached_sky_visibility(memo, device, request, layouts[0], shapes)
         if request.occlusion_follows_shape
         else None,
         hair=strands,
         visibility=cached(_visibility_layers, device, settings.size, settings.samples),
-        view=_shade_record(device, request, technique, own),
+        view=_shade_record(device, request, technique, resources),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
         post=post.make(memo, device, request),
         outputs=outputs.make(memo, device, request, shapes.tables, thin),
@@ -103,7 +104,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
 def _shade_constants(request: FrameRequest) -> Constants:
     """Return the pipeline constants of the shading pass for the optional features that the request uses.
 
-    These are relief finer than the maps, modelled eyes, and profiles that are blended by a map.
+    The features are relief finer than the maps, modelled eyes, profiles that are blended by a map, and parts
+    other than skin.
     """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
@@ -112,15 +114,15 @@ def _shade_constants(request: FrameRequest) -> Constants:
 
 
 def _shade_record(
-    device: Device, request: FrameRequest, technique: Technique, own: TechniqueResources | None
+    device: Device, request: FrameRequest, technique: Technique, resources: TechniqueResources | None
 ) -> UniformRecord:
-    """Return the uniform record of the shading pass, with all members except those of the camera.
+    """Return the uniform record of the shading pass, without the members that the camera determines.
 
-    own : tables and textures of the technique, None for none
+    resources : tables and textures of the technique; None if it has none
     """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.split)
-    technique.write_view_record(view, program, own)
+    technique.write_view_record(view, program, resources)
     return view
 
 
@@ -143,11 +145,9 @@ def _shared_bindings(
     """Return the shader resources that all atlas layouts share, apart from maps and lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
-    curvature = shapes.curvature
+    curvature, light_count = shapes.curvature, sum(request.light_part_counts)
     return {
-        "skin": skin_record(
-            program, skin, request.head.maps, request.profile, sum(request.light_part_counts)
-        ),
+        "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
         "environment": environment_record(program, environment, skin, total, request.has_occlusion),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
@@ -162,7 +162,7 @@ def _shared_bindings(
 def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
 ) -> VertexSkyVisibility:
-    """Return resources of sky visibility at the vertices, cached or computed for the head at rest."""
+    """Return the sky visibility at the vertices, from the cache or newly computed for the head at rest."""
     at_rest = rest_geometry(memo, device, layout.head, shapes.tables, request.topology, None, 0)
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
@@ -183,48 +183,51 @@ def _make_layout(
     shared: Bindings,
     index: int,
 ) -> AtlasLayout:
-    """Return the resources of one atlas layout; each frame adds the record of its lights.
+    """Return the resources of one atlas layout, without the record of the lights, which each frame adds.
 
     layout_atlas : the atlas, and its textures on the device
     shared : result of `_shared_bindings`, with the maps of the head
-    index : index of the layout, which keys its resources in the cache
+    index : index of the layout, which identifies its resources in the cache
     """
-    cached, number, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
+    cached, layout_key, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
     geometry = cached(
-        upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=number
+        upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=layout_key
     )
     tables, settings = shapes.tables, request.settings
-    at_rest = partial(rest_geometry, memo, device, geometry, tables, head, request.pair_positions_mm, index)
+    at_rest = partial(rest_geometry, memo, device, geometry, tables, head)
     bindings: MutableBindings = {**geometry.resources, **shared}
     gutter_update = None
     if shapes.rest_shape and textures.gutter:
-        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, owner=number)
-        textures = cached(with_own_gutters, device, textures, owner=number)
-        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=number)
+        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, owner=layout_key)
+        textures = cached(with_separate_gutters, device, textures, owner=layout_key)
+        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=layout_key)
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
-        occlusion = cached(cached_occlusion_map, device, head, atlas, untracked=inputs, owner=number)
+        occlusion = cached(cached_occlusion_map, device, head, atlas, untracked=inputs, owner=layout_key)
     else:
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
-        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=number)
+        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=layout_key)
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
-        posed, rest = ({**one.resources, **textures.resources} for one in (geometry, at_rest()))
+        searched = at_rest(pair_positions_mm(memo, request), index)
+        posed, rest = ({**one.resources, **textures.resources} for one in (geometry, searched))
         blurred = request.split.blurred_mm2, request.split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
-        translucency = make_translucency(memo, device, posed, rest, atlas, *blurred, *tissue, owner=number)
+        translucency = make_translucency(
+            memo, device, posed, rest, atlas, *blurred, *tissue, owner=layout_key
+        )
     interreflection = None
     if request.has_interreflection:
         light = request.split.total, request.has_occlusion, request.light_key
-        interreflection = make_interreflection(memo, device, head, atlas, *light, owner=number)
+        interreflection = make_interreflection(memo, device, head, atlas, *light, owner=layout_key)
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
     )
     side = settings.atlas if request.blur_count else 1
-    surfaces = cached(make_surface_texture, device, side, owner=number)
-    scattered = _exitance_texture(memo, device, request, technique, side, number)
+    surfaces = cached(make_surface_texture, device, side, owner=layout_key)
+    scattered = _exitance_texture(memo, device, request, technique, side, layout_key)
     optional = gutter_update, translucency, moving_occlusion, interreflection
     return AtlasLayout(textures, geometry, bindings, surfaces, scattered, *optional)
 
@@ -237,7 +240,7 @@ def _exitance_texture(
     memo: Memo, device: Device, request: FrameRequest, technique: Technique, side: int, role: str
 ) -> Texture:
     owner = f"{role} {request.view_name}"
-    return memo.get(_make_sum, device, technique, side, request.light_key, owner=owner)
+    return memo.get(_make_exitance_texture, device, technique, side, request.light_key, owner=owner)
 
 
 def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> ShadowMaps:
@@ -252,5 +255,5 @@ def _albedo_texture(device: Device, lobe: str, fresnel: str) -> Texture:
     return texture_from_array(device, albedo_table(lobe, fresnel), "rg32float")
 
 
-def _make_sum(device: Device, technique: Technique, side: int, _: str) -> Texture:
+def _make_exitance_texture(device: Device, technique: Technique, side: int, _: str) -> Texture:
     return technique.make_sum(device, side)

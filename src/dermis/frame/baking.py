@@ -25,15 +25,15 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
-_POINTS_PER_PASS = (
-    1 << 20
-)  # surface points per pass; their results fit a buffer of the default limits of WebGPU
-_PICTURE_SIZE = (64, 64)  # size of the frame that lights the atlas, which is not used
-_ALBEDO_ATLAS, _ALBEDO_SIDE = 512, 2048  # sides of the atlas and of the filtered texels, for albedo only
+# Surface points per pass, whose results fit in a buffer of the default size limit of WebGPU.
+_POINTS_PER_PASS = 1 << 20
+_PICTURE_SIZE = (64, 64)  # size of the picture, which is discarded: the frame only has to light the atlas
+_ALBEDO_ATLAS = 512  # side of the atlas where only albedo is baked [texels]
+_ALBEDO_SIDE = 2048  # side of the maps that sets the filter width where only albedo is baked [texels]
 _CONDITIONAL_OUTPUTS = {
     ("thickness",): "no light crosses thin parts: transmission is none, or no light is blurred",
     ("melanin", "blood"): "the skin is not made of pigments",
-}  # outputs that only some scenes have, and the reason why others do not
+}  # outputs that only some scenes have, and the reason why other scenes lack them
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ def _bake_points(
 
 
 def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
-    """Return the shader resources of bake.wgsl: those of a rendered frame, curvature and thickness."""
+    """Return the shader resources of bake.wgsl: those of a rendered frame, plus curvature and thickness."""
     resources, device = inputs.resources, renderer.device
     skin_curvature = make_curvature(device, scene.head.topology.mesh)
     frame = CommandList(device, timed=False)
@@ -170,8 +170,8 @@ def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> Mut
     frame.submit()
     measured = resources.outputs.light.thickness if resources.outputs else None
     thickness = baking_pass.placeholder_thickness(device) if measured is None else measured
-    own: MutableBindings = {"curvatures": skin_curvature.smoothed, "thickness_map": thickness}
-    return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **own}
+    added: MutableBindings = {"curvatures": skin_curvature.smoothed, "thickness_map": thickness}
+    return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **added}
 
 
 def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[str, str]) -> BakedMaps:

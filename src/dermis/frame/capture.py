@@ -17,11 +17,11 @@ from dermis.scene.techniques import TECHNIQUES
 
 _CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
 ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
-"""Kinds of adapters for which frames can be captured, by the names that callers use."""
+"""Kinds of adapters for which frames can be captured, by the values of `device_kind`."""
 
 
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:
-    """Return a renderer that records passes for GPUs or software adapters, whatever its own adapter is.
+    """Return a renderer that records passes for GPUs or for software adapters, whichever adapter it runs on.
 
     device_kind : adapter on which the passes will be replayed, "gpu" or "software"
     """
@@ -40,7 +40,7 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 
 
 def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
-    """Return a captured frame that draws one of every `factor` coarse hairs, widened to cover the same area.
+    """Return a captured frame that draws one in `factor` coarse hairs, widened to cover the same area.
 
     factor : divisor of the number of hairs; 0 keeps all
     """

@@ -20,13 +20,13 @@ from dermis.scene.settings import Settings
 
 @dataclass(frozen=True, eq=False)
 class FrameInputs:
-    """Inputs of a frame: cached resources, and what differs between frames that share them.
+    """Inputs of a frame: cached resources, and values that may differ between frames with equal resources.
 
     motion : pose of the head, as bytes for the shaders
-    face_movements : (9,) strength of the facial movements that change the painted maps, None without such
-        maps
-    layouts : atlas layouts of the resources, with the record of this frame's lights
-    blurs : Gaussian blurs of the layouts, with the light scale of this frame
+    face_movements : (9,) strength of the facial movements that change the painted maps, None if no map
+        changes
+    layouts : atlas layouts of `resources`, each with the record of this frame's lights
+    blurs : Gaussian blurs of each layout, with the factor that brings this frame's light into their range
     shadow_views : projections of all shadow maps
     light_constants : pipeline constants of the lights in use
     camera_views : projection of the camera, with the positions of samples in a pixel

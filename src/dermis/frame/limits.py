@@ -84,7 +84,7 @@ def suggest_settings(request: FrameRequest, budget: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory of a frame by size setting [bytes], without that of the head and its maps."""
+    """Return the memory that each size setting of a frame requires [bytes], without the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE_BYTES + _SAMPLE_BYTES * settings.samples + technique.pixel_bytes
@@ -131,7 +131,7 @@ def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
 def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int) -> float:
     """Return the memory per atlas texel on a software adapter [bytes].
 
-    It covers geometry, pyramid levels, temporary light and the sum of the levels.
+    It covers geometry, pyramid levels, temporary textures of light, and the sum of the levels.
 
     blur_count : number of Gaussians that blur light
     layouts : number of atlas layouts

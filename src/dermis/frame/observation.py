@@ -25,9 +25,9 @@ _MISSING: Any = object()
 
 
 class Landmarks(NamedTuple):
-    """Landmarks of one set in a picture.
+    """Landmarks of one set, located in a scene and in its picture.
 
-    names : names in the order of the set
+    names : names of the landmarks, in the order of the set
     positions_mm : (n, 3) world positions relative to the centre of the head [mm]
     pixels : (n, 2) image coordinates, x to the right and y down, (0, 0) at the centre of the upper left pixel
     visible : (n,) whether the mesh does not occlude the landmark; hair is ignored
@@ -110,10 +110,10 @@ def _landmarks(camera: OpenCvCamera, names: tuple[str, ...], rows: NDArray[np.fl
 def pair_with_previous(
     scenes: Iterable[Scene], previous: Scene | Iterable[Scene | None] | None
 ) -> Iterator[tuple[Scene, Scene | None]]:
-    """Yield each scene with the previous scene from which its motion is computed, None for none.
+    """Yield each scene together with the previous scene, from which its motion is measured, or with None.
 
-    previous : one scene or None, which precedes the first scene; each later scene then follows the one before
-        it unless the head changes. Or an iterable with the previous scene of each scene
+    previous : the scene before the first one, or None; each later scene is then paired with the scene before
+        it, or with None if the head changes. Alternatively an iterable with the previous scene of each scene
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_MISSING):

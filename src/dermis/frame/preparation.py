@@ -1,4 +1,4 @@
-"""Preparation of the inputs of a frame from a scene, with a cache of what did not change."""
+"""Preparation of the inputs of a frame from a scene, with a cache of the resources that did not change."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-_OUTLINE_MARGIN_MM = 10.0  # margin of the outline of a rig, which is approximate
+_OUTLINE_MARGIN_MM = 10.0  # margin around the outline of a posed rig, because that outline is approximate
 Lights = tuple[Light, ...]
 RequestedNames = tuple[str, ...]
 
@@ -161,7 +161,7 @@ class Preparation:
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
         """Return the profiles of the skin and their blend weights.
 
-        Techniques that cannot blend profiles get the first one, and None as weights.
+        Techniques that cannot blend profiles get the first profile alone, and None in place of weights.
         """
         if technique.mixes_profiles:
             return self.profiles.mixture(skin)
@@ -191,7 +191,7 @@ class Preparation:
         return PreviousScene(None if motion == inputs.motion else motion, view)
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
-        """Return the pose, outline and eyes of a head; without a motion, those of the rest pose."""
+        """Return the pose, outline and eyes of a head, in its rest pose if `motion` is None."""
         at_rest = self.memo.get(_rest_motion, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 
@@ -210,7 +210,7 @@ def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionByt
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the (p, 3) control points of the person at rest [mm], None where they equal the topology's."""
+    """Return the (p, 3) control points of the person at rest [mm], None if they are those of the topology."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
@@ -248,7 +248,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights: UniformRecord) -> AtlasLayout:
-    """Return a copy of the layout whose shaders read the uniform record of these lights."""
+    """Return a copy of the layout with the uniform record of these lights in its shader bindings."""
     return replace(layout, bindings=layout.bindings | {"lights": lights})
 
 
@@ -259,7 +259,7 @@ def _scaled_blurs(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
 def _light_resources(
     _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
-    """Return the uniform record of the lights, the views of shadow maps, and the parts of each light.
+    """Return the uniform record of the lights, the views of shadow maps, and the part count of each light.
 
     The first two parameters only serve as cache keys.
     """

@@ -31,9 +31,9 @@ FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""
 SPECULAR_FOLDER = Path(str(specular.__file__)).parent
 TILE_SIDE = 16
-"""Side of the workgroups of short shaders; a GPU starts smaller ones more slowly than they run."""
+"""Side of the square workgroups of short shaders; smaller ones take a GPU longer to start than to run."""
 WORKGROUP_SIZE = 64
-"""Invocations per workgroup of shaders over lists, the constant EACH of each.wgsl."""
+"""Invocations per workgroup of shaders that process lists, the constant EACH of each.wgsl."""
 _GROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
 _STRIP_PIXELS = 16  # pixels per invocation of shade.wgsl on software adapters
 _SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
@@ -50,23 +50,23 @@ _COMMON_SHADERS = (  # shaders of most frames
 
 
 def shader_folders(*options: str) -> tuple[Folder, ...]:
-    """Return the folders in which shaders are included, with the lists and constants of all features.
+    """Return the folders from which shaders include files, with the lists and constants of all features.
 
     A feature is a package in `features`. Its functions `shader_constants` and `shader_lists` are discovered
     here, so that features need no registration.
 
     options : names of the `//#if` conditions that hold
     """
-    numbers: dict[str, float] = {
+    constants: dict[str, float] = {
         **light_shader_constants(),
         **isotropic_lobe_constants(),
         **reflection_constants(),
     }
     lists: dict[str, Callable[[], Sequence[ShaderListMember]]] = {"lights": light_shaders}
     for feature in _features():
-        numbers |= getattr(feature, "shader_constants", dict)()
+        constants |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
-    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: numbers, frozenset(options))
+    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(options))
     return (shared, FRAME_FOLDER / "wgsl", FRAME_FOLDER / "techniques", SPECULAR_FOLDER)
 
 
@@ -90,7 +90,8 @@ def program(
 
     path : "FEATURE/NAME.wgsl", or the path of any other file
     constants : pipeline constants
-    source, store : formats of the textures from which the shader reads and to which it stores light
+    source : format of the texture from which the shader reads light
+    store : format of the texture to which the shader writes light
     labels : whether a hair pass stores labels besides the picture
     """
     active = shader_options(source, store, labels, constants)
@@ -116,7 +117,7 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return `constants`, and those of `device_constants` that the shader declares, by name."""
+    """Return the values of `constants`, and of those `device_constants` that the shader declares, by name."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
@@ -151,9 +152,10 @@ def device_constants(device: Device) -> Constants:
 
 
 def strip_constants(device: Device, samples: int) -> Constants:
-    """Return constants that shorten the columns of pixels per invocation, for many samples per pixel.
+    """Return the pipeline constant that shortens the column of pixels per invocation, for many samples.
 
-    Software adapters shade columns of pixels, and a driver limits the iterations of an invocation.
+    On software adapters an invocation shades a column of pixels, and a driver limits its loop iterations. The
+    result is empty where no limit is reached.
     """
     strip = max(1, _MAX_SAMPLES // samples)
     return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP_PIXELS else ()

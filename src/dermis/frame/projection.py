@@ -54,8 +54,8 @@ class ShadowView(NamedTuple):
     """View of the head from a light, for its shadow map.
 
     clip : (4, 4) matrix from world to clip space
-    texel : side of a texel: in parallel light [mm], for other lights divided by the distance [-]
-    origin : position of the light; in parallel light the centre of the map [mm]
+    texel : side of a texel; for parallel light in mm, for other lights relative to the distance [-]
+    origin : position of the light; for parallel light the centre of the map [mm]
     right, up : unit vectors along the rows and columns of the map
     near, far : depths at which the map stores 1 and 0 [mm]
     """
@@ -83,8 +83,8 @@ def view_axes_array(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
 def view_axes(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
     """Return the unit vectors right, up and forward of a view direction, as tuples.
 
-    For single vectors this is faster than NumPy. A horizontal axis is chosen where `up` is parallel to
-    `forward`.
+    For single vectors this is faster than NumPy. Where `up` is parallel to `forward`, a horizontal axis takes
+    its place.
     """
     f = unit_vector(forward)
     r = _cross(f, up)
@@ -163,7 +163,7 @@ def point_shadow_views(
 ) -> list[ShadowView]:
     """Return for each point light the narrowest view from its position that contains the whole mesh.
 
-    lights : name and light, for each light
+    lights : each light with its name for error messages
     centre : centre of the head, the origin of light positions [mm]
     outline : outline of the head's shape
     size : side of the shadow maps [texels]
@@ -207,9 +207,9 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
 
 
 def _largest_tangents(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
-    """Return the largest tangent of the view angle of any point, for each view.
+    """Return, for each view, the tangent of half the square field of view that contains all points [-].
 
-    sides : (2, k, n) x and y of points in k views, which is overwritten to avoid allocations
+    sides : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
     depth : (k, n) depths of the points
     """
     for side in sides:

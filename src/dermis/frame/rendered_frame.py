@@ -26,7 +26,7 @@ _WHITE = 255  # largest byte of a picture
 
 @dataclass(eq=False)
 class FrameTextures:
-    """Device, textures and buffers of a frame, replaced when the device is lost and the frame drawn again.
+    """Device, textures and buffers of a frame; all are replaced if the frame is drawn again on a new device.
 
     meter : exposure meter, None for a given exposure
     outputs : resources of the outputs besides the picture, None without any
@@ -75,7 +75,7 @@ class RenderedFrame(ShortRepr):
 
     @property
     def exposure(self) -> float:
-        """Return the factor from radiance to linear light in the picture, given or metered [-]."""
+        """Return the factor from radiance to linear light in the picture, as set or as metered [-]."""
         if self.settings.exposure != "auto":
             return float(self.settings.exposure)
         return self._read(lambda frame: read_meter(frame.device, frame.meter) if frame.meter else 1.0)

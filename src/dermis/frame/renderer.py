@@ -49,7 +49,7 @@ def pipeline_frames(
     device: Callable[[], Device],
     frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
-    """Yield the result of each frame in order, while the next frames are already submitted.
+    """Yield the result of each frame in order, while later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -83,7 +83,7 @@ class Renderer:
     adapter : str
         "auto", "cpu" or part of the name of an adapter.
     cache_size : int
-        Number of variants of each resource that are cached, for callers that alternate between a few.
+        Number of variants of each resource that are cached, for callers that alternate between a few scenes.
     cache_ttl : int
         Number of frames after which unused resources are released.
     reopens : bool
@@ -212,7 +212,7 @@ class Renderer:
         settings : Settings, optional
             Size, technique and other settings.
         force : bool
-            True runs all passes instead of only stale ones.
+            True runs all passes, instead of only those whose inputs have changed.
         timed : bool or "whole"
             True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame
             as one pass. False returns when the frame is submitted, and waits only if three frames are in

@@ -25,14 +25,14 @@ class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
     profile : diffusion profile of the skin, the first one if a map blends several
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None where they equal the topology's
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are the topology's
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
-    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None without any
+    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
     outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """
 
@@ -64,14 +64,6 @@ class FrameRequest:
         return self.topology is not self.head.bare
 
     @property
-    def pair_positions_mm(self) -> NDArray[np.float32] | None:
-        """Return the control points at rest in which translucent pairs are searched [mm].
-
-        None means those of the topology: people of one template share its pairs, only the weights differ.
-        """
-        return None if self.is_shared else self.rest_positions_mm
-
-    @property
     def albedo_from_map(self) -> bool:
         """Return whether the colour map alone determines the albedo."""
         return self.skin.albedo == "map"
@@ -83,10 +75,10 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the Gaussians that the technique relights and blurs, other profiles included."""
+        """Return the profile, and any other profiles, split into relit and blurred Gaussians."""
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
-        fine = {} if others else first.fine  # where widths vary, a stripe is as fine as texels
+        fine = {} if others else first.fine  # with blends, stripes are as fine as texels
         return replace(first, others=tuple(others), fine=fine)
 
     @property
@@ -101,7 +93,7 @@ class FrameRequest:
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; an environment without occlusion excludes it."""
+        """Return whether interreflection is computed; under an environment it requires occlusion."""
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property
@@ -112,7 +104,7 @@ class FrameRequest:
 
     @cached_property
     def seam_method(self) -> SeamMethod:
-        """Return the treatment of seams that the settings and the technique select."""
+        """Return how seams are treated, which depends on the settings and the technique."""
         return seam_method(self.settings.seams, self.technique.stitches_seams)
 
     @property
@@ -125,7 +117,7 @@ class FrameRequest:
 
     @property
     def has_fine_relief(self) -> bool:
-        """Return whether the skin has relief finer than its maps; painted gloss maps store its strength."""
+        """Return whether the skin has relief finer than its maps, whose strength painted gloss maps store."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 

@@ -38,8 +38,8 @@ class Resources:
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first
     scattered : texture of the exitance of light that scattered below the surface
-    technique : tables and textures of the technique, None for none
-    output_layers : textures in which the technique diffuses the light of outputs, None for none
+    technique : tables and textures of the technique; None if it has none
+    output_layers : textures in which the technique diffuses the light of outputs; None if it has none
     sky : visible fraction of the sky at the vertices, None where occlusion does not follow the shape
     hair : resources of the hair, None without it
     visibility : triangle at each sample of the picture

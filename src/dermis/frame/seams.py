@@ -1,4 +1,4 @@
-"""Treatments of seams: the stitched atlas, and the methods of the 2007 talk [Dudash2007]."""
+"""Ways to treat the seams of the atlas: stitching, and the methods of the 2007 talk [Dudash2007]."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towa
 
 @dataclass(frozen=True)
 class SeamMethod:
-    """Treatment of seams: the layouts of the atlases, and the texels that blurs read beyond a chart.
+    """How seams are treated: the layouts of the atlases, and the texels that blurs read beyond a chart.
 
-    layouts : names of layouts: "stitched", "mesh" for the uv of the mesh, "unwrapped" for one with other
-        seams
+    layouts : names of layouts: "stitched", "mesh" for the uv layout of the mesh, or "unwrapped" for a layout
+        with other seams
     edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGE_MODES`
     feathered : whether the stretch map is changed near edges so that blurs become narrower there
-    coloured : whether empty texels have the colour `Settings.seam_colour` instead of black
+    coloured : whether empty texels have the colour `Settings.seam_colour`; otherwise they are black
     """
 
     layouts: tuple[str, ...] = ("mesh",)
@@ -39,7 +39,7 @@ SEAM_METHODS = {
 
 
 def seam_method(name: str, can_stitch: bool) -> SeamMethod:
-    """Return the treatment of seams by its name; "clear-colour" replaces "stitch" if that is not possible.
+    """Return the seam method of a name; "clear-colour" replaces "stitch" for techniques that cannot stitch.
 
     can_stitch : whether the technique can carry light across seams
     """

@@ -82,7 +82,7 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     a, b, c = (points[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
-    weights *= np.sign(weights.sum(axis=1, keepdims=True))  # of back faces
+    weights *= np.sign(weights.sum(axis=1, keepdims=True))  # negative on back faces
     weights = np.clip(weights, 0.0, None)
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300))
 
@@ -90,7 +90,7 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """Return irradiance times the skin colour before scattering, (n, 3) at points of the surface [-].
+    """Return (n, 3) irradiance at points of the surface, times the skin colour applied before scattering [-].
 
     scene : scene without maps and environment, because these need atlas positions; interreflection is ignored
     triangle, barycentric : (n,) triangle indices and (n, 3) barycentric weights of the points

@@ -17,13 +17,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Profile split into a narrow Gaussian that is relit in the picture, and Gaussians that blur light.
+    """Profile split into a narrow Gaussian that is relit per pixel, and Gaussians that blur the atlas.
+
+    To relight means to use unblurred light, evaluated per pixel, in place of light blurred by the Gaussian.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
     others : splits of the profiles that a map blends with this one; they have the same Gaussians
-    fine : members of the shader's struct Fine for light that varies within a texel, empty without it
+    fine : members of the shader's struct Fine, for light that varies within a texel; empty if it is ignored
     """
 
     relit: Floats
@@ -35,17 +37,17 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return (o, 3) differences of the relit weights: each of the o other profiles minus this one [-]."""
+        """Return (o, 3) weights of the relit Gaussian in the o other profiles, minus that in this one [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return for each other profile its (k, 3) blurring weights minus those of this profile [-]."""
+        """Return, for each other profile, the (k, 3) weights of its blurs minus those of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
 class TechniqueResources:
-    """Tables and textures of a technique; base class without any."""
+    """Tables and textures of a technique; this base class has none."""
 
 
 class TechniqueTraits:

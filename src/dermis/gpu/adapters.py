@@ -59,7 +59,7 @@ DEFAULT_LIMITS = {
 _REQUIRED_LIMITS = tuple(
     name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
 )
-"""Limits that programs rely on; those of texture and buffer sizes may be lower."""
+"""Limits that programs rely on; the limits of texture and buffer sizes may be lower."""
 _RANKED_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 
@@ -77,7 +77,7 @@ def register_types(ffi: Any) -> int:
     This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
     """
     try:
-        with ffi._lock:  # as its own callers do
+        with ffi._lock:  # cffi's own callers take it too
             declared = ffi._parser._declarations
             types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _named_types(declared)}
             types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callback_types(declared)}

@@ -44,21 +44,21 @@ def make_bind_group(
     layout: NativeObject,
     bindings: Sequence[Binding],
     values: Sequence[Untyped],
-    records: Sequence[int],
+    record_sizes: Sequence[int],
 ) -> BindGroup:
     """Create the bind group of a program.
 
     values : buffer, texture, texture view or sampler for each binding, the uniform buffers last
-    records : sizes of the records that these uniform buffers hold, in order [byte]
+    record_sizes : size of the record in each of these uniform buffers [byte]
     """
     entries = device.ffi.new("WGPUBindGroupEntry[]", len(values))
-    first_uniform = len(values) - len(records)
+    first_uniform = len(values) - len(record_sizes)
     for k, (binding, value) in enumerate(zip(bindings, values, strict=True)):
         entry, kind = entries[k], binding.entry
         entry.binding = binding.index
         if "buffer" in kind:
             entry.buffer = value._internal
-            entry.size = value.size if k < first_uniform else records[k - first_uniform]
+            entry.size = value.size if k < first_uniform else record_sizes[k - first_uniform]
         elif "sampler" in kind:
             entry.sampler = value._internal
         else:
@@ -75,9 +75,8 @@ class ResourceCache(Generic[T]):
 
     def __init__(self) -> None:
         self._entries: dict[ResourceKey, T] = {}
-        self._keys: dict[
-            int, tuple[weakref.ref[object], set[ResourceKey]]
-        ] = {}  # of each resource, by its id
+        # For the id of each resource: a reference that watches its release, and the keys that contain it.
+        self._keys: dict[int, tuple[weakref.ref[object], set[ResourceKey]]] = {}
 
     def __len__(self) -> int:
         """Return the number of cached entries."""
@@ -126,9 +125,9 @@ def resource_key(resources: Sequence[object]) -> ResourceKey:
 
 
 def _view_handle(device: Device, value: TextureOrView, texture: LayoutEntry) -> object:
-    """Return the native handle of a view; for a texture, that of its default view, which is cached.
+    """Return the native handle of a view; for a texture, the handle of its default view, which is cached.
 
-    texture : layout entry of the binding, which has the view dimension
+    texture : layout entry of the binding, which contains the view dimension
     """
     if is_texture(value):
         return _default_view(device, value, texture["view_dimension"])

@@ -76,14 +76,14 @@ class CapturedFrame:
     records: list[tuple[str, UniformRecord]] = field(default_factory=list)
     _record_index: dict[int, int] = field(default_factory=dict)
 
-    def add(self, one: CapturedPass, unit: int | None) -> None:
+    def add(self, captured_pass: CapturedPass, unit: int | None) -> None:
         """Append a pass.
 
         unit : index of the recording to which it belongs; None for a pass that is a unit by itself
         """
         last = self.passes[-1].unit if self.passes else -1
-        one.unit = last + 1 if unit is None else unit
-        self.passes.append(one)
+        captured_pass.unit = last + 1 if unit is None else unit
+        self.passes.append(captured_pass)
 
     def record(self, struct: str, record: UniformRecord) -> int:
         """Return the index of a uniform record in `records`, appending it on first use."""
@@ -181,9 +181,9 @@ class FrameCapture(Graph):
     ) -> None:
         """Capture a render pass of triangles instead of running it."""
         attachments = {"indices": indices, "depth": target.depth, "target": target.colour}
-        numbers = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
+        indices_of = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
         captured = self._add_pass(stage, program, resources, (vertices,))
-        captured.raster = {"layer": layer, "far": target.clear_depth, **numbers}
+        captured.raster = {"layer": layer, "far": target.clear_depth, **indices_of}
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -206,7 +206,7 @@ class FrameCapture(Graph):
         self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]
     ) -> CapturedPass:
         bound = [self._binding_index(program, one, resources[one.name]) for one in program.bindings]
-        captured = CapturedPass(stage, self._program_number(program), bound, groups)
+        captured = CapturedPass(stage, self._index_of_program(program), bound, groups)
         self._frame.add(captured, self._unit)
         return captured
 
@@ -217,14 +217,14 @@ class FrameCapture(Graph):
         self.structs[struct] = value.dtype
         return -1 - self._frame.record(struct, cast("UniformRecord", value))
 
-    def _program_number(self, program: Program) -> int:
+    def _index_of_program(self, program: Program) -> int:
         if id(program) not in self._program_index:
             self._program_index[id(program)] = len(self.programs)
             self._program_objects.append(program)
             self.programs.append(
                 {
                     "name": program.name,
-                    "shader": self._shader_number(program.source.text),
+                    "shader": self._index_of_shader(program.source.text),
                     "constants": dict(program.constants),
                     "bindings": [(one.index, one.name, one.entry) for one in program.bindings],
                     "raster": program.raster if isinstance(program, RenderProgram) else None,
@@ -232,7 +232,7 @@ class FrameCapture(Graph):
             )
         return self._program_index[id(program)]
 
-    def _shader_number(self, text: str) -> int:
+    def _index_of_shader(self, text: str) -> int:
         if text not in self.shaders:
             self.shaders.append(text)
         return self.shaders.index(text)
@@ -241,7 +241,7 @@ class FrameCapture(Graph):
 def describe_resource(device: Device, value: Bindable) -> PlainData:
     """Return the parameters with which a resource can be created again, as plain data for JSON.
 
-    They are the kind with sizes, format and usage flags, or the options of a sampler.
+    For a texture or buffer they are its sizes, format and usage flags, for a sampler its options.
     """
     if is_texture(value):
         size, mips = list(value.size), value.mip_level_count

@@ -21,7 +21,7 @@ Timing = bool | Literal["whole"]
 
 TimestampWrites = dict[str, object]
 """The member `timestamp_writes` of wgpu's pass descriptors."""
-_CACHED_DISPATCHES = 16  # of a pass, whose record positions depend on which passes run before it
+_CACHED_DISPATCHES = 16  # for each pass: its record positions depend on which passes run before it
 
 
 class CommandList(Recorder):
@@ -105,7 +105,7 @@ class CommandList(Recorder):
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
-        """Add copies of buffers into a readback, one after the other; its mapping starts after submission."""
+        """Add copies of buffers into a readback, one after the other; it is mapped after submission."""
         self._end_pass()
         start = 0
         for buffer in buffers:
@@ -179,7 +179,7 @@ class CommandList(Recorder):
     ) -> Untyped:
         """Begin a render pass with cleared targets, pipeline and bind group, and return its encoder.
 
-        depth : wgpu's description of the depth attachment; None for none
+        depth : wgpu's description of the depth attachment; None for a pass without depth
         """
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
         self._end_pass()
@@ -313,7 +313,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Reserve a timestamp for a pass and return its `timestamp_writes`; None if it takes no timestamp."""
+        """Reserve a timestamp for a pass; return the pass's `timestamp_writes`, None without a timestamp."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None

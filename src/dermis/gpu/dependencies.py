@@ -18,7 +18,7 @@ R = TypeVar("R", bound=Resource)
 
 _access_ids = count(1)
 
-_CACHED_STATES = 16  # combinations of up-to-date resources
+_CACHED_STATES = 16  # combinations of up-to-date resources for which the stale passes are cached
 
 
 @dataclass(eq=False, slots=True)
@@ -114,7 +114,8 @@ class Dependencies:
         self.passes = passes
         # The resources that each pass reads, with the earlier pass that wrote them, if one did.
         self._reads: list[list[tuple[int | None, ResourceState]]] = []
-        self._last_writer: dict[ResourceState, int] = {}  # of the resource, or of one that overlaps it
+        # For each resource, the last pass that writes it or a resource that overlaps it.
+        self._last_writer: dict[ResourceState, int] = {}
         self._cached_stale = lru_cache(_CACHED_STATES)(self._find_stale)
         writers: dict[ResourceState, int] = {}
         for index, (_, reads, writes) in enumerate(passes):

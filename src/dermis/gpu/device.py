@@ -27,7 +27,8 @@ T = TypeVar("T")
 
 _MAX_TIMED_PASSES = 2048
 _STAGING_STEP_BYTES = 4096
-_LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"  # in wgpu's log; DeviceLostError says so too
+# Starts of wgpu's log messages that are dropped, as DeviceLostError reports the same.
+_LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
@@ -153,7 +154,7 @@ class Device:
         return False
 
     def _check_alive(self) -> None:
-        """Raise GPUError if the device is lost, found by writing zero bytes to a buffer."""
+        """Raise GPUError if the device is lost, which a write of zero bytes to a buffer reveals."""
         self.write(self._unwritten, b"", 0)
 
     @cached_property
@@ -185,7 +186,7 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for later readbacks; a buffer of a new size replaces those of other sizes."""
+        """Keep a staging buffer for later readbacks; if its size is new, drop the buffers of other sizes."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)

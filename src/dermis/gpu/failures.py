@@ -62,7 +62,8 @@ class ReopeningDevice:
 
     open_device : function that opens a device
     on_open : function that creates the resources of the caller on each opened device
-    reopens : if False, DeviceLostError is raised instead, for callers that keep more resources on the device
+    reopens : whether a lost device is opened again; if False, DeviceLostError is raised, for callers that
+        keep other resources on the device too
     """
 
     def __init__(

@@ -20,7 +20,7 @@ from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_CACHED_DEPENDENCIES = 8  # of frames that alternate: pictures, readbacks, and those of several views
+_CACHED_DEPENDENCIES = 8  # for frames that alternate, such as pictures, readbacks and several views
 
 
 @dataclass
@@ -160,7 +160,7 @@ class Graph(Recorder):
 
     recordings : cache of the recordings of `repeat`
     executed_stages : stages of the passes that ran in the last frame, in order
-    listing : listing that receives the passes of the next frame; None for none
+    listing : listing that records the passes of the next frame; None to record nothing
     """
 
     def __init__(self, device: Device) -> None:
@@ -283,7 +283,7 @@ class Graph(Recorder):
             self.invalidate()
             raise
         finally:
-            self._passes, self._readbacks = [], []  # which keep resources alive
+            self._passes, self._readbacks = [], []  # they keep resources alive
         dependencies.set_versions(is_stale, versions)
         self.executed_stages = [stage for one in stale for stage in one.stages]
         return frame

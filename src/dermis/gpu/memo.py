@@ -44,14 +44,14 @@ class Memo:
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
         self._cache_size = cache_size
-        self._results: dict[
-            FunctionKey, list[CachedResult]
-        ] = {}  # of each function, the most recently used first
+        # The results of each function, the most recently used first.
+        self._results: dict[FunctionKey, list[CachedResult]] = {}
         self._recent_keys: deque[set[FunctionKey]] = deque(
             [set()], maxlen=max(cache_ttl, cache_size * cache_size)
         )
         self._pending: list[CachedResult] = []  # the function calls that are running, innermost last
-        self._hits: list[tuple[FunctionKey, CachedResult]] = []  # of this frame, without parts
+        # The results used in this frame, without the parts of other results.
+        self._hits: list[tuple[FunctionKey, CachedResult]] = []
 
     @overload
     def get(self, function: Callable[[*Ts], T], *args: *Ts, owner: str = "") -> T: ...

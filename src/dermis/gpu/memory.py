@@ -16,10 +16,13 @@ if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _DRIVER_LOADING_BYTES = 0.5e9, 0.15e9
-"""Address space that loading all drivers takes, and per thread of Mesa's adapter; measured with Mesa 22.3."""
+"""Address space to load all drivers, and in addition for each thread of Mesa's adapter; for Mesa 22.3."""
 
 _SOFTWARE_RENDERING_BYTES = 0.9e9, 0.22e9
-"""Address space to render the package's human in software at 512x512, atlas 1024, and per thread."""
+"""Address space to render the package's human in software, and in addition for each thread.
+
+Measured at 512x512 with an atlas of 1024.
+"""
 
 _MAX_THREADS = 16  # of Mesa's software adapter
 
@@ -27,7 +30,7 @@ _CGROUPS = Path("/sys/fs/cgroup")
 
 _MIN_PROBE_BYTES = 1 << 20
 
-_OUT_OF_MEMORY = "out of memory", "not enough memory"  # in errors of the library, whose classes differ
+_OUT_OF_MEMORY = "out of memory", "not enough memory"  # words in wgpu's errors, whose classes differ
 
 _RAISE_LIMIT = "Raise it: ulimit -v unlimited"
 

@@ -22,15 +22,15 @@ from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, ShaderSource, compose
 
 UniformRecords = Mapping[str, NDArray[np.generic]]
-"""Bindings of a shader's uniforms only."""
+"""Uniform records by their names in the shader, without other resources."""
 
 P = TypeVar("P")
 
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 
-_LARGE_RECORD_BYTES = 2048  # bytes; the record of a skin is smaller, of which few shaders read all
+_LARGE_RECORD_BYTES = 2048  # the record of a skin is smaller, and few shaders read all of it
 
-_CACHED_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
+_CACHED_VARIANTS = 12  # for each shader; on a software adapter each variant takes some 7 MB
 
 Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants (`override` in WGSL); others keep their default."""
@@ -60,8 +60,8 @@ class Program:
         self.bindings: tuple[Binding, ...] = shader_bindings(self.source.text)
         self._module = self._compile(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
-        self._others = [b for b in self.bindings if not _is_uniform(b)]
-        self._get_others = _binding_getter([b.name for b in self._others])
+        self._resource_bindings = [b for b in self.bindings if not _is_uniform(b)]
+        self._get_resources = _binding_getter([b.name for b in self._resource_bindings])
         self._used_members = [(one.name, used_members(self.source.text, one.name)) for one in self._uniforms]
         self.bind_groups: ResourceCache[BindGroup] = ResourceCache()
         self._accesses: ResourceCache[Access] = ResourceCache()
@@ -101,7 +101,7 @@ class Program:
         key = resource_key(bound)
         found = self._accesses.find(key)
         if found is None:
-            named = list(zip(self._others, bound, strict=True))
+            named = list(zip(self._resource_bindings, bound, strict=True))
             reads = tuple(
                 resource_state(self.device, value) for one, value in named if one.has_content and one.reads
             )
@@ -128,7 +128,7 @@ class Program:
     def _bound_resources(self, resources: Bindings) -> Sequence[Bindable]:
         """Return the bound resources in the order of the shader's bindings, without uniform records."""
         try:
-            return self._get_others(resources)
+            return self._get_resources(resources)
         except KeyError as missing:
             raise self._unbound_error(missing) from None
 
@@ -140,7 +140,7 @@ class Program:
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(
-            self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes
+            self.device, self._group_layout, (*self._resource_bindings, *self._uniforms), bound, sizes
         )
 
     def _compile(self, path: Path) -> Untyped:

@@ -46,8 +46,8 @@ class Recorder(ABC):
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
         groups : number of workgroups along each axis
-        in_place : name of a resource that the pass only extends from its own content, such as the gutters of
-            a map; the version of that resource does not change
+        in_place : name of a resource that the pass only completes from the resource's own content, such as a
+            map whose gutters it fills; the version of that resource does not change
         """
 
     def compute(
@@ -67,7 +67,7 @@ class Recorder(ABC):
 
         data : bytes, if possible the same object in each frame, as Python caches the hash of bytes
         """
-        raise self._refusal(stage)
+        raise self._unsupported_error(stage)
 
     def draw(
         self,
@@ -87,17 +87,17 @@ class Recorder(ABC):
         indices : index buffer; None to number the vertices in order
         layer : instance index, which shaders use as the layer of a texture array
         """
-        raise self._refusal(stage)
+        raise self._unsupported_error(stage)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Add a render pass that runs a program once per texel of its targets."""
-        raise self._refusal(stage)
+        raise self._unsupported_error(stage)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Add the compute passes that `record(recorder, *args)` adds, which must depend only on `args`."""
         return record(self, *args)
 
-    def _refusal(self, stage: str) -> NotImplementedError:
+    def _unsupported_error(self, stage: str) -> NotImplementedError:
         return NotImplementedError(f"{stage}: {type(self).__name__} takes compute passes only")

@@ -57,7 +57,7 @@ class Binding:
 
     @property
     def has_content(self) -> bool:
-        """Return whether the resource has content, which all resources except samplers have."""
+        """Return whether the resource holds data; samplers do not."""
         return "sampler" not in self.entry
 
     @property
@@ -101,7 +101,7 @@ def uniform_type(text: str, name: str) -> str:
 
 
 def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
-    """Return a function that takes a uniform record as bytes, and selects those that the shader reads.
+    """Return a function that selects, from the bytes of a uniform record, those that the shader reads.
 
     It selects all bytes if the shader passes the record to a function, or if the type of the variable is not
     a struct.

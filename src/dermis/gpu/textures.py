@@ -35,7 +35,7 @@ _TEXEL_FORMATS: dict[str, tuple[type[np.generic], int]] = {
 }
 
 FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _TEXEL_FORMATS.items()}
-"""Bytes of a texel of each format."""
+"""Size of a texel in each format [byte]."""
 
 _LARGE_UPLOAD_BYTES = 1 << 24  # bytes
 

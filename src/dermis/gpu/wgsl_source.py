@@ -4,8 +4,8 @@ Each directive is a line of its own:
 
 - `//#include "name.wgsl"`: inserts another file, once;
 - `//#include <list>`: inserts the file of each member of a list;
-- `//#each list: text`: inserts the text for each member with its {name}, {NAME}, {number} and words;
-- `//#fill text`: inserts the text with a number from Python for each {word};
+- `//#each list: text`: inserts the text for each member, with {name}, {NAME}, {number} and {words} replaced;
+- `//#fill text`: inserts the text, with each {word} replaced by a number from Python;
 - `//#if NAME`, `//#else`, `//#end`: keep lines for programs with that option, or without it.
 """
 

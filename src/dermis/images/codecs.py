@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
 _PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
-_UP_FILTER = 2  # number of PNG's filter that stores differences from the row above
+_UP_FILTER = 2  # PNG's code of the filter that stores differences from the row above
 
 _STRIP_PIXELS = 1 << 20  # pixels converted at a time
-_CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}
+_CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}  # by FFmpeg's pixel format
 _PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
     "L": ("L", np.uint8),
@@ -44,7 +44,7 @@ _PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "I;16B": ("I;16B", np.uint16),
     "F": ("F", np.float32),
 }
-"""Pillow's mode and the NumPy type of the result by Pillow's mode of the file."""
+"""For each Pillow mode of a file, the mode to which it is converted and the NumPy type of the pixels."""
 _PNG_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
 _TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_RGB = 258, 262, 2
 
@@ -54,7 +54,7 @@ def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
 
     C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF. CMYK becomes sRGB.
 
-    convert_tables : convert colours to 8-bit sRGB if the file has an ICC profile of tables
+    convert_tables : whether to convert colours to 8-bit sRGB if the file's ICC profile has lookup tables
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or of an unsupported
     type.
@@ -166,7 +166,7 @@ def png_size(data: bytes) -> tuple[int, int]:
 
 
 def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
-    """Decode a PNG file whose rows all use the "up" filter, as those of `encode_png`.
+    """Decode a PNG file whose rows all use the "up" filter, as in files that `encode_png` writes.
 
     The result is (H, W, 1, 3 or 4) uint8 or uint16, or None for any other file.
 
@@ -199,7 +199,7 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
 
 
 def _compressed_pixels(data: bytes) -> bytes | None:
-    """Return the compressed pixels of a PNG file; None if a tRNS chunk makes one colour transparent."""
+    """Return the compressed pixels of a PNG file; None for a file in which a tRNS chunk sets transparency."""
     parts = list[memoryview]()
     for kind, content in png_chunks(data):
         if kind == b"tRNS":

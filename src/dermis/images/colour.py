@@ -1,4 +1,4 @@
-"""Colour spaces: linear Rec. 709 from and to sRGB, luminance and colour differences (CIEDE2000)."""
+"""Conversion between sRGB and linear Rec. 709, luminance, and colour differences (CIEDE2000)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _XYZ_OF_REC709 = np.array(
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
 )
 _WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
-_CIELAB_DELTA = 6.0 / 29.0  # of the CIELAB function
+_CIELAB_DELTA = 6.0 / 29.0  # constant delta of the CIELAB function
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
@@ -74,7 +74,7 @@ def _as_float(values: ArrayLike) -> NDArray[np.floating]:
 
 
 def lab(linear: ArrayLike) -> Doubles:
-    """Return CIE L*a*b* (..., 3) under D65 of linear Rec. 709 colours (..., 3)."""
+    """Convert linear Rec. 709 colours (..., 3) to CIE L*a*b* (..., 3) with the white point D65."""
     t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
     f = np.where(t > _CIELAB_DELTA**3, np.cbrt(t), t / (3.0 * _CIELAB_DELTA**2) + 4.0 / 29.0)
     X, Y, Z = np.moveaxis(f, -1, 0)

@@ -26,13 +26,14 @@ _PRIMARIES: dict[str, tuple[float, ...]] = {
 """Chromaticities x, y of red, green, blue and white."""
 _ADOBE_GAMMA = 563 / 256
 _CODED_PRIMARIES = {1: "Rec. 709", 2: "Rec. 709", 5: "PAL", 6: "Rec. 601", 9: "Rec. 2020", 12: "Display P3"}
+"""Name in `_PRIMARIES` by the number of the primaries in ITU-T H.273."""
 _CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14: None, 15: None}
 """Gamma by the number of a transfer function in ITU-T H.273; None for sRGB and for the curves of video, which
 programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
 _CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
 _LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
-_SAME_SPACE = 5e-3  # largest difference of a matrix or a curve from those of sRGB
+_SRGB_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _ICC_HEADER, _MAX_ICC_TAGS = 128, 200
@@ -41,11 +42,11 @@ _MAX_NAME = 60  # characters
 
 @dataclass(frozen=True, eq=False)
 class ColourSpace:
-    """Colour space of a picture's pixels; the default is sRGB for levels and linear Rec. 709 for floats.
+    """Colour space of a picture's pixels; by default, integers are sRGB and floats are linear Rec. 709.
 
-    name : for notes
+    name : name of the colour space, for notes
     to_rec709 : (3, 3) matrix from linear colours to linear Rec. 709; None for the primaries of Rec. 709
-    curves : (3, 65536) linear values of evenly spaced levels by channel; None for the curve of sRGB
+    curves : (3, 65536) for each channel, the linear values of evenly spaced levels; None for sRGB's curve
     """
 
     name: str = "sRGB"
@@ -80,12 +81,12 @@ SRGB = ColourSpace()
 
 
 def adobe_rgb() -> ColourSpace:
-    """Return Adobe RGB (1998), which cameras state in EXIF without a profile."""
+    """Return Adobe RGB (1998), which cameras may state in EXIF without embedding an ICC profile."""
     return _space("Adobe RGB", _to_rec709(_PRIMARIES["Adobe RGB"]), _LEVELS**_ADOBE_GAMMA)
 
 
 def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
-    """Return the colour space of code points of ITU-T H.273, as in AVIF, HEIC and PNG; None for unknown ones.
+    """Return the colour space of ITU-T H.273 code points, as in AVIF, HEIC and PNG; None for unknown codes.
 
     Raises ValueError for the transfer functions of HDR displays.
     """
@@ -98,11 +99,12 @@ def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
 
 
 def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
-    """Return the colour space of a gamma, None for the curve of sRGB, and primaries, None for Rec. 709.
+    """Return the colour space with the given gamma and primaries.
 
-    primaries : chromaticities x, y of red, green, blue and white
+    gamma : exponent from levels to linear values; None for the curve of sRGB
+    primaries : chromaticities x, y of red, green, blue and white; None for Rec. 709
 
-    Raises ValueError for primaries that span no colours.
+    Raises ValueError for primaries that are invalid or lie on one line.
     """
     matrix = np.eye(3) if primaries is None else _to_rec709(primaries)
     return _space(name, matrix, None if gamma is None else _LEVELS**gamma)
@@ -120,9 +122,9 @@ def profile_name(icc: bytes) -> str:
 
 
 def profile_space(icc: bytes) -> ColourSpace | None:
-    """Return the colour space of an ICC profile of primaries and curves, or a grey curve; None for tables.
+    """Return the colour space of an ICC profile with primaries and curves; None for one with lookup tables.
 
-    Such profiles are converted here at the full depth of the picture, because LittleCMS in Pillow has 8 bits.
+    Primaries and curves are applied here at the picture's full bit depth; Pillow's LittleCMS has only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
     """
@@ -134,21 +136,21 @@ def profile_space(icc: bytes) -> ColourSpace | None:
         return None
     if kind == b"GRAY":
         return _space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
-    columns = [_fixed(tags[b"%cXYZ" % one], 3) for one in channels]
+    columns = [_fixed_point_numbers(tags[b"%cXYZ" % one], 3) for one in channels]
     curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
     to_rec709 = np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
     return _space(profile_name(icc), to_rec709, np.array(curves))
 
 
 def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
-    """Return a colour space, in which parts equal to those of sRGB are None.
+    """Return a colour space; a matrix or curves equal to those of sRGB become None.
 
     to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
     """
     if curves is not None:
-        same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SAME_SPACE)
+        same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SRGB_TOLERANCE)
         curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
-    same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SAME_SPACE)
+    same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SRGB_TOLERANCE)
     return ColourSpace(
         name, None if same else to_rec709, None if curves is None else np.asarray(curves, np.float32)
     )
@@ -160,7 +162,7 @@ def _to_rec709(primaries: Sequence[float]) -> Doubles:
 
 
 def _xyz_of(primaries: Sequence[float]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to the white D50 of profiles by Bradford.
+    """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to D50, the white point of ICC profiles.
 
     primaries : chromaticities x, y of red, green, blue and white
     """
@@ -175,7 +177,7 @@ def _xyz_of(primaries: Sequence[float]) -> Doubles:
 
 
 def _profile_curve(tag: bytes) -> Doubles:
-    """Return the linear values (65536,) of evenly spaced levels, from the tag of a curve in a profile."""
+    """Return the linear values (65536,) of evenly spaced levels, from a curve tag of an ICC profile."""
     kind, (count,) = tag[:4], struct.unpack_from(">I", tag, 8)
     if kind == b"curv" and count < 2:
         gamma = struct.unpack_from(">H", tag, 12)[0] / 256.0 if count else 1.0
@@ -186,7 +188,7 @@ def _profile_curve(tag: bytes) -> Doubles:
     if kind != b"para" or count >> 16 > 4:
         raise ValueError("a curve is of an unknown kind")
     function = count >> 16
-    numbers = _fixed(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
+    numbers = _fixed_point_numbers(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
     if function <= 2:  # constant up to -b / a
         (g, a, b), offset = numbers[:3], sum(numbers[3:])
         c, d, e, f = 0.0, -b / a, offset, offset
@@ -198,6 +200,6 @@ def _profile_curve(tag: bytes) -> Doubles:
     return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
 
 
-def _fixed(tag: bytes, count: int, offset: int = 8) -> list[float]:
-    """Return numbers of a tag of an ICC profile, in signed fixed point with 16 fractional bits."""
+def _fixed_point_numbers(tag: bytes, count: int, offset: int = 8) -> list[float]:
+    """Read `count` numbers of an ICC profile's tag, stored as signed fixed point with 16 fractional bits."""
     return [value / 65536.0 for value in struct.unpack_from(f">{count}i", tag, offset)]

@@ -19,8 +19,9 @@ _MAX_LISTED = 6
 class ExrLayer:
     """Layer of an OpenEXR file with the channels of a picture.
 
-    part : index of its part
-    name : of the layer; in files of several parts with the name of its part; empty for plain R, G and B
+    part : index of the part that contains the layer
+    name : name of the layer, in files of several parts preceded by the name of the part; empty for plain R,
+        G, B
     channels : names of the channels of red, green, blue and, if there is one, alpha; or of grey
     """
 
@@ -30,33 +31,34 @@ class ExrLayer:
 
 
 def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
-    """Return the layer of an OpenEXR file that is read, and a note if there are several with colours.
+    """Choose the layer to read from an OpenEXR file; also return a note if several layers have colours.
 
-    A layer without a name has precedence over one whose name means the whole picture, and that over others.
+    Colours are preferred to grey; then a layer without a name, then one whose name means the whole picture.
 
     parts : name and channels of each part
 
-    Raises UnsupportedError for a file without such a layer, unless it has a single channel.
+    Raises UnsupportedError if no layer has R, G and B or Y, unless the file has a single channel.
     """
-    found = [layer for number, part in enumerate(parts) for layer in _layers(number, *part, len(parts) > 1)]
+    found = [layer for index, part in enumerate(parts) for layer in _layers(index, *part, len(parts) > 1)]
     if found:
         chosen = min(found, key=_rank)
-        colours = [_shown(layer.name) for layer in found if len(layer.channels) > 1]
+        colours = [_display_name(layer.name) for layer in found if len(layer.channels) > 1]
         if len(colours) < 2:
             return chosen, None
         listed = ", ".join(colours[:_MAX_LISTED]) + ", ..." * (len(colours) > _MAX_LISTED)
-        return chosen, f"of its layers, {listed}, only {_shown(chosen.name)} is read"
+        return chosen, f"of its layers, {listed}, only {_display_name(chosen.name)} is read"
     names = [name for _, channels in parts for name in channels]
     if len(names) == 1:
         return ExrLayer(0, "", (names[0],)), None
-    listed = ", ".join(map(_shown, names[:20]))
+    listed = ", ".join(map(_display_name, names[:20]))
     raise UnsupportedError(f"it has channels {listed}, and no layer with R, G and B or Y")
 
 
-def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> Iterator[ExrLayer]:
-    """Yield the layers of a part that are pictures: R, G, B in any case or in words, with or without A, or Y.
+def _layers(index: int, part: str, channels: Sequence[str], several_parts: bool) -> Iterator[ExrLayer]:
+    """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
 
-    several : whether the file has several parts, and layers are named by them
+    index, part : index and name of the part
+    several_parts : whether the file has several parts; the name of the part then precedes that of the layer
     """
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:
@@ -68,16 +70,16 @@ def _layers(number: int, part: str, channels: Sequence[str], several: bool) -> I
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
         if names and not is_vector:
-            title = ".".join(filter(None, (part if several else "", layer)))
-            yield ExrLayer(number, title, tuple(letters[name] for name in names))
+            title = ".".join(filter(None, (part if several_parts else "", layer)))
+            yield ExrLayer(index, title, tuple(letters[name] for name in names))
 
 
 def _rank(layer: ExrLayer) -> tuple[bool, int]:
-    """Return a key that sorts layers with colours before grey ones, and the picture before its parts."""
+    """Return a sort key: layers with colours before grey ones, then the whole picture before components."""
     last = layer.name.rpartition(".")[2].lower()
     by_name = 0 if not layer.name else 1 if last in _MAIN_LAYERS else 2
     return len(layer.channels) == 1, by_name
 
 
-def _shown(name: str) -> str:
+def _display_name(name: str) -> str:
     return shorten("".join(one for one in name if one.isprintable()), _MAX_NAME) or "the one without a name"

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Doubles, Floats, Index
 from dermis.base.errors import shorten
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, no_effect, noted, refused
 from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_space
 from dermis.images.exr_layers import ExrLayer, choose_layer
 from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
-_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # by number of channels
-_MAX_SAMPLES = 3 * MAX_PIXELS  # in all channels of all parts, because the library decodes all of them
+_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # names of the channels by their number
+_MAX_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 _ASPECT_TOLERANCE = 1e-3
 _MAX_NAME = 60  # characters
@@ -37,11 +38,45 @@ _RADIANCE_VALUES = {
     "PIXASPECT": [1.0],
 }
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
+_UNUSED_VALUES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
+EXR_PROPERTIES = (
+    drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
+    refused("deep pixels"),
+    drawn("layer or part with R, G and B, in any case or in words, and perhaps A; or with Y"),
+    noted(
+        "several layers, such as `ViewLayer.Combined.R`, or parts",
+        "the one without a name is read, else one called beauty, combined, rgba and the like, else the first",
+    ),
+    drawn("a single channel of any name", "as grey"),
+    refused("luminance with chroma (Y, RY, BY), subsampled channels, channels without a layer of colours"),
+    drawn_with_note("`dataWindow` inside `displayWindow`", "placed there, the rest is black"),
+    drawn_with_note("`dataWindow` beyond `displayWindow`", "cut off"),
+    drawn_with_note("`chromaticities`, else `colorInteropID`", "converted to Rec. 709"),
+    noted("unknown `colorInteropID`"),
+    noted("`pixelAspectRatio`", "no note if it is 1"),
+    no_effect("`envmap`", "a cube is refused as a panorama by its shape"),
+    no_effect("`screenWindow...`, `whiteLuminance`, cameras, dates, comments"),
+)
+"""Properties of OpenEXR files."""
+RADIANCE_PROPERTIES = (
+    drawn("`FORMAT` 32-bit_rle_rgbe"),
+    drawn_with_note("`FORMAT` 32-bit_rle_xyze", "converted to Rec. 709"),
+    refused("other `FORMAT`"),
+    drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
+    drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
+    drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
+    noted(in_code(_UNUSED_VALUES), "no note if they are 1"),
+    refused("run-length coding of before 1991"),
+    no_effect("`VIEW`, `SOFTWARE`, comments"),
+)
+"""Properties of Radiance files (.hdr)."""
 _MAX_HEADER = 1 << 16
 _STRIP_PIXELS = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
 _DECODED_BYTES = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
+"""Number of decoded bytes by code."""
 _CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
+"""Number of stored bytes by code: the code itself and its data."""
 
 
 def decode_exr(data: bytes) -> Floats:
@@ -64,7 +99,7 @@ def decode_exr(data: bytes) -> Floats:
 
 
 def exr_header(data: bytes) -> PictureHeader:
-    """Return what the header of an OpenEXR file says about its picture; pixels are not decoded."""
+    """Return the header of an OpenEXR file; pixels are not decoded."""
     file = _open_exr_header(data)
     layer, layer_note = _checked_layer(file)
     header = file.parts[layer.part].header
@@ -82,7 +117,7 @@ def exr_header(data: bytes) -> PictureHeader:
 
 
 def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of a part of an OpenEXR file, and a note unless that is linear Rec. 709."""
+    """Return the colour space of a part of an OpenEXR file, and a note if it is not linear Rec. 709."""
     import OpenEXR
 
     primaries, name = header.get("chromaticities"), header.get("colorInteropID", "")
@@ -140,9 +175,9 @@ def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
 
 
 def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
-    """Return the size of the display window, and rows and columns of the data window inside it.
+    """Return the size of the display window, and slices for the part of the data window that is inside it.
 
-    They are relative to the data window, then to the display window.
+    The slices (rows, columns) are given twice: relative to the data window, and to the display window.
     """
     data, shown = (np.array(header[name], np.int64)[:, ::-1] for name in ("dataWindow", "displayWindow"))
     low, high = np.maximum(data[0], shown[0]), np.minimum(data[1], shown[1]) + 1
@@ -182,7 +217,7 @@ class _RadianceHeader:
 
     axes : directions of the scanlines and of the pixels in them, such as "-Y" and "+X"
     lengths : number of scanlines, and of pixels in each
-    values : numbers by name, such as EXPOSURE; those that may be repeated are multiplied
+    values : numbers by name, such as EXPOSURE; if a name occurs on several lines, the product of its numbers
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """
@@ -223,7 +258,7 @@ def decode_radiance(data: bytes) -> Floats:
 
 
 def radiance_header(data: bytes) -> PictureHeader:
-    """Return what the header of a Radiance .hdr file says."""
+    """Return the header of a Radiance .hdr file."""
     header = _radiance_header(data)
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths
@@ -231,7 +266,7 @@ def radiance_header(data: bytes) -> PictureHeader:
     space = gamma_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
     notes = [
         f"its {name} of {float(header.values[name][0]):g} is not used"
-        for name in ("GAMMA", "PIXASPECT")
+        for name in _UNUSED_VALUES
         if header.values[name][0] != 1.0
     ]
     colour_note = None if space.is_default else "its colours are converted from its primaries to Rec. 709"

@@ -1,4 +1,4 @@
-"""What the header of a picture file says about its pixels."""
+"""Header of a picture file: size, colour space, orientation and notes."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dermis.images.colour_spaces import SRGB, ColourSpace
 
 
 class UnsupportedError(ValueError):
-    """Error for a valid picture with pixels that are not read."""
+    """Error for a valid picture whose pixel format is not supported."""
 
 
 @dataclass(frozen=True)
 class PictureHeader:
-    """Size and colour space of a picture file, and what is done with its other properties.
+    """Size and colour space of a picture file, with notes on its other properties.
 
     size : width and height of the stored picture [pixel]
-    colour_space : of the decoded pixels
-    orientation : EXIF's number of the turn or mirroring that shows the picture upright; 1 is none
+    colour_space : colour space of the decoded pixels
+    orientation : EXIF orientation from 1 (upright) to 8: rotation or reflection that turns it upright
     notes : sentences about properties that are converted or not used
-    colour_note : sentence about the conversion of colours, for pictures whose pixels are colours
+    colour_note : sentence about the conversion of colours; it does not apply if pixels are read as numbers
     is_grey : whether the pixels have one colour channel
     """
 

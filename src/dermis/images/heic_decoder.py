@@ -12,9 +12,9 @@ from dermis.images.sizes import MAX_PIXELS
 
 
 def decode(request: Arrays) -> Arrays:
-    """Return the size of a picture, its ICC profile, three facts, and its pixels unless there are too many.
+    """Return a picture's size, ICC profile and three properties, and its pixels unless there are too many.
 
-    The facts are the number of bits of a channel in the file, whether the picture was turned upright, and
+    The properties are the bits per channel in the file, whether the picture was turned upright, and
     whether the file has more pictures.
     """
     import pi_heif

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dermis.base import atomic_write
 from dermis.base.arrays import Floats, Numbers
 from dermis.base.errors import DermisError, error_text, notify, refuse
+from dermis.base.file_properties import drawn_with_note, refused
 from dermis.base.reading import read_file
 from dermis.images.codecs import Pixels, decode_with_pillow, encode_png
 from dermis.images.colour import encode_srgb8
@@ -49,26 +50,36 @@ _OTHER_FORMATS = {
     b"\0\0\0\x0cjP  ": "JPEG 2000",
 }
 """Formats that are not read, by their first bytes."""
+OTHER_PICTURES = (refused(", ".join(dict.fromkeys(_OTHER_FORMATS.values())), "by name"),)
+"""Picture formats that are not read."""
+ODD_PIXELS = (
+    drawn_with_note("infinite", "the largest finite value"),
+    drawn_with_note("NaN, negative", "0"),
+    refused("more than half of the pixels not finite, or none above 0"),
+    refused("radiance above 10¹² in panoramas"),
+    refused("odd pixels in maps of heads"),
+)
+"""Invalid pixels of panoramas and linear photographs, and their replacements."""
 
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
-    """Picture file that is part of another file, such as a .glb file.
+    """Picture file of a glTF file or of a USD package, whose colours are sRGB whatever profile it has.
 
-    name : for error messages
-    data : bytes of the picture file, in any format but OpenEXR
+    name : name of the picture in error messages
+    data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
     """
 
     name: str
-    data: bytes = field(repr=False)
+    data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name, which stands in error messages instead of a path."""
+        """Return the name, which error messages show where they show the path of other pictures."""
         return self.name
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the pixels (H, W, C) of a picture file of numbers as stored, row 0 at the top.
+    """Return the pixels (H, W, C) of a picture file with numeric data, row 0 at the top, as stored.
 
     C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
     camera orientation are not used. Notes name other properties that are not used.
@@ -84,26 +95,26 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
 
 
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
-    """Return the pixels (H, W, C) of a picture of colours as `read_image`, and their colour space.
+    """Return the pixels (H, W, C) of a picture of colours, read as by `read_image`, and their colour space.
 
-    The colour space is that of the file's profile or primaries. Pictures inside other files are sRGB or
-    linear Rec. 709, as glTF demands.
+    The colour space is given by the file's profile or primaries; pictures of glTF files are sRGB or linear
+    Rec. 709, as glTF requires.
 
     upright : turn the picture as its EXIF says, as for photographs
 
-    Raises DermisError as `read_image`.
+    Raises DermisError as `read_image` does.
     """
     data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
     header = _header(path, data)
     _note(path, header, colours=True, upright=upright)
     image = _pixels(path, data, convert_tables=not embedded)
-    return _turned(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
+    return _oriented(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
 
 
 def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
-    """Issue the note of `read_image` or `read_colours` for a picture that is in a cache.
+    """Issue the note that `read_image` or `read_colours` would issue, for a picture taken from a cache.
 
-    colours : whether its pixels are colours, to which profiles apply
+    colours : whether the pixels are colours, to which colour profiles apply
     """
     _note(path, _header(path, read_bytes(path)), colours, upright=False)
 
@@ -120,12 +131,12 @@ def _note(path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bo
         notify(f"{path}: {'; '.join(notes)}")
 
 
-def mended_radiance(name: object, radiance: Floats) -> Floats:
-    """Return radiance (H, W, C) without infinite, NaN and negative values, with a note of their number.
+def repaired_radiance(name: object, radiance: Floats) -> Floats:
+    """Replace infinite, NaN and negative radiance (H, W, C); a note states how many pixels were changed.
 
-    Infinite values become the largest finite one, other values 0.
+    Infinite values become the largest finite value; NaN and negative values become 0.
 
-    name : of the file, for messages
+    name : name of the file, for messages
 
     Raises DermisError if most pixels are not finite, or no value is above 0.
     """
@@ -165,8 +176,8 @@ def _pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: boo
     return image
 
 
-def _turned(image: Pixels, orientation: int) -> Pixels:
-    """Return a picture (H, W, C) turned and mirrored by EXIF's number of its orientation, 1 to 8."""
+def _oriented(image: Pixels, orientation: int) -> Pixels:
+    """Return a picture (H, W, C) rotated and mirrored according to its EXIF orientation, 1 to 8."""
     upright = image.swapaxes(0, 1) if orientation >= 5 else image
     upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright
     turned: Any = upright[:, ::-1] if orientation in (2, 3, 6, 7) else upright
@@ -190,7 +201,8 @@ def _apply_codec(
     codec = pillow if picture_format(data) else None
     for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
         codec = other if data.startswith(start) else codec
-    if codec is None or (codec is exr and isinstance(path, EmbeddedPicture)):
+    is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
+    if codec is None or (codec is exr and is_inside):
         known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
         actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
@@ -200,7 +212,7 @@ def _apply_codec(
         refuse(path, "a picture of at most 8192 x 8192 pixels", str(fault), "Resize it")
     except UnsupportedError as fault:
         refuse(path, _EXPECTED_PICTURE, str(fault), "Convert it to PNG, or to EXR if it is linear")
-    except DermisError as fault:  # a package is missing
+    except DermisError as fault:  # raised if a package is missing
         raise DermisError(f"{path}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         raise DermisError(
@@ -298,7 +310,7 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
 def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], fast: bool = False) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    parts : for each part by name, its channels (H, W) by name; most programs show only the first part
+    parts : channels (H, W) by name, for each part by name; most programs show only the first part
     fast : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR
@@ -324,6 +336,5 @@ def read_bytes(path: str | Path | EmbeddedPicture) -> bytes:
 
     Raises DermisError when it cannot be read.
     """
-    if isinstance(path, EmbeddedPicture):
-        return path.data
-    return read_file(path, _EXPECTED_PICTURE, MAX_FILE_BYTES)
+    source = path.data if isinstance(path, EmbeddedPicture) else path
+    return source if isinstance(source, bytes) else read_file(source, _EXPECTED_PICTURE, MAX_FILE_BYTES)

@@ -25,7 +25,7 @@ DEFAULT_CRF = 18
 _MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
 _BT709, _LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
 _QUEUE_LENGTH = 8
-_MAX_SIDE = 1 << 14  # of a frame in H.264
+_MAX_SIDE = 1 << 14  # largest side of a frame in H.264
 _NTSC_RATES = tuple(Fraction(1000 * rate, 1001) for rate in (24, 30, 48, 60, 120))
 _NTSC_TOLERANCE = Fraction(5, 1000)
 _RATE_PATTERN = re.compile(
@@ -187,7 +187,7 @@ class MovieWriter:
         while len(self._queue) > _QUEUE_LENGTH or (self._queue and self._queue[0].done()):
             self._queue.popleft().result()
 
-    def _encode(self, number: int, picture: NDArray[np.generic]) -> None:
+    def _encode(self, frame_index: int, picture: NDArray[np.generic]) -> None:
         import av
         from av.video.reformatter import ColorRange, Colorspace
 
@@ -198,7 +198,7 @@ class MovieWriter:
             src_color_range=ColorRange.JPEG,
             dst_color_range=ColorRange.MPEG,
         )
-        frame.pts, frame.time_base = number, 1 / self.rate
+        frame.pts, frame.time_base = frame_index, 1 / self.rate
         self._container.mux(self._stream.encode(frame))
 
     def _finish(self) -> None:

@@ -1,4 +1,4 @@
-"""Opening of PNG, JPEG, TIFF, WebP, AVIF and HEIC files with Pillow, and what their headers say."""
+"""Opening of PNG, JPEG, TIFF, WebP, AVIF and HEIC files with Pillow, and parsing of their headers."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
 from dermis.base.native_decoding import run_decoder
 from dermis.base.reading import MALFORMED_DATA_ERRORS
 from dermis.images.colour_spaces import (
@@ -40,16 +41,52 @@ _BRANDS = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
     (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs"), "HEIC"
 )
 """Formats by brand of the container that AVIF and HEIC share."""
+PICTURE_PROPERTIES = (
+    drawn(
+        ", ".join(dict.fromkeys((*_FORMATS.values(), "WebP", *_BRANDS.values()))),
+        "AVIF and WebP need a Pillow that has them, as its wheels do; HEIC needs "
+        '`pip install "dermis[formats]"`, 16-bit colour `"dermis[video]"`',
+    ),
+    drawn("8 and 16 bits, palettes"),
+    drawn_with_note("grey, with or without alpha", "repeated in all channels of colours"),
+    drawn_with_note("10 and 12 bits (AVIF, HEIC), CMYK of 16 bits", "reduced to 8"),
+    drawn("float TIFF", "linear; only grey"),
+    drawn_with_note(
+        "ICC profile of curves: Display P3, Adobe RGB, ProPhoto, linear, grey and others",
+        "colours are converted to linear Rec. 709 at full depth; no note for sRGB",
+    ),
+    drawn_with_note(
+        "ICC profile of tables, in RGB",
+        "colours are converted by LittleCMS at 8 bits, relative to white, with compensation of black",
+    ),
+    noted("ICC profile that is damaged or for other pixels"),
+    drawn_with_note("CMYK", "converted by its profile likewise, or by subtraction of the inks"),
+    drawn_with_note("code points (`cICP` of PNG, `nclx` of AVIF and HEIC)", "converted"),
+    noted("unknown code points"),
+    refused("code points of PQ and HLG", "levels for HDR displays"),
+    drawn_with_note("`gAMA`, `cHRM`, `sRGB` of PNG", "converted; no note for sRGB"),
+    drawn_with_note("Adobe RGB stated in EXIF", "converted"),
+    no_effect("colour profiles of maps of numbers", "numbers are read as stored"),
+    noted("colour profiles of pictures in .glb files", "not used, as glTF demands"),
+    drawn_with_note("EXIF orientation of photographs and of HEIC", "turned upright"),
+    noted("EXIF orientation of maps"),
+    drawn_with_note("alpha of photographs", "transparent pixels are not fitted"),
+    drawn("alpha of maps", "as the material states"),
+    noted("several pictures in a file: pages, frames, gain maps of phones", "the first is read"),
+    refused("raw files of cameras, CIELAB, 32-bit integers"),
+    no_effect("resolution, dates, texts and other metadata"),
+)
+"""Properties of picture files that Pillow opens."""
 _MAX_BRAND_BYTES = 64
 _HEIC, _HEIC_DECODER = "HEIC", "dermis.images.heic_decoder"
 _PILLOW_LOCK = threading.Lock()
 _JPEG_SCAN = b"\xff\xda"
-_MAX_SCANNED_PIXELS = 1 << 30  # in all scans of a JPEG: sixteen scans of the largest picture
+_MAX_SCANNED_PIXELS = 1 << 30  # total of all scans of a JPEG: sixteen scans of the largest picture
 _GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
 _EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
 _ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
 _TIFF_SUBFILE, _TIFF_DNG_VERSION, _CANON_RAW = 254, 50706, b"CR"
-_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # as PNG files state it
+_SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state sRGB
 
 
 def picture_format(data: bytes) -> str | None:
@@ -115,16 +152,16 @@ def _open_heic(data: bytes) -> Image:
     return picture
 
 
-@lru_cache(maxsize=1)  # because the header and the pixels of a picture are read one after the other
+@lru_cache(maxsize=1)  # cached, as header and pixels of a picture are read one after the other
 def _decoded_heic(data: bytes) -> Arrays:
     request = Arrays(data=np.frombuffer(data, np.uint8))
     return run_decoder(_HEIC_DECODER, request, len(data), "a HEIC picture", "pixels")
 
 
 def pillow_header(data: bytes) -> PictureHeader:
-    """Return what the header of a picture file says.
+    """Return the header of a picture file.
 
-    Raises errors as `open_picture`.
+    Raises the errors of `open_picture`.
     """
     picture = open_picture(data)
     exif = _exif(picture)
@@ -137,9 +174,10 @@ def pillow_header(data: bytes) -> PictureHeader:
 
 
 def table_transform(picture: Image) -> ImageCmsTransform | None:
-    """Return the conversion to 8-bit sRGB by a picture's ICC profile, if that consists of tables; else None.
+    """Return the conversion of a picture to 8-bit sRGB if its ICC profile has lookup tables, else None.
 
-    Profiles of tables are those of CMYK and of some scanners. The conversion is relative to white and black.
+    CMYK files and files of some scanners have such profiles. The rendering intent is relative colorimetric,
+    with black point compensation.
     """
     from PIL import ImageCms
 
@@ -207,7 +245,7 @@ def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return SRGB, "its colour profile is damaged, and its colours are taken as sRGB"
     if space is None and table_transform(picture):
-        is_cmyk = picture.mode == "CMYK"  # noted where it is converted
+        is_cmyk = picture.mode == "CMYK"  # noted at the conversion
         return SRGB, None if is_cmyk else f"{_conversion_note(name)}, at 8 bits a channel"
     if space is None or picture.mode in ("CMYK", "F") or (icc[16:20] == b"GRAY" and not is_grey):
         return SRGB, f"its colour profile, {name}, does not fit its pixels, and is not used"
@@ -225,7 +263,7 @@ def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
 
 
 def _is_adobe_rgb(exif: Exif) -> bool:
-    """Return whether a camera states Adobe RGB in EXIF, which most cameras do without a profile."""
+    """Return whether EXIF states Adobe RGB; most cameras state it there without embedding a profile."""
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (
@@ -236,7 +274,7 @@ def _is_adobe_rgb(exif: Exif) -> bool:
 
 
 def _png_space(picture: Image) -> ColourSpace:
-    """Return the colour space by the gamma and chromaticities in a PNG file; sRGB for other files."""
+    """Return the colour space given by a PNG file's gamma and chromaticities; sRGB for other files."""
     gamma, corners = picture.info.get("gamma"), picture.info.get("chromaticity")
     if picture.format != "PNG" or "srgb" in picture.info or not gamma:
         return SRGB
@@ -255,7 +293,7 @@ def _notes(data: bytes, picture: Image) -> Iterator[str]:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
         yield "it is turned upright as its EXIF says"
-    if _has_several(picture):
+    if _has_more_pictures(picture):
         yield "it has several pictures, and only the first is read"
 
 
@@ -268,7 +306,7 @@ def _bits(data: bytes, picture: Image) -> int:
     return int(picture.info.get("bit_depth", 8))
 
 
-def _has_several(picture: Image) -> bool:
+def _has_more_pictures(picture: Image) -> bool:
     """Return whether a file has further pictures: frames, pages, or the gain map of a phone's photograph."""
     if picture.format != "TIFF":
         return bool(getattr(picture, "is_animated", False))

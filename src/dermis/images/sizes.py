@@ -5,9 +5,9 @@ from __future__ import annotations
 MAX_FILE_BYTES = 256 << 20
 """Largest size of a picture file."""
 MAX_PIXELS = 8192**2
-"""Largest number of pixels of a picture: a map of the largest texture size that every device supports."""
+"""Largest number of pixels of a picture: the size of the largest texture that every device supports."""
 MAX_TOTAL_PIXELS = 2 * MAX_PIXELS
-"""Largest number of pixels of all pictures of one mesh file."""
+"""Largest total number of pixels in the pictures of one mesh file."""
 
 
 class TooLargeError(ValueError):

@@ -29,7 +29,7 @@ _NUMBER_PLACEHOLDER = re.compile(r"%(?:0(\d+))?d")
 
 
 class ImageWriter:
-    """Context manager that encodes and writes pictures on other threads; its end waits for all pictures.
+    """Context manager that encodes and writes pictures on other threads; on exit it waits for all of them.
 
     threads : number of threads, by default one per core
 
@@ -106,7 +106,7 @@ class FrameFiles:
     pattern: Path
 
     def path(self, number: int) -> Path:
-        """Return the path of the picture with a frame number."""
+        """Return the path of the picture of the frame with a number."""
         name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{number:0{found[1] or 1}d}", self.pattern.name)
         return self.pattern.with_name(name)
 
@@ -139,7 +139,7 @@ class FrameFiles:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
-        """Return those frame numbers whose pictures are not complete files of this sequence.
+        """Return those of the frame numbers for which there is no complete picture of this sequence.
 
         size : width and height of the pictures
         """

@@ -10,7 +10,7 @@ from dermis.base.quantities import checked_number
 from dermis.base.summary import ShortRepr
 from dermis.mesh.pose import Pose
 
-_MAX_NAMES = 8  # in a note
+_MAX_NAMES = 8  # largest number of names in a note
 MAX_DURATION_S = 86_400.0
 _MAX_TIME_S = 1e9
 _MIN_RATE, _MAX_RATE = 0.001, 1000.0

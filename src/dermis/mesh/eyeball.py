@@ -22,9 +22,9 @@ IRIS_BEHIND_MM = 3.0
 SIDE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
 UV_RIM = 0.49
-"""Distance from the centre of the uv layout for the back of the eye."""
+"""Distance of the back of the eye from the centre of the uv layout [-]."""
 UV_DECAY_RADIANS = 0.9
-"""Constant a of that distance at an angle t from the axis, which is proportional to 1 - exp(-t / a) [rad]."""
+"""Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
@@ -53,7 +53,7 @@ def iris_mm() -> float:
 def profile_mm(angle: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the surface of ball and cornea [mm].
 
-    angle : between the direction and the eye's axis [rad]
+    angle : angle between the direction and the eye's axis [rad]
     """
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
@@ -64,7 +64,7 @@ def profile_mm(angle: Doubles) -> Doubles:
 def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
     """Return distances (...) of points from the ball's centre, and of the surface in these directions [mm].
 
-    points : (..., 3) relative to the ball's centre [mm]
+    points : (..., 3) positions relative to the ball's centre [mm]
     axis : (..., 3) unit vectors of the eyes' axes
     """
     distance = np.linalg.norm(points, axis=-1)
@@ -77,7 +77,7 @@ class LidContact(ShortRepr):
     """Collision of eyelids with eyeballs: control points of the lids are kept outside in any pose.
 
     point : (n,) control points of the lids
-    ball : (n,) index of the eyeball over which each of them slides
+    ball : (n,) index of the eyeball over which each lid point slides
     min_clearance_mm : (n,) smallest distance from the eyeball's surface, for an eye of adult size [mm]
     apex, back : (k,) control points of each eyeball: apex of the cornea, and the opposite point of the ball
     edge : (k, r) control points along the lid edges, once around each opening
@@ -91,7 +91,7 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """Return control points (p, 3) with those of the lids moved out of the eyeballs [mm].
+        """Return control points (p, 3) in which the lids' points are moved out of the eyeballs [mm].
 
         points_mm : (p, 3) control points of a posed head
         """
@@ -115,7 +115,7 @@ def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]
     scale : factor of the points; above 1 for control points, as their subdivision surface shrinks
     """
     points, quads = list[Doubles](), list[Index]()
-    grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # even in angle
+    grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # evenly spaced in angle
     u, v = (part.ravel() for part in np.meshgrid(grid, grid))
     corner = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
     around = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
@@ -163,7 +163,7 @@ def _directions(side: int) -> Doubles:
 class EyeTextures:
     """Textures of an eyeball as seen along its axis, in the uv layout of `eye_uv`, with row 0 at v = 0.
 
-    colour : (n, n, 3) linear [-]
+    colour : (n, n, 3) linear colour [-]
     normal : (n, n, 3) unit normals of the surface below the tear film, x along u, y against v (green up)
     """
 
@@ -174,7 +174,7 @@ class EyeTextures:
 def eye_uv(points: Doubles) -> Floats:
     """Return the uv (n, 2) of surface points in the layout of `EyeTextures`.
 
-    points : (n, 3) relative to the eyeball's centre, with z along its axis
+    points : (n, 3) positions relative to the eyeball's centre, with z along its axis
     """
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])

@@ -15,7 +15,7 @@ T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(rows: ArrayLike) -> Ints:
-    """Return for each row (v, k) the index of its unique row, (v,); rows are compared in float32.
+    """Return the index of each row (v, k) among the unique rows, (v,); rows are compared in float32.
 
     rows : positions [mm], or positions and uv side by side
     """
@@ -41,15 +41,15 @@ def merge_near_points(
 ) -> tuple[Doubles, Index]:
     """Merge the points of each cell of a grid into their mean; return the points and the triangles (f, 3).
 
-    positions : (v, 3)
+    positions : (v, 3) vertex positions
     triangles : (f, 3) vertex indices; some of the returned triangles have coincident corners
     spacing : side of the cells
     """
     cell = np.floor(positions / spacing).astype(np.int64)
     cell -= cell.min(axis=0)
     x, y, _ = cell.max(axis=0) + 1
-    number = cell[:, 0] + x * (cell[:, 1] + y * cell[:, 2])
-    _, merged, count = np.unique(number, return_inverse=True, return_counts=True)
+    cell_key = cell[:, 0] + x * (cell[:, 1] + y * cell[:, 2])
+    _, merged, count = np.unique(cell_key, return_inverse=True, return_counts=True)
     sums = [np.bincount(merged.reshape(-1), column) for column in positions.T]
     return np.stack(sums, axis=1) / count[:, None], merged.reshape(-1)[triangles]
 
@@ -65,7 +65,7 @@ def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 
 
 def edge_keys(corners: NDArray[np.integer]) -> Index:
-    """Return for each side of triangles a number that is equal for the sides of one edge, (f, 3).
+    """Return a key (f, 3) for each triangle side, which is equal for all sides of an edge.
 
     corners : (f, 3) point indices; side k runs from corner k to the next
     """
@@ -75,7 +75,7 @@ def edge_keys(corners: NDArray[np.integer]) -> Index:
 
 
 def triangle_keys(corners: NDArray[np.integer], count: int) -> Index:
-    """Return for each triangle a number that is equal for triangles of the same three points, (f,).
+    """Return a key (f,) for each triangle, which is equal for triangles with the same three points.
 
     corners : (f, 3) point indices
     count : number of points, at most two million
@@ -99,7 +99,7 @@ def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 
 
 def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
-    """Return unit normals (v, 3): face normals weighted by the corner angle and summed at each point.
+    """Return vertex normals (v, 3): normalised sums of face normals, weighted by the corner angles.
 
     Vertices of one point share a normal, so that there is no crease at a uv seam. The normal is +Z where the
     sum is 0. Weights by angle, unlike those by area, do not depend on how the surface is triangulated.
@@ -112,7 +112,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     a, b, c = (columns.take(one, axis=1) for one in corner)  # (3, f) each
     ab, bc, ca = b - a, c - b, a - c
     normal = cross_columns(ab, ca)
-    sine = np.sqrt(dot_columns(normal, normal))  # of each angle, times the lengths of its sides
+    sine = np.sqrt(dot_columns(normal, normal))  # sine of each angle, times the lengths of its sides
     angles = [np.arctan2(sine, -dot_columns(one, other)) for one, other in ((ca, ab), (ab, bc))]
     angle = np.stack([*angles, np.pi - angles[0] - angles[1]])
     angle /= np.where(sine > 0, -sine, 1.0)
@@ -164,8 +164,8 @@ def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     """Return the derivatives of the position by u and by v at each vertex, (v, 3) each [mm per unit of uv].
 
-    They are means over the triangles of a vertex, weighted by area, without triangles that have no uv area. A
-    vertex without any other gets two orthogonal vectors of length 1, so that nothing divides by 0.
+    They are means over the triangles of a vertex, weighted by area; triangles without uv area are ignored. A
+    vertex with no other triangles gets two orthogonal unit vectors, to avoid divisions by 0.
 
     positions, normals : (v, 3) [mm], and unit vectors
     uv : (v, 2)
@@ -221,7 +221,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 
 
 def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node of a graph, (n,), numbered in the order of first nodes.
+    """Return the connected component of each node of a graph, (n,), numbered as they first appear.
 
     count : n, number of nodes
     a, b : (l,) nodes at the two ends of each link

@@ -10,10 +10,11 @@ import numpy as np
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
-from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone, is_head_sized
+from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone
 from dermis.mesh.strands import Strands
 
 _HEAD_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
@@ -40,13 +41,16 @@ class Head:
     eyes : Eyes, optional
         Eyeballs of realistic shape.
     strands, hair : Strands, optional
-        Brows and lashes; hair of head and beard in random order, so that a few can represent all from afar.
+        Strands of brows and lashes, and of scalp and beard. The latter are in random order, so that the first
+        ones are a random sample.
     note : str, optional
-        Parts of the file that are not used, and why; empty for none.
+        Parts of the file that are not used, with reasons; empty for none.
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional
         Head of the same topology and uv layout whose atlas and tables serve this one too.
+    file_vertices : FileVertices, optional
+        Vertices of the mesh file from which the points come, for mesh sequences.
 
     Examples
     --------
@@ -68,6 +72,7 @@ class Head:
     note: str = ""
     levels: int = 0
     template: Head | None = None
+    file_vertices: FileVertices | None = None
 
     def __repr__(self) -> str:
         """Return name, size, maps and rig on two lines."""
@@ -81,7 +86,7 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig; for a head without one, a rig with its points only."""
+        """Return the rig; for a head without one, a rig of its points without targets or bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
@@ -96,7 +101,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and derived tables this head uses: its template, else `bare`."""
+        """Return the head whose atlas and tables this head uses: its template if it fits, else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare
@@ -128,7 +133,7 @@ class Head:
 
         The skull of a body is at its head bone, if it has one.
         """
-        skeleton = None if is_head_sized(self.mesh.positions) or self.rig is None else self.rig.skeleton
+        skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:
             return self.mesh.skull_mm
@@ -143,9 +148,10 @@ class Head:
 
     @cached_property
     def axes(self) -> Doubles:
-        """Return the directions (3, 3), in rows, to the right, upwards and to the front of what is seen.
+        """Return the directions to the right, upwards and to the front, as rows (3, 3).
 
-        They are x, y and z for a head. A flat piece of skin is seen from the side that it faces.
+        They are x, y and z for a head; the front of a flat patch of skin is the side to which its normals
+        point.
         """
         return np.eye(3) if self.skull_mm is not None else facing_axes(self.mesh.positions, self.mesh.normals)
 

@@ -11,14 +11,14 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.summary import ShortRepr
 
-_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # for means: samples along each side, and largest distance of them
+_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and largest distance between them
 
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
     """Common texture maps of the groups that are not skin, whose uv refer to these maps.
 
-    colour : (H, W, 4) base colour, linear Rec. 709, and opacity, shifted so that surfaces end at 0.5 [-]
+    colour : (H, W, 4) base colour, linear Rec. 709, and opacity, shifted so that it is cut out below 0.5 [-]
     surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
     emission : (H, W, 3) emitted radiance, or None
     """
@@ -51,7 +51,7 @@ class Maps(ShortRepr):
     region: Bytes | None = None
     parts: PartMaps | None = None
     is_painted: ClassVar[bool] = False
-    """Whether the device paints those that are None."""
+    """Whether the device paints the maps that are None."""
 
     @property
     def has_roughness(self) -> bool:
@@ -60,7 +60,7 @@ class Maps(ShortRepr):
 
     @cached_property
     def mean_colour(self) -> Doubles | None:
-        """Return the mean (3,) of the colour map without unused, black texels; None without a map."""
+        """Return the mean (3,) of the colour map, leaving out unused (black) texels; None without a map."""
         if self.colour is None:
             return None
         stride = int(np.clip(min(self.colour.shape[:2]) // _MEAN_SAMPLES, 1, _MAX_STRIDE))

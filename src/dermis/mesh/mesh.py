@@ -27,9 +27,9 @@ class Material:
     name : name of the group in the file
     kind : "skin" is rendered with subsurface scattering, "opaque" with a diffuse and a specular lobe
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
-    part : which teeth, or the tongue, for the colours of mouth.wgsl; None for other surfaces
+    part : part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
-    has_maps : whether `Maps.parts` has the colour and the surface of an opaque group, factors included
+    has_maps : whether `Maps.parts` contains colour and surface of an opaque group, with its factors applied
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
@@ -82,7 +82,7 @@ class Mesh(ShortRepr):
 
     @property
     def cut_out(self) -> Mask:
-        """Return the mask (f,) of triangles that are cut out by the opacity of their part."""
+        """Return the mask (f,) of triangles of which an opacity map cuts out parts, such as hair cards."""
         return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
     @property
@@ -96,9 +96,14 @@ class Mesh(ShortRepr):
         return convex_hull(self.positions)
 
     @cached_property
+    def is_head_sized(self) -> bool:
+        """Return whether the mesh has the size and proportions of a head or bust."""
+        return is_head_sized(self.positions)
+
+    @cached_property
     def skull_mm(self) -> Point | None:
         """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm]."""
-        if is_head_sized(self.positions):
+        if self.is_head_sized:
             return skull_below(self.positions, float(self.positions[:, 1].max()))
         is_eye = np.array([one.eye for one in self.materials])[self.material]
         return body_skull(self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()])

@@ -15,7 +15,7 @@ from dermis.base.summary import ShortRepr
 class MorphTargets(ShortRepr):
     """Sparse displacements of points by t morph targets, stored target after target.
 
-    names : (t,)
+    names : (t,) names of the targets
     first : (t + 1,) index of the first displacement of each target, and the number of displacements
     point : (n,) point of each displacement
     delta_mm : (n, 3) displacement at weight 1

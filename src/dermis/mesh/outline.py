@@ -21,22 +21,21 @@ from dermis.mesh.skeleton import Skeleton
 
 _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
 _REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
-_CLOSE_MM = 0.5
-_MAX_CORNERS = 512
+_CLOSE_MM = 0.5  # largest distance of points beyond the bounds of the chosen ones at which they are skipped
 _BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
-_CANDIDATES_PER_DIRECTION = 16  # candidates per direction, of which a pose may bring another one outermost
+_CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
 _RANDOM_POSES, _SEED = 128, 0
 _MAX_DEGREES = 60.0
-_MAX_BONES = 4  # that are rotated in one pose
-_ACTIVE_TARGETS = 0.3  # fraction of the targets in one pose
-_MIN_WEIGHT = 0.02  # of a bone for a point to follow it
+_MAX_BONES = 4  # bones that are rotated in one pose
+_ACTIVE_TARGETS = 0.3  # fraction of the targets that are active in one pose
+_MIN_WEIGHT = 0.02  # least weight of a bone that a point follows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outline(ShortRepr):
     """Points that bound a shape in every direction.
 
-    points_mm : (n, 3)
+    points_mm : (n, 3) positions
     margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges add it
     """
 
@@ -67,13 +66,13 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
     try:
         return np.sort(ConvexHull(positions.astype(np.float64)).vertices).astype(np.intp)
-    except QhullError:  # it is flat
+    except QhullError:  # the positions lie in a plane
         return np.arange(len(positions))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """Outline points of a rig, s of them stored as columns, with dense morph targets and skin weights.
+    """The s outline points of a rig, stored as columns, with dense morph targets and skin weights.
 
     rest_mm : (4, s) homogeneous points at rest
     delta_mm : (t, 3 s) displacements by each target at weight 1
@@ -89,8 +88,8 @@ class RigOutline(ShortRepr):
     def pose(self, weights: Floats, matrices: Floats) -> Floats:
         """Return the outline points in a pose, (s, 3) [mm].
 
-        weights : (t,) of the targets, relative to the rest pose
-        matrices : (b, 3, 4) of all bones of the rig
+        weights : (t,) weights of the targets, relative to the rest pose
+        matrices : (b, 3, 4) matrices of all bones of the rig
         """
         columns, active = self.rest_mm, weights.nonzero()[0]
         if len(active):
@@ -109,7 +108,7 @@ def rig_outline(
 ) -> RigOutline:
     """Return the outline of a rig that consists of the given points, with their targets and weights.
 
-    positions : (p, 3) of all control points at rest [mm]
+    positions : (p, 3) positions of all control points at rest [mm]
     points : (s,) indices of the outline points
     """
     rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])
@@ -117,17 +116,10 @@ def rig_outline(
     if skeleton is None:
         return RigOutline(rest, delta, None, np.zeros(0, np.intp))
     bone, weight = skeleton.bone[points], skeleton.weight[points]
-    bones, number = np.unique(bone, return_inverse=True)
+    bones, row = np.unique(bone, return_inverse=True)
     weights = np.zeros((len(bones), len(points)), np.float32)
-    np.add.at(weights, (number.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
+    np.add.at(weights, (row.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
     return RigOutline(rest, delta, weights, bones.astype(np.intp))
-
-
-def hull_corners(positions: Floats) -> Intp:
-    """Return indices of convex hull corners of points (p, 3); of more than 512, the most extreme ones."""
-    corners = hull_vertices(positions)
-    few = len(corners) <= _MAX_CORNERS
-    return corners if few else corners[extreme_points(positions[corners], _MAX_CORNERS)]
 
 
 def extreme_points(positions: Floats, count: int = _FEW_DIRECTIONS) -> Intp:
@@ -142,7 +134,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 
     The poses are the rest pose, each morph target alone, and random poses.
 
-    positions : (p, 3) of all control points at rest [mm]
+    positions : (p, 3) positions of all control points at rest [mm]
     """
     candidates = _outline_candidates(positions, targets, skeleton)
     outline = rig_outline(positions, targets, skeleton, candidates)

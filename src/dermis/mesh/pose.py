@@ -21,9 +21,9 @@ MAX_WEIGHT = 100.0
 MAX_DEGREES = 1e5
 MAX_DISTANCE_MM = 1e6
 _BONE_VALUES = "three angles [degrees] or a (4, 4) matrix"
-_SUGGESTIONS = 3  # names that are proposed
-_MAX_LETTERS = 80  # of a name, that are compared
-_MIN_DETERMINANT = 1e-9  # of a matrix, relative to its size cubed
+_SUGGESTIONS = 3  # names that an error message proposes
+_MAX_LETTERS = 80  # compared letters of a name
+_MIN_DETERMINANT = 1e-9  # least determinant of a matrix, relative to the cube of its norm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,12 +40,12 @@ class Pose(ShortRepr):
         space to its parent's, in the units of the file, as animations have it.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
-        person of the same topology, or a motion from elsewhere.
+        person of the same topology, or a motion from another program.
 
     Raises
     ------
     DermisError
-        If weights or bones are no mappings.
+        If weights or bones are not mappings.
 
     Examples
     --------
@@ -129,9 +129,9 @@ class Pose(ShortRepr):
         )
 
     def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones of the pose, with the bone rotations of active morph targets added to angles.
+        """Return the bones of the pose, rotated in addition by the active morph targets.
 
-        A bone that is given by a matrix is not changed.
+        Bones that are given by a matrix are not changed.
         """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
@@ -166,7 +166,7 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Return a pose completed from a base: weights, bones and positions that `pose` does not set."""
+    """Return a pose with weights, bones and positions of a base wherever `pose` does not set them."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)
@@ -207,7 +207,7 @@ def _bone_transforms(
 def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
-    names : (n,) of the bones
+    names : (n,) names of the bones
     """
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
@@ -225,7 +225,7 @@ def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
 def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
-    names : of the morph targets of the rig
+    names : names of the morph targets of the rig
     """
     for name, weight in weights.items():
         if name not in names:

@@ -9,8 +9,8 @@ from dermis.base.errors import refuse
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 
 SKIN = (Material("skin"),)
-# Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and
-# left, top and side length of its chart.
+# Faces of a box. For each: its corners (x, y, z) in 0..1, clockwise from the top left as seen from outside;
+# and the left, top and side length of its chart in uv.
 _WEDGE_FACES = (
     (((0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1)), (0.02, 0.02, 0.45)),
     (((1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0)), (0.52, 0.02, 0.45)),
@@ -55,10 +55,10 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     """Return a sphere about the origin with latitude-longitude uv; v is 0 at +Y, the north pole.
 
-    u goes around +Y from -Z by -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an
+    u goes around +Y from -Z via -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an
     apex vertex of its own, with u at the middle of its base, so that none is degenerate.
 
-    radius_mm : [mm]
+    radius_mm : radius [mm]
     segments, rings : number of cells around the axis, and from pole to pole, at least 3 and 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):

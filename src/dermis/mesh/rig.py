@@ -13,7 +13,7 @@ from dermis.base.disk import cached_array
 from dermis.base.summary import ShortRepr
 from dermis.mesh.eyeball import LidContact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
-from dermis.mesh.outline import RigOutline, find_outline_points, hull_corners, rig_outline
+from dermis.mesh.outline import RigOutline, extreme_points, find_outline_points, rig_outline
 from dermis.mesh.rotations import rigid_motion
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
@@ -29,11 +29,11 @@ __all__ = [
     "no_targets",
 ]
 
-_CACHE_VERSION = "outline 6"  # to be changed when other points are found
+_CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
-    """State of a rig as arrays, as the device uses it.
+    """State of a rig as arrays, which are uploaded to the device.
 
     weights : (t,) weights of the targets, relative to the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
@@ -65,9 +65,9 @@ class Stencils(ShortRepr):
 
 
 class BoneRotation(NamedTuple):
-    """Rotation of a bone that a morph target makes in addition to its displacements.
+    """Rotation of a bone by a morph target, in addition to the target's displacements.
 
-    target, bone : names
+    target, bone : names of the target and of the bone
     degrees : angles about the head's x, y and z at weight 1
     """
 
@@ -94,19 +94,17 @@ class Rig(ShortRepr):
     positions_mm : (p, 3) control points at rest, in head space
     targets, skeleton : morph targets and bones; `skeleton` is None without bones
     stencils : subdivision from control points to mesh points; None without subdivision
-    vertex_point : (v,) control point of each vertex of the file's mesh; None if it is `Mesh.point`
     bone_rotations : rotations of bones by morph targets
-    rigid_followers : points that are not in the file, such as fitted eyeballs; they come after its own
+    rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None to let them intersect
-    template : rig of the same topology whose outline points are reused, in addition to the corners of the
-        convex hull; None to search outline points
+    template : rig of the same topology whose outline points are used, together with the extreme points of
+        this rig; None to search for outline points
     """
 
     positions_mm: Floats
     targets: MorphTargets = field(default_factory=no_targets)
     skeleton: Skeleton | None = None
     stencils: Stencils | None = None
-    vertex_point: Ints | None = None
     bone_rotations: tuple[BoneRotation, ...] = ()
     rigid_followers: tuple[RigidFollowers, ...] = ()
     contact: LidContact | None = None
@@ -124,7 +122,7 @@ class Rig(ShortRepr):
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3), given those of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """
@@ -148,8 +146,7 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If the rest positions in `motion` differ from those of the rig, the corners of their convex hull are
-        added.
+        If `motion` has other rest positions than the rig, the extreme points of these are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -162,7 +159,7 @@ class Rig(ShortRepr):
         """
         points, outline = self._last_outline
         if not np.array_equal(positions[points].T, outline.rest_mm[:3]):
-            points = np.union1d(self._outline_points, hull_corners(positions))
+            points = np.union1d(self._outline_points, extreme_points(positions))
             outline = rig_outline(positions, self.targets, self.skeleton, points)
             vars(self)["_last_outline"] = points, outline
         return outline
@@ -174,7 +171,7 @@ class Rig(ShortRepr):
     @cached_property
     def _outline_points(self) -> Intp:
         if self.template is not None:
-            return np.union1d(self.template._outline_points, hull_corners(self.positions_mm))
+            return np.union1d(self.template._outline_points, extreme_points(self.positions_mm))
         targets, skeleton = self.targets, self.skeleton
         sources: list[Numbers] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
         if skeleton is not None:
@@ -202,7 +199,11 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return control points of the lid edges, their weights in edge points, and their outline."""
+        """Return the control points that determine the lid edges, and how they do.
+
+        The second result is the weights (e, n) of the n control points in the points of the edges, the third
+        is an outline that poses the control points.
+        """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))
@@ -246,8 +247,8 @@ class Rig(ShortRepr):
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """Return all control points in a pose, (p, 3) [mm]; the reference for the computation on the device.
 
-        weights : (t,) of the targets, relative to the rest pose
-        matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; None for the rest pose
+        weights : (t,) weights of the targets, relative to the rest pose
+        matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         row_weights = np.repeat(weights, np.diff(targets.first))

@@ -66,7 +66,7 @@ def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
     """Return the Euler angles about x, y and z [degrees] of a rotation matrix (3, 3), see `angles_matrix`."""
     m = np.asarray(matrix, np.float64)
     x = math.asin(min(max(-m[1, 2], -1.0), 1.0))
-    if abs(m[1, 2]) > 1 - 1e-9:  # gimbal lock: y and z have one axis
+    if abs(m[1, 2]) > 1 - 1e-9:  # gimbal lock: the axes of y and z coincide
         return math.degrees(x), math.degrees(math.atan2(-m[2, 0], m[0, 0])), 0.0
     y, z = math.atan2(m[0, 2], m[2, 2]), math.atan2(m[1, 0], m[1, 1])
     return math.degrees(x), math.degrees(y), math.degrees(z)
@@ -77,7 +77,7 @@ def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
 
     Kabsch's method: the least squares solution from the singular value decomposition of the covariance.
 
-    before, after : (n, 3)
+    before, after : (n, 3) positions of the points
     """
     centre, new_centre = before.mean(axis=0), after.mean(axis=0)
     u, _, vh = np.linalg.svd((before - centre).T @ (after - new_centre))

@@ -13,20 +13,20 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.rotations import angles_matrix
 
 INFLUENCES = 4
-"""Number of bones that move a point; of more, those with the largest weights are kept."""
+"""Largest number of bones that move a point; if a file has more, those with the largest weights are kept."""
 _IDENTITY = np.eye(4)
-_MAX_SEQUENTIAL = 12
+_MAX_SEQUENTIAL = 12  # largest number of moving bones that are handled one after the other
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Skeleton(ShortRepr):
     """Hierarchy of b bones, parents before children, with the skin weights of p points.
 
-    names : (b,)
+    names : (b,) names of the bones
     parent : (b,) index of each bone's parent, -1 for a root
-    local : (b, 4, 4) from each bone's space to its parent's, at rest
-    inverse_bind : (b, 4, 4) from the file's space to the bone's, in the bind pose
-    to_head : (4, 4) from the file's space to the head's [mm]
+    local : (b, 4, 4) rest transforms from each bone's space to its parent's space
+    inverse_bind : (b, 4, 4) transforms from file space to each bone's space, in the bind pose
+    to_head : (4, 4) transform from file space to head space [mm]
     bone, weight : (p, 4) bones that each point follows, and their weights, which sum to 1
     """
 
@@ -41,7 +41,7 @@ class Skeleton(ShortRepr):
     def matrices(self, local: Doubles | None = None) -> Doubles:
         """Return the bone matrices (b, 3, 4), which transform points at rest in head space [mm].
 
-        local : (b, 4, 4) from each bone's space to its parent's; None for the rest pose
+        local : (b, 4, 4) transforms from each bone's space to its parent's space; None for the rest pose
         """
         world = self._bone_to_file(self.local if local is None else local)
         matrices = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
@@ -74,7 +74,7 @@ class Skeleton(ShortRepr):
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
     def head_space_transforms(self, bones: Sequence[int], local: Doubles) -> Doubles:
-        """Return head-space transforms (n, 4, 4) that give n bones other transforms than at rest [mm].
+        """Return the head-space transforms (n, 4, 4) by which n bones leave their rest pose [mm].
 
         bones : (n,) indices of the bones
         local : (n, 4, 4) new transforms from the space of each bone to its parent's
@@ -142,7 +142,7 @@ class Skeleton(ShortRepr):
     def _parent_to_head(self) -> Doubles:
         """Return the matrices (b, 4, 4) from the space of each bone's parent to head space, at rest."""
         to_head = np.concatenate([self.to_head @ self._bone_to_file(self.local), self.to_head[None]])
-        return np.asarray(to_head[self.parent])  # the last one is for roots, with parent -1
+        return np.asarray(to_head[self.parent])  # the last matrix is for roots, whose parent is -1
 
     @cached_property
     def _head_to_bone(self) -> Doubles:

@@ -1,4 +1,4 @@
-"""Position of the skull in a mesh: a head or bust, or a body with a head bone or eyes, or that stands."""
+"""Position of the skull in a mesh: a head, a bust, or a body that stands or has a head bone or eyes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from dermis.base.arrays import Doubles, Floats, Ints
 
 Point = tuple[float, float, float]
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
-_HEAD_HEIGHT_MM = 100.0, 1000.0  # of heads and busts
+_HEAD_HEIGHT_MM = 100.0, 1000.0  # smallest and largest height of heads and busts
 _MIN_BODY_HEIGHT_MM = 300.0
 MAX_ELONGATION = 2.4
 """Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
-_MAX_RELATIVE_WIDTH = 3.0  # of a bust
+_MAX_RELATIVE_WIDTH = 3.0  # largest width of a bust relative to its depth
 _EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
-_MAX_FLATNESS = 0.5  # thickness relative to width of what is seen from its flat side
-_MIN_MEAN_NORMAL = 0.2  # of an open piece; of closed meshes it is 0
+_MAX_FLATNESS = 0.5  # thickness relative to width below which a mesh is flat
+_MIN_MEAN_NORMAL = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 # Sections of a standing figure, as fractions of its height, and widths relative to its height.
 _HEAD_SECTION, _NECK_SECTIONS, _SHOULDER_SECTIONS = 0.95, (0.82, 0.85, 0.88), (0.74, 0.77, 0.8)
@@ -137,9 +137,9 @@ class _Section(NamedTuple):
 
 
 def _section(positions: Doubles, cut: Ints, height: float) -> _Section:
-    """Return the section at a height.
+    """Return the section of a mesh with the horizontal plane at a height.
 
-    cut : (n, 3) vertex indices of the triangles that it cuts
+    cut : (n, 3) vertex indices of the triangles that the plane cuts
     """
     if not len(cut):
         return _Section(0, 0.0, 0.0)

@@ -74,9 +74,9 @@ class Strands(ShortRepr):
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
-    """Express knot offsets from each root in the frame of that root, as `Strands.knots_mm` has them.
+    """Express knot offsets from each root in the frame of that root, as in `Strands.knots_mm`.
 
-    offsets_mm : (n, k, 3) in head space, on the mesh at rest
+    offsets_mm : (n, k, 3) offsets in head space, on the mesh at rest
     """
     return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
@@ -127,14 +127,13 @@ def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tu
 def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
     """Return the positions of roots (3, n) and of the corners of their quads (4, 3, n) [mm], as columns."""
     columns = np.ascontiguousarray(points_mm.T, np.float64)
-    corners = columns.take(
-        quad_corners(mesh, roots.quad).T, axis=1
-    )  # `take` is ten times faster than indexing
+    # `take` is ten times faster than indexing
+    corners = columns.take(quad_corners(mesh, roots.quad).T, axis=1)
     return interpolate_quads(roots.position, corners), corners.transpose(1, 0, 2)
 
 
 def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubles:
-    """Interpolate c quantities bilinearly in quads, from the corners (c, 4, n) to a position in each, (c, n).
+    """Interpolate c quantities bilinearly from the corners of n quads (c, 4, n) to a point in each, (c, n).
 
     position : (n, 2) bilinear coordinates, see `Roots`
     """
@@ -150,7 +149,7 @@ def refine_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
 
     The first corner of each finer quad is a corner of the coarser face.
 
-    mesh : before subdivision
+    mesh : mesh before subdivision
     """
     loose_triangles = len(mesh.triangles) - 2 * len(mesh.quads)
     quad, position = roots.quad.astype(np.int64), roots.position.astype(np.float64)

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 MAX_LEVELS = 3
-_CACHE_VERSION = "subdivision 1"  # to be changed when weights or corners change for the same mesh
+_CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
 _CACHED_TRIANGLES = 500_000
-"""Number of finer triangles from which weights are cached on disk, which saves half a second or more."""
+"""Smallest number of triangles of a finer mesh whose weights are cached on disk, to save half a second."""
 Corners = NDArray[np.integer]
 
 
@@ -41,9 +41,9 @@ class Refinement:
     """Subdivision of all meshes of one topology: v finer vertices at q finer points.
 
     weights : (q, p) weights of the control points in each finer point
-    stencils : these weights as a rig stores them
+    stencils : the same weights in the format of a rig
     uv, point : (v, 2) and (v,) uv and point of the finer vertices
-    triangles, material, quads : of the finer mesh, see `Mesh`
+    triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
 
     weights: csr_array
@@ -133,7 +133,7 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
 def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Return the arrays of a subdivision, cached on disk for large meshes.
 
-    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
     if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
         return _compute_refinement(mesh, levels, by_quads)
@@ -148,7 +148,7 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Return the arrays of a subdivision by name: corners of finer faces, and control point weights.
 
-    by_quads : whether to use the rules of Catmull and Clark, else those of Loop
+    by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
     triangles = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
     faces = polygons(mesh) if by_quads else triangles
@@ -186,9 +186,9 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) of a subdivided head that leave out levels of subdivision in flat regions.
+    """Return triangles (t, 3) that cover a subdivided head with fewer levels of subdivision in flat regions.
 
-    The vertices are those of the subdivided mesh. Triangles that are cut out by their opacity are left out.
+    The vertices are those of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : smallest number of faces of the coarsest level
     tolerance_mm : largest distance of a left out vertex from the coarse edge that replaces it

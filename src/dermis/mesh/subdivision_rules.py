@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Cage(NamedTuple):
     """Polygons before a level of subdivision.
 
-    uv : (v, 2) of each vertex
+    uv : (v, 2) uv of each vertex
     point : (v,) point of each vertex
     corner : (n,) vertices at the corners, face by face
     sides : (f,) number of corners of each face
@@ -42,9 +42,9 @@ class _Sides:
     face : (n,) face of each side
     ends : (e, 2) points at the ends of each edge
     edge : (n,) edge of each side
-    border : (e,) whether the number of sides of an edge is not two
-    seam_edges, seam_edge : edges as pairs of vertices, and the one of each side; an edge on a uv seam counts
-        twice
+    border : (e,) mask of edges whose number of sides is not two
+    seam_edges, seam_edge : edges as pairs of vertices, and the index of each side's edge; an edge on a uv
+        seam counts twice
     """
 
     points: int
@@ -95,7 +95,9 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
     sides = _find_sides(cage)
     # total weight of all neighbours
     neighbours = np.where(sides.valence == 3, 9 / 16, 3 / 8)
-    old = _old_point_weights(sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), along=1 / 8)
+    old = _old_point_weights(
+        sides, 1 - neighbours, neighbours / np.maximum(sides.valence, 1), border_weight=1 / 8
+    )
     opposite = sides.start[sides.previous]
     ends = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 3 / 8))
     new = ends + _sparse_matrix(sides.edge, opposite, _inner_edge_weights(sides, 1 / 8), ends.shape)
@@ -123,7 +125,7 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
     new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4))
     weights = _inner_edge_weights(sides, 1 / 4)
     new += _sparse_matrix(sides.edge, sides.face, weights, (len(sides.ends), count)) @ centres
-    old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, along=1 / 8)
+    old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, border_weight=1 / 8)
     weights = _inner_point_weights(sides, 1 / n**2)
     old += _sparse_matrix(sides.start, sides.face, weights, (sides.points, count)) @ centres
     uv, point = _add_edge_vertices(cage, sides)
@@ -146,7 +148,7 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
     """
     sides = _find_sides(cage)
     n = np.maximum(sides.valence, 1)
-    direct = _old_point_weights(sides, n / (n + 5), 4 / (n * (n + 5)), along=1 / 6)
+    direct = _old_point_weights(sides, n / (n + 5), 4 / (n * (n + 5)), border_weight=1 / 6)
     opposite = sides.start.reshape(-1, 4)[:, [2, 3, 0, 1]].ravel()
     diagonal = _sparse_matrix(
         sides.start, opposite, _inner_point_weights(sides, 1 / (n * (n + 5))), direct.shape
@@ -169,7 +171,7 @@ def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
-    """Return the matrix (e, p) that gives the points at both ends of an edge its weight.
+    """Return the matrix (e, p) whose entries for both end points of an edge are the edge's weight.
 
     weight : (e,) weight of each edge
     """
@@ -177,25 +179,27 @@ def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
     return _sparse_matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
 
 
-def _old_point_weights(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
+def _old_point_weights(
+    sides: _Sides, inner_weight: Doubles, neighbour_weight: Doubles, border_weight: float
+) -> csr_array:
     """Return the weights (p, p) of old points in the new positions of the old points.
 
-    own, each : (p,) for inner points: weight of the point itself, and of each neighbour
-    along : for border points: weight of either neighbour on the border
+    inner_weight, neighbour_weight : (p,) weights of an inner point itself, and of each of its neighbours
+    border_weight : weight of each of the two neighbours of a border point on the border
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
-    neighbour_weight = np.where(is_inner, each, 0)[both]
-    neighbour_weight[np.tile(sides.border, 2) & is_border[both]] = along
-    # points where borders meet, or where the surface is not manifold, stay
-    own_weight = np.where(is_inner, own, np.where(is_border, 1 - 2 * along, 1))
-    index, weights = np.arange(sides.points), np.concatenate((own_weight, neighbour_weight))
+    edge_weights = np.where(is_inner, neighbour_weight, 0)[both]
+    edge_weights[np.tile(sides.border, 2) & is_border[both]] = border_weight
+    # points where borders meet, or where the surface is not manifold, do not move
+    own_weights = np.where(is_inner, inner_weight, np.where(is_border, 1 - 2 * border_weight, 1))
+    index, weights = np.arange(sides.points), np.concatenate((own_weights, edge_weights))
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
     return _sparse_matrix(rows, columns, weights, (sides.points, sides.points))
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
-    """Return uv and point of the old vertices, followed by those of a vertex in the middle of each edge."""
+    """Return uv and point of the old vertices, followed by a new vertex in the middle of each edge."""
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))

@@ -69,7 +69,7 @@ def _reduced(mu_s: float, g: float) -> float:
 
 
 def _numbers(cells: list[str]) -> list[float]:
-    """Return numbers in text; none if there is other text."""
+    """Return the numbers in cells of text; an empty list if any cell is not a number."""
     try:
         return [float(cell) for cell in cells]
     except ValueError:

@@ -17,9 +17,9 @@ from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
-_DISTANCE_MM = 1100.0  # of portrait photography; from a shorter distance the nose looks large
-_RELATIVE_DISTANCE = 3.0  # to the size of what is shown as a whole
-_MARGIN = 1.08
+_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
+_RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
+_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
 _UP = (0.0, 1.0, 0.0)
 
 
@@ -144,7 +144,7 @@ class Camera(FrozenModel):
 
 
 def portrait(head: Head) -> Camera:
-    """Return a camera that shows head and shoulders from the front, also those of a body.
+    """Return a camera that shows head and shoulders from the front.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def full_body(head: Head) -> Camera:
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m, or three times the size of what it shows.
+        Camera at a distance of 1.1 m or, if that is more, of three times the size of the mesh.
 
     Examples
     --------
@@ -268,7 +268,7 @@ CAMERA_PRESETS = {
     "cheek": cheek,
     "full_body": full_body,
 }
-"""Functions of the head that return a camera, by name; hyphens and underscores are alike."""
+"""Functions of the head that return a camera, by name; hyphens and underscores are interchangeable."""
 
 
 def camera_preset(name: str, head: Head) -> Camera:
@@ -299,7 +299,8 @@ def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
 def _show_all(head: Head, degrees: float) -> Camera:
     """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
     x, _, z = _azimuth_direction(degrees)
-    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes  # to the right, up and back
+    # rows: to the right, up and towards the camera
+    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
     points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))

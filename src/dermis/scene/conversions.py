@@ -55,9 +55,9 @@ def as_lights(lights: object, head: Head) -> Sequence[Light]:
     if not isinstance(lights, Iterable) or isinstance(lights, Mapping | FrozenModel):
         refuse("lights", "a list of lights", f"got {format_value(lights)}", advice)
     light_list = lights if isinstance(lights, list | tuple) else tuple(lights)
-    for number, light in enumerate(light_list):
+    for index, light in enumerate(light_list):
         if not isinstance(light, Light):
-            refuse(f"lights[{number}]", "a light", f"got {format_value(light)}", advice)
+            refuse(f"lights[{index}]", "a light", f"got {format_value(light)}", advice)
     return _check_positions(light_list)
 
 

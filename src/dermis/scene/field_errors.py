@@ -115,21 +115,21 @@ def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dic
     return {".".join(str(part) for part in one["loc"]): _format_error(one, model) for one in errors}
 
 
-def _format_error(one: ErrorDetails, model: type[BaseModel]) -> str:
+def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return the message "expected ..., but got ..." for one validation error of pydantic."""
-    if one["type"] == "extra_forbidden":
-        return _unknown_field(str(one["loc"][-1]), model)
-    if one["type"] == "missing":
+    if error["type"] == "extra_forbidden":
+        return _unknown_field(str(error["loc"][-1]), model)
+    if error["type"] == "missing":
         return "expected a value, but there is none"
-    expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", one["msg"])
-    expected = expected.replace("a valid tuple", f"a list{_list_length(one, model)}")
-    if one["type"] in _BOUND_ERRORS | _NUMBER_ERRORS:
-        expected = _number_range(one["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
-    if len(one["loc"]) == 1 and (words := field_keywords(model, str(one["loc"][0]))):
+    expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", error["msg"])
+    expected = expected.replace("a valid tuple", f"a list{_list_length(error, model)}")
+    if error["type"] in _BOUND_ERRORS | _NUMBER_ERRORS:
+        expected = _number_range(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
+    if len(error["loc"]) == 1 and (words := field_keywords(model, str(error["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
-    actual = format_value(one["input"])
-    if not one["loc"] and isinstance(one["input"], dict):  # inconsistent values of several fields
-        values = ", ".join(f"{name} {format_value(value)}" for name, value in one["input"].items())
+    actual = format_value(error["input"])
+    if not error["loc"] and isinstance(error["input"], dict):  # inconsistent values of several fields
+        values = ", ".join(f"{name} {format_value(value)}" for name, value in error["input"].items())
         actual = shorten(values, _MAX_TABLE_LENGTH)
     return f"expected {expected}, but got {actual}"
 
@@ -165,9 +165,9 @@ def _leaf_types(kind: Any) -> Iterator[Any]:
         yield kind
 
 
-def _list_length(one: ErrorDetails, model: type[BaseModel]) -> str:
+def _list_length(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
-    info = model.model_fields.get(str(one["loc"][0])) if len(one["loc"]) == 1 else None
+    info = model.model_fields.get(str(error["loc"][0])) if len(error["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 

@@ -40,7 +40,7 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, which replace those of the mesh file; None for no choice
+    files : picture files by role, which replace the mesh file's pictures; None keeps the mesh file's picture
     height_mm, normal_y : see `load_maps`
     """
 
@@ -49,20 +49,20 @@ class MapOptions:
     normal_y: NormalY = "up"
 
     @property
-    def given(self) -> dict[str, MapFile]:
-        """Return the files that users name."""
+    def user_files(self) -> dict[str, MapFile]:
+        """Return the files that the user has chosen, by role."""
         return {role: file for role, file in self.files.items() if file is not None}
 
     @property
-    def replaced(self) -> set[str]:
-        """Return the roles of pictures of the file that the given files replace."""
+    def replaced_roles(self) -> set[str]:
+        """Return the roles for which the user's files replace pictures of the mesh file."""
         relief = {"normal", "height", "bump"}
-        return {*self.given, *(relief if relief & self.given.keys() else ())}
+        return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 
     def load(self, files: Mapping[str, Any]) -> Maps:
-        """Return the maps of the given files and, for other roles, of those that belong to the mesh.
+        """Load the user's files and, for all other roles, the pictures of the mesh.
 
-        files : pictures of the mesh by role, and "height_mm" of its height map
+        files : pictures of the mesh by role, and under "height_mm" the relief of its height map
         """
         chosen: dict[str, Any] = {
             role: files.get(role) if file is None else file for role, file in self.files.items()
@@ -73,14 +73,14 @@ class MapOptions:
 
     def relief_mm(self, files: Mapping[str, Any]) -> float | None:
         """Return the relief of one grey level of the height map [mm]."""
-        own = files.get("height_mm") if self.files["height"] is None else None
-        return own if self.height_mm is None else self.height_mm
+        mesh_relief_mm = files.get("height_mm") if self.files["height"] is None else None
+        return mesh_relief_mm if self.height_mm is None else self.height_mm
 
 
 def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
-    """Return the head of a sample or a mesh file, and the look of its eyes that the file states.
+    """Return the head of a sample or a mesh file, and the eye look that the file states.
 
-    name : of the sample or of the file
+    name : name of the sample or of the file
     mesh_options : keyword arguments of `load_rigged`
     """
     sample = SAMPLES.get(name)
@@ -95,10 +95,10 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     )
     check_uv_range(mesh, path)
     check_relief(options.height_mm, maps.height, f"{name}: height_mm")
-    maps, tone_note = (maps, "") if "colour" in options.given else with_skin_tone(mesh, maps)
+    maps, tone_note = (maps, "") if "colour" in options.user_files else with_skin_tone(mesh, maps)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
         notify(f"{path}: {note}")
-    return Head(name, mesh, maps, "", rigged.rig), look
+    return Head(name, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
 
 
 def _load_mesh(path: Path, name: str, mesh_options: dict[str, Any]) -> RiggedMesh:
@@ -112,15 +112,16 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
-    own = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
-    if own["v_origin"] == "auto":
-        own["v_origin"] = sample.v_origin or "auto"
+    sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
+    if sample_options["v_origin"] == "auto":
+        sample_options["v_origin"] = sample.v_origin or "auto"
     with ThreadPoolExecutor(1) as pool:
         pending_maps = pool.submit(options.load, {**files, "height_mm": sample.height_mm})
-        rigged = _load_mesh(files["mesh"], sample.name, own)
+        rigged = _load_mesh(files["mesh"], sample.name, sample_options)
         maps = pending_maps.result()
     check_relief(options.height_mm, maps.height, f"{sample.name}: height_mm")
-    return Head(sample.name, rigged.mesh, maps, f"{sample.attribution}, {sample.licence}", rigged.rig)
+    credit = f"{sample.attribution}, {sample.licence}"
+    return Head(sample.name, rigged.mesh, maps, credit, rigged.rig, file_vertices=rigged.file_vertices)
 
 
 def _with_materials(
@@ -128,26 +129,29 @@ def _with_materials(
 ) -> tuple[Mesh, Maps, list[str]]:
     """Return mesh and maps of a file with materials, and notes on properties that are not drawn."""
     direct = direct_material(rigged, materials)
-    pack_skin = direct is None and not options.given
+    pack_skin = direct is None and not options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
     loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
     roles = [one.name for one in fields(Maps)]
-    maps = replace(packed, **{role: own for role in roles if (own := getattr(loaded, role)) is not None})
-    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced, pack_skin)
+    loaded_maps = {role: one for role in roles if (one := getattr(loaded, role)) is not None}
+    maps = replace(packed, **loaded_maps)
+    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced_roles, pack_skin)
     return mesh, maps, [*notes, *faults, unused]
 
 
 def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tuple[Maps, list[str]]:
-    """Return the maps of a material whose pictures are those of the skin, and notes on maps left out."""
+    """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
     if path.suffix.lower() != ".obj" or not material.name:
-        return with_factors(options.load(material.skin_pictures()), material, options.given), []
-    own, faults = obj_maps(
+        return with_factors(options.load(material.skin_pictures()), material, options.user_files), []
+    mtl_maps, faults = obj_maps(
         path,
         material.name,
-        overridden=options.given,
+        overridden=options.user_files,
         height_mm=options.height_mm,
         normal_y=options.normal_y,
     )
     loaded = options.load({})
-    given: dict[str, Any] = {role: getattr(loaded, role) for role in options.given}
-    return with_factors(replace(own, **given), material, {*options.given, "roughness"}), faults
+    chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in options.user_files}
+    return with_factors(
+        replace(mtl_maps, **chosen_maps), material, {*options.user_files, "normal", "roughness"}
+    ), faults

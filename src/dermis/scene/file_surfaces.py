@@ -1,4 +1,4 @@
-"""Maps and materials of heads from mesh files: the pictures of each material on the parts that have it."""
+"""Maps and materials of heads from mesh files, made from the pictures of each material."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh whose skin has uv everywhere: a new layout where the file has none, with a note."""
+    """Return a mesh with a new uv layout for its skin groups without uv, and with a note on them."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -33,20 +33,19 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
         colours=None if surface.colours is None else surface.colours[vertex],
         other_uv={index: uv[vertex] for index, uv in surface.other_uv.items()},
     )
-    rig = rigged.rig and replace(rigged.rig, vertex_point=mesh.point)
     names = ", ".join(repr(own.name) for own, without in zip(mesh.materials, bare, strict=True) if without)
     note = f"{names} has no uv; the package lays it out"
-    return rigged._replace(mesh=laid_out, rig=rig, notes=(*rigged.notes, note), surface=changed)
+    return rigged._replace(mesh=laid_out, notes=(*rigged.notes, note), surface=changed)
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures are the maps of the skin as they are, None if they must be packed.
+    """Return the material whose pictures serve unchanged as maps of the skin; None if they must be packed.
 
     rigged, materials : mesh and materials of a file
     """
     mesh, surface = rigged.mesh, rigged.surface
-    skin = _members(mesh, "skin")
-    used = {index for index, own in zip(surface.in_file, skin, strict=True) if own}
+    skin = _materials_of_kind(mesh, "skin")
+    used = {index for index, is_skin in zip(surface.in_file, skin, strict=True) if is_skin}
     if len(used) != 1:
         return None
     index = used.pop()
@@ -59,32 +58,36 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
-def with_factors(maps: Maps, material: FileMaterial, given: Collection[str]) -> Maps:
-    """Return the maps of a skin material with its factors; roughness is the square of the file's.
+def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
+    """Return the maps of a skin material, multiplied by its factors; roughness is squared.
 
-    given : roles of maps that users replace, to which the factors do not apply
+    user_roles : roles of maps that the user replaces, to which the factors do not apply
     """
     changed: dict[str, Any] = {}
-    if material.maps is None and "colour" not in given and material.colour not in (None, (1.0, 1.0, 1.0)):
+    if (
+        material.maps is None
+        and "colour" not in user_roles
+        and material.colour not in (None, (1.0, 1.0, 1.0))
+    ):
         white = np.ones((1, 1, 3), np.float32)
         changed["colour"] = (white if maps.colour is None else maps.colour) * np.array(
             material.colour, np.float32
         )
-    if maps.normal is not None and "normal" not in given and material.normal_scale != 1.0:
+    if maps.normal is not None and "normal" not in user_roles and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
-    if material.maps is None and "roughness" not in given and "roughness" in material.textures:
+    if material.maps is None and "roughness" not in user_roles and "roughness" in material.textures:
         values = read_role(material.textures["roughness"], "roughness")[..., 0]
         changed["roughness"] = (values * np.float32(material.roughness)) ** 2
     return replace(maps, **changed)
 
 
-def _members(mesh: Mesh, kind: str) -> Mask:
+def _materials_of_kind(mesh: Mesh, kind: str) -> Mask:
     """Return the mask (m,) of the mesh's materials of a kind."""
     return np.array([material.kind == kind for material in mesh.materials])
 
 
 def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
-    """Return whether vertices of some materials have a colour other than white."""
+    """Return whether any vertex of the materials in a mask has a colour other than white."""
     if surface.colours is None:
         return False
     return bool((surface.colours[np.unique(mesh.triangles[members[mesh.material]])] < 1.0).any())
@@ -93,14 +96,16 @@ def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
 def with_file_textures(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
 ) -> tuple[Mesh, Maps, tuple[str, ...]]:
-    """Return the mesh with uv in common maps, the maps, and notes on what is not exact.
+    """Pack the pictures of materials; return the mesh with uv in common maps, the maps, and notes.
+
+    The notes are sentences for users about lost detail.
 
     rigged, materials : mesh and materials of a file
     pack_skin : whether the maps of the skin are packed, see `direct_material`
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()
     if pack_skin:
-        packed = pack_textures(mesh, rigged.surface, materials, _members(mesh, "skin"))
+        packed = pack_textures(mesh, rigged.surface, materials, _materials_of_kind(mesh, "skin"))
         mesh, maps = _with_uv(mesh, packed), _skin_maps(packed)
         notes += [f"skin: {note}" for note in packed.notes]
     pictured = _pictured_parts(mesh, rigged.surface, materials)
@@ -133,14 +138,14 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
 
 def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
-    opaque = _members(mesh, "opaque")
-    if any(one.maps is not None for one in materials):  # eyes in files of this package are fitted again
+    opaque = _materials_of_kind(mesh, "opaque")
+    if any(one.maps is not None for one in materials):  # this package wrote the file; eyes are fitted again
         opaque &= ~np.array([one.eye for one in mesh.materials])
     pictured = np.zeros_like(opaque)
     for index in np.flatnonzero(opaque):
-        own, in_file = np.arange(len(opaque)) == index, surface.in_file[index]
+        selected, in_file = np.arange(len(opaque)) == index, surface.in_file[index]
         has_pictures = in_file >= 0 and bool(materials[in_file].textures) and surface.has_uv[index]
-        pictured[index] = has_pictures or _has_colours(mesh, surface, own)
+        pictured[index] = has_pictures or _has_colours(mesh, surface, selected)
     return pictured
 
 
@@ -151,7 +156,7 @@ def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
 
 
 def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
-    """Return a changed mesh of the same shape with the outline of the original, a costly hull."""
+    """Return a changed mesh of the same shape with the cached outline of the original."""
     vars(changed)["outline"] = mesh.outline
     return changed
 
@@ -177,7 +182,7 @@ def _emission(values: Floats | None) -> Floats | None:
 
 
 def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
-    """Return an opaque material with the surface that its file states."""
+    """Return an opaque material with the surface properties of its file."""
     if material.kind == "skin":
         return material
     if in_file is None:
@@ -196,33 +201,35 @@ def unused_properties(
     mesh: Mesh,
     materials: Sequence[FileMaterial],
     in_file: Sequence[int],
-    given: Collection[str],
+    user_roles: Collection[str],
     is_packed: bool,
 ) -> str:
-    """Return the note on what of a file's materials is not drawn; empty for nothing.
+    """Return a note on properties of a file's materials that are not drawn; empty if there are none.
 
     in_file : (m,) index of the file's material for each material of the mesh, -1 for none
-    given : roles of maps of the skin that users replace
+    user_roles : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
         return ""
     lines = dict[str, None]()
     for material, index in zip(mesh.materials, in_file, strict=True):
-        own, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
-        unused = list(own.unused)
-        unused += [text for role, text in own.missing.items() if not (is_skin and role in given)]
-        if is_skin and own.maps is None:
-            unused += _replaced_by_skin(own)
+        file_material, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
+        unused = list(file_material.unused)
+        unused += [
+            text for role, text in file_material.missing.items() if not (is_skin and role in user_roles)
+        ]
+        if is_skin and file_material.maps is None:
+            unused += _replaced_by_skin(file_material)
         if not is_skin or is_packed:
-            unused += own.skin_only
+            unused += file_material.skin_only
         if unused:
-            lines[f"{own.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
+            lines[f"{file_material.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
     return "\n  ".join(["not drawn, or replaced by the properties of skin:", *lines]) if lines else ""
 
 
 def _replaced_by_skin(material: FileMaterial) -> list[str]:
-    """Return the properties of a material that skin has itself."""
+    """Return the properties of a material that the settings of the skin replace."""
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from dermis.base.errors import error_context, refuse
 from dermis.base.reading import checked_path, is_file, read_toml
+from dermis.base.renamed import renamed_keywords
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
@@ -68,7 +69,7 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
 
 
 def load_camera(name: str | Path, head: Head) -> Camera:
-    """Return the camera of a preset, placed for the head, or that of the [camera] table in a TOML file."""
+    """Return the camera of a preset, placed for the head, or of the [camera] table in a TOML file."""
     preset = find_preset(str(name))
     if preset is not None:
         return preset(head)
@@ -76,9 +77,10 @@ def load_camera(name: str | Path, head: Head) -> Camera:
     return _build_settings(Camera, name, "camera", table)
 
 
+@renamed_keywords(known="head")
 def load_scene(
     path: str | Path,
-    known: Head | None = None,
+    head: Head | None = None,
     *,
     camera: str | None = None,
     size: tuple[int, int] | None = None,
@@ -88,19 +90,20 @@ def load_scene(
     Tables: [head] (`name` of a file or a sample, options of `load_head`, and `regions`, a table for
     `with_regions`), [pose] (`weights` and `bones` by name), [skin] or skin = "deck-2007", [[lights]] or
     lights = "preset", [environment], [camera] or camera = "preset", [render]. Missing keys have their
-    defaults. File names are relative to the folder of the file. A scene with an environment has other lights
-    only if the file names them.
+    defaults. File names are relative to the folder of the file. A scene with an environment has no other
+    lights unless the file names them.
 
     Parameters
     ----------
     path : str or path
         The TOML file.
-    known : Head, optional
-        Head of the file's [head] table, if it is already loaded.
+    head : Head, optional
+        Head to use instead of loading the head of the file's [head] table.
     camera : str, optional
-        Name of the camera that determines the subdivision levels of the head, instead of the file's camera.
+        Name of the camera for which the subdivision levels of the head are chosen, instead of the file's
+        camera.
     size : (int, int), optional
-        Picture size that determines these levels, instead of the file's size [pixel].
+        Picture size for which these levels are chosen, instead of the file's size [pixel].
 
     Returns
     -------
@@ -135,12 +138,13 @@ def load_scene(
     skin = _parse_skin(path, table.get("skin", {}))
     settings = _build_settings(Settings, path, "render", table.get("render", {}))
     head_entry = _build_settings(HeadTable, path, "head", table.get("head"))
-    _check_single_strength(path, head_entry, skin)
+    _check_rho_s_given_once(path, head_entry, skin)
     entry = table.get("camera", "portrait")
     resolve_camera = partial(_parse_camera, path, entry) if camera is None else partial(load_camera, camera)
     picture = SmoothIn(resolve_camera, size or settings.size)
     with error_context(path):
-        head, skin = (known, skin) if known else head_and_skin(head_entry, skin, path.parent, picture)
+        if head is None:
+            head, skin = head_and_skin(head_entry, skin, path.parent, picture)
     environment = _parse_environment(path, table["environment"]) if "environment" in table else None
     pose = _parse_pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")
@@ -210,7 +214,7 @@ def _parse_skin(path: Path, entry: Any) -> Skin:
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
-    """Return the skin with its profile files as paths in a folder."""
+    """Return the skin with the names of its profile files resolved relative to a folder."""
     others = tuple(_resolve_file(folder, name) for name in skin.other_profiles)
     mixture_map = skin.profile_map and _resolve_file(folder, skin.profile_map)
     names = {
@@ -221,7 +225,7 @@ def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
     return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
-def _check_single_strength(path: Path, table: HeadTable, skin: Skin) -> None:
+def _check_rho_s_given_once(path: Path, table: HeadTable, skin: Skin) -> None:
     if has_region_table(vars(table)) and "rho_s" in skin.model_fields_set:
         actual = "it is given beside the head's regions, which set it for each region"
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")

@@ -45,7 +45,7 @@ else:
     ModelMetaclass = type(BaseModel)
 
 MAX_COORDINATE_MM = 1e6
-_DISPLAYED_BOUND = 1e5  # larger bounds only keep numbers finite
+_DISPLAYED_BOUND = 1e5  # larger bounds are not shown to users, as they only keep numbers finite
 _MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
@@ -164,7 +164,7 @@ def field_help(model: type[BaseModel], field: str) -> str:
 
 
 def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """Return the words that a text field accepts; empty for a field that accepts any text or none."""
+    """Return the words that a text field accepts; empty if it accepts any text, and for other fields."""
     info = model.model_fields[field]
     for named in _registry_names(info):
         return named.names

@@ -21,7 +21,7 @@ from dermis.mesh.rotations import angles_matrix
 Doubles = NDArray[np.float64]
 
 MAX_GAZE_WEIGHT = 1.3
-"""Largest weight of a gaze target."""
+"""Largest weight of a gaze target, a morph target that turns an eye."""
 _MAX_BONE_DEGREES = 36.0
 _ROTATION_ITERATIONS = 6
 _SIDES = "Left", "Right"
@@ -31,8 +31,8 @@ _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeb
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
     """Return a pose in which both eyes look at a point and the lids follow.
 
-    The eyes are rotated by the gaze targets of the head (eyeLook... of ARKit) if it has them, otherwise by
-    their bones.
+    The eyes are turned by gaze targets (morph targets such as ARKit's eyeLook...) if the head has them,
+    otherwise by their bones.
 
     target_mm : (3,) point to look at, relative to the head's centre [mm]
     pose : pose of the rest of the head, whose gaze is replaced
@@ -66,9 +66,9 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
-    """Return the gaze targets of one eye in a head from a file, where they move only the lids.
+    """Return the gaze targets of one eye of a head from a file, in which they move only the lids.
 
-    The angles of each target are those of the parametric human.
+    For each target, the angles are those by which it turns the parametric human's eye.
     """
     arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side)]
     known = match_targets([rotation.target for rotation in arkit], rig.targets.names)
@@ -98,9 +98,9 @@ def _unit_vector(vector: Doubles) -> Doubles:
 
 
 def _gaze_weights(rotations: list[BoneRotation], angles: tuple[float, float]) -> dict[str, Any]:
-    """Return the weights of the gaze targets, by name, that give an eye rotation.
+    """Return the weights of gaze targets, by name, that turn an eye by given angles.
 
-    angles : rotation about x and y [rad]
+    angles : angles about x and y [rad]
     """
     target_weights = {}
     for rotation in rotations:

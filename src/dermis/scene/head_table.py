@@ -72,27 +72,28 @@ class HeadTable(FrozenModel):
     height_mm: _Relief = None
     """Relief of one grey level of an 8-bit height map [mm]."""
     specular: str | None = None
-    """Map of the specular strength, scaled to a mean of rho_s."""
+    """Map of the specular strength, scaled so that its mean is rho_s."""
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
     unit_mm: _Unit = None
-    """Length of the file's unit [mm]; when left out 1000 for glTF, that stated by USD, else a guess from the
-    size."""
+    """Length of the file's unit [mm]; if left out, 1000 for glTF, the length that USD states, or for other
+    formats a guess from the size."""
     v_origin: VOrigin = "auto"
     """Row of the maps at v = 0; "auto" follows the format."""
-    up: Axis = "y"
-    """Upward axis of the file; that stated by USD replaces the default."""
+    up: Axis | None = None
+    """Upward axis of the file; if left out, the axis that USD states, for other formats y."""
     front: Front = "auto"
-    """Axis of the file along which the face looks; "auto" for -y with z up, as in Blender, else z."""
+    """Axis of the file along which the face looks; "auto" uses the axis that VRM states, else the axis that
+    eyes or the shape of the head show, else -y if z is up, as in Blender, else z."""
     normal_y: NormalY = "up"
     """Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     skin_groups: tuple[str, ...] = ()
     """Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
-    own materials. When left out they are found by their names, or by what covers the head, and a note lists
-    them."""
+    own materials. If left out, skin groups are found by their names or because they cover the head, and a
+    note lists them."""
     opaque: tuple[str, ...] = ()
-    """Groups of the file that are not skin, such as teeth or clothes, where those found are wrong. Two balls
-    in groups named as eyes become the package's eyes and need not be listed."""
+    """Groups of the file that are not skin, such as teeth or clothes, to correct the automatic choice. Two
+    balls in groups named as eyes become the package's eyes and need not be listed."""
     eyes: EyeMode = "fitted"
     """Eyeballs of a file (groups named eyes, Eye_L, cornea ...): "fitted" replaces them by the package's."""
     eye_groups: tuple[str, ...] = ()
@@ -104,14 +105,14 @@ class HeadTable(FrozenModel):
     """Levels of subdivision: Catmull-Clark for meshes of quads (.obj, .ply), else Loop; "auto" for as many as
     the outline needs to look smooth in a picture of this size from this camera."""
     regions: str = AUTO
-    """Roughness and strength by region of the face: "auto" uses the package's table if the regions are known
-    and the head has no roughness map, "none" one value everywhere; "default" is the package's table (an
-    artist's), a TOML file is your own, and both then set rho_s too."""
+    """Roughness and strength of reflection by region of the face: "auto" uses the package's table if the
+    regions are known and the head has no roughness map; "none" uses one value everywhere; "default" (the
+    package's table, by an artist) and a TOML file (your own table) set rho_s too."""
 
     @field_validator("front")
     @classmethod
     def _check_axes(cls, front: Front, info: ValidationInfo) -> Front:
-        up = info.data.get("up", "")
+        up = info.data.get("up") or ""
         if front[-1] == up[-1:]:
             raise ValueError(f"an axis across up, which is {up}")
         return front

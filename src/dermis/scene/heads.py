@@ -54,7 +54,7 @@ def load_head(
     roughness: MapFile = None,
     unit_mm: float | None = None,
     v_origin: VOrigin = "auto",
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
     normal_y: NormalY = "up",
     skin_groups: Sequence[str] | str = (),
@@ -80,24 +80,24 @@ def load_head(
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
-        Length of the unit of the file [mm]; by default 1000 for glTF, and as stated for USD. For OBJ, PLY and
-        STL, which state none, 1 if the mesh is then 100 to 1000 mm large, else a guess from the size, with a
-        note.
+        Length of the unit of the file [mm]; by default 1000 for glTF, and what the file states for USD. OBJ,
+        PLY and STL state no unit: it is 1 if the mesh then measures 100 to 1000 mm, else it is guessed from
+        the size, with a note.
     v_origin : {"auto", "top", "bottom"}
         Row of the maps at v = 0; "auto" follows the format.
-    up : {"y", "z", "x", "-y", "-z", "-x"}
-        Upward axis of the file; that stated by USD replaces the default.
+    up : {"y", "z", "x", "-y", "-z", "-x"}, optional
+        Upward axis of the file; by default the axis that USD states, for other formats y.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of the file along which the face looks; "auto" for -z in avatars of VRM 0, -y with z up, as in
-        Blender, else z.
+        Axis of the file along which the face looks; "auto" uses, in this order: the axis that VRM states, the
+        axis indicated by eyes or by the shape of the head (with a note), -y if z is up, as in Blender, and z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     skin_groups : str or sequence of str
         Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
-        own materials. By default they are found by their names, or by what covers the head.
+        own materials. By default skin is recognised by names, or by the groups that cover the head.
     opaque : str or sequence of str
-        Groups of the file that are not skin, where those found are wrong. Two balls in groups named as eyes
-        become the package's eyes and need not be listed.
+        Groups of the file that are not skin, to correct the automatic choice. Two balls in groups named as
+        eyes become the package's eyes and need not be listed.
     eyes : {"fitted", "plain"}
         "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
     eye_groups : str or sequence of str
@@ -107,8 +107,8 @@ def load_head(
         Overrides of the look of the eyes: fields of `EyeLook`.
     subdivide : int, "auto" or callable
         Levels of subdivision, 0 to 3: Catmull-Clark for meshes of quads, else Loop; at least 1 for the human.
-        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024, `SmoothIn(camera,
-        size)` in another picture.
+        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024 pixels; for other
+        pictures pass `SmoothIn(camera, size)`.
     regions : {"auto", "none"}
         "auto" sets roughness and strength by region of the face if the regions are known and the head has no
         roughness map; "none" keeps them uniform.
@@ -144,7 +144,7 @@ def load_head(
     map_files = {"colour": colour, "normal": normal, "height": height}
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
-    levels, relief = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
+    levels, map_options = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
     mesh_options: dict[str, Any] = {
         "unit_mm": unit_mm,
         "v_origin": v_origin,
@@ -159,8 +159,8 @@ def load_head(
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
-    loaded, look = load_file_head(name, mesh_options, relief)
-    coarse, loaded = loaded.mesh, _subdivide_with_points(loaded, levels)
+    loaded, look = load_file_head(name, mesh_options, map_options)
+    coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
 
@@ -168,14 +168,6 @@ def load_head(
 def is_person_name(name: str) -> bool:
     """Return whether a name denotes a parametric human: "human", "human:SEED", or a person's .json file."""
     return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
-
-
-def _subdivide_with_points(head: Head, levels: SubdivisionLevels) -> Head:
-    """Return the subdivided head; its rig also keeps the vertices of the file, for mesh sequences."""
-    finer = subdivide_head(head, levels)
-    if finer.levels and finer.rig is not None:
-        return replace(finer, rig=replace(finer.rig, vertex_point=head.mesh.point))
-    return finer
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
@@ -218,11 +210,11 @@ def _load_human(
 
     name : "human", "human:SEED", or a person's .json file
     maps : map files that replace painted maps, by role
-    mesh_options : options that apply only to mesh files; DermisError unless they have their defaults
+    mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     levels : subdivision levels, or a function of the head that returns them
     """
-    texts = {"v_origin": "auto", "up": "y", "front": "auto", "eyes": "fitted"}
-    defaults = {"unit_mm": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
+    texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
+    defaults = {"unit_mm": None, "up": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")
@@ -236,7 +228,7 @@ def _load_human(
 
 
 def load_person(name: str) -> Human:
-    """Return the person for a head name: the default person, one sampled by seed, or that of a .json file.
+    """Return the person for a head name: the default person, one drawn by seed, or the one in a .json file.
 
     Raises DermisError for an invalid seed or file.
     """

@@ -247,7 +247,8 @@ LIGHTS: Registry[type[Light]] = Registry(
 reference; exports write a registered light as the class that it derives from."""
 
 
-_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0  # usual, and largest for which presets stay as they are
+# Reach of a typical head, and largest reach for which the lights of presets are not moved away.
+_HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0
 _NARROW_DEGREES = 10.0
 _SIZES = "width_mm", "height_mm", "radius_mm"
 _VECTORS = "position", "target", "direction", "up"
@@ -266,8 +267,8 @@ def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
 
     head : subject of the lights; None for a head of ordinary size that faces +Z
 
-    The lights of a body larger than a metre are farther away and larger in proportion; those of a flat piece
-    of skin are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
+    For a body larger than a metre, the lights are farther away and larger in proportion; for a flat piece of
+    skin, they are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
     the head.
     """
     if name == NO_LIGHTS:

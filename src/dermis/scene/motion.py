@@ -30,7 +30,7 @@ def load_motion(
     clip: str | None = None,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
 ) -> Clip:
     r"""Load the motion of a head from a file.
@@ -38,32 +38,35 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file, of the head or with nodes or targets of the same names, "file.glb#clip" for one of
-        several clips; a CSV file of Live Link Face; results of MediaPipe's face landmarker in JSON; or files
-        of one topology: a folder, "face_%05d.obj" or "face_*.ply".
+        A glTF file: the head's own, or one whose nodes or targets have the same names ("file.glb#clip"
+        selects one of several clips); a CSV file of Live Link Face; results of MediaPipe's face landmarker in
+        JSON; or a sequence of mesh files of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head
         Head that moves.
     clip : str, optional
         Name of the clip in a glTF file.
     fps : float, optional
-        Frame rate of a sequence, by default 30; of a CSV file whose timecode does not tell it; of results
-        without time.
+        Frame rate of a sequence (by default 30), of a CSV file whose timecode does not imply it, or of
+        results without times.
     unit_mm : float, optional
-        Length of the unit of a sequence's files [mm]; by default one that makes them as large as the head.
-    up : {"y", "z", "x", "-y", "-z", "-x"}
-        Upward axis of a sequence's files.
+        Length of the unit of a sequence's files [mm]; by default the length that makes the meshes as large as
+        the head.
+    up : {"y", "z", "x", "-y", "-z", "-x"}, optional
+        Upward axis of a sequence's files; without `up` and `front`, they have the axes of the head's file.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of a sequence's files along which the face looks; see `load_head`.
+        Axis of a sequence's files along which the face looks; with `up` given, "auto" is -y for z up, else z.
 
     Returns
     -------
     Clip
-        Motion of the head; `Clip.pose_at` gives the pose at any time, `Clip.note` lists what the head lacks.
+        Motion of the head; `Clip.pose_at` returns the pose at any time, and `Clip.note` lists targets and
+        bones that the head lacks.
 
     Raises
     ------
     DermisError
-        For files that cannot be read, with the line, and for motion that no part of the head matches.
+        For files that cannot be read, naming the line, and for motion that matches no target or bone of the
+        head.
 
     Examples
     --------

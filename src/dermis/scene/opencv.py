@@ -12,7 +12,7 @@ from dermis.base.quantities import checked_array
 
 Doubles = NDArray[np.float64]
 _PIXEL_CENTRE = 0.5  # OpenCV's origin is the centre of the first pixel, not the corner of the picture [pixel]
-_TOLERANCE = 1e-4  # for rotations and skews rounded in files
+_TOLERANCE = 1e-4  # tolerance for rotations and skews that were rounded in files
 _MIN_DISTANCE_MM = 1.0
 _MAX_VALUE = 1e9
 _MAX_PIXELS = 1e6  # along a side

@@ -19,7 +19,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
-_SET_BY_REGIONS = {"rho_s"}
+_SET_BY_REGIONS = {"rho_s"}  # fields of skins that a table of face regions sets
 # fields of skins and environments that are file names, unless they name presets
 _PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
 
@@ -58,7 +58,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
 
 def _pose_tables(pose: Pose | None) -> list[str]:
-    """Return the TOML tables [pose.weights] and [pose.bones] of a pose, those that are not empty."""
+    """Return the TOML tables [pose.weights] and [pose.bones] of a pose, or [pose] if both are empty."""
     if pose is None:
         return []
     if pose.positions_mm is not None:

@@ -86,8 +86,8 @@ class Settings(FrozenModel):
     shadow_size: Annotated[int, Field(ge=64, le=8192), Reason("texels: finer than the pores of skin")] = 2048
     """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "rest", "none"] = "baked"
-    """Occlusion of the environment by the head itself: "baked" is updated when the head moves, "rest" is that
-    of the rest pose, "none" leaves it out."""
+    """Occlusion of the environment by the head itself: "baked" is updated when the head moves, "rest" is
+    computed for the rest pose only, "none" leaves it out."""
     interreflection: bool = True
     """Light reflected from skin to skin: in ears, around the eyes, under chin and nose."""
     exposure: Exposure = 1.0
@@ -95,14 +95,14 @@ class Settings(FrozenModel):
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
     """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"
-    """Tone curve before the sRGB encoding; "neutral" is that of the Khronos Group."""
+    """Tone curve before the sRGB encoding; "neutral" is the Khronos Group's curve."""
     gamma: Gamma = "right"
     background: Background = "none"
     """Backdrop behind the head, which emits no light: "none" for pictures with alpha, a grey studio
     "gradient", the "environment", or a colour as linear Rec. 709 or #rrggbb."""
     background_blur: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Blur of an environment as background, as the roughness of a mirror of at least 0.018; 0 for a sharp
-    one."""
+    """Blur of an environment in the background: the roughness of a mirror that blurs it as much. 0 is sharp;
+    smaller values than 0.018 count as 0.018."""
     strands: bool = True
     """Whether to draw hair strands: hair, beard, brows and lashes of heads that have them."""
     parts: Literal["all", "diffuse", "specular"] = "all"
@@ -118,4 +118,4 @@ class Settings(FrozenModel):
 
 
 PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
-"""Defaults of `dermis render`, `animate` and `view` in place of those of `Settings`."""
+"""Defaults of `dermis render`, `animate` and `view` where they differ from the defaults of `Settings`."""

@@ -1,4 +1,4 @@
-"""Skin tone of meshes without a colour map: that of the materials, or of the default skin."""
+"""Skin tone of meshes without a colour map, from their materials or the default skin."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
 
 _WHITE = (1.0, 1.0, 1.0)
-_TOLERANCE = 1e-3  # of the colours of files, some of which are rounded
+_TOLERANCE = 1e-3  # tolerance for colours that were rounded in files
 
 
 @cache
@@ -29,10 +29,10 @@ def default_skin_colour() -> Doubles:
 
 
 def with_skin_tone(mesh: Mesh, maps: Maps) -> tuple[Maps, str]:
-    """Return maps with the colour of the skin's materials if they have no colour map, and a note or "".
+    """Return maps with a colour, from the skin's materials if there is no colour map, and a note or "".
 
-    White and the grey of new materials in Blender are no colours of skin: groups with them have the colour of
-    the default skin. Several groups have their mean colour.
+    White and the default grey of Blender's materials are not skin colours; groups with these colours get the
+    colour of the default skin. The colour of several groups is averaged.
     """
     if maps.colour is not None and maps.colour.shape[:2] != (1, 1):
         return maps, ""

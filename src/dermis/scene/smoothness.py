@@ -26,7 +26,7 @@ MAX_SMOOTH_TRIANGLES = 300_000
 """Largest number of triangles that `SmoothIn` subdivides to."""
 MAX_DEVIATION_PX = 0.6
 """Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
-_SMOOTH_FRACTION = 0.9  # of the length of the silhouette; most of the rest are creases and hidden parts
+_SMOOTH_FRACTION = 0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
 _NEAR_PLANE_MM = 1.0
 
 

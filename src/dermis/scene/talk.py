@@ -28,15 +28,15 @@ _STRETCH = """Correction of blur kernels for the uv layout: "full" for stretch a
 alone, "none" for the same kernel everywhere."""
 Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS, Field(description=_STRETCH)]
 
-_SEAMS = """Treatment of seams in the uv layout: "stitch" diffuses light across them; the others are those
-of the talk. Techniques that cannot stitch use "clear-colour" instead."""
+_SEAMS = """How seams in the uv layout are treated: "stitch" diffuses light across them; the other methods are
+the talk's. Techniques that cannot stitch use "clear-colour" instead."""
 Seams = Annotated[
     Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"],
     COMPARISONS,
     Field(description=_SEAMS),
 ]
 
-_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance over pi.'
+_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance divided by pi.'
 SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR)]
 
 _GAMMA = (

@@ -29,7 +29,7 @@ def directional_albedo(
     fresnel: Fresnel = schlick,
     nodes: tuple[int, int] = (48, 32),
 ) -> Floats:
-    """Return the directional-hemispherical reflectance rho_dt of a lobe for rho_s = 1 [-].
+    """Return the directional-hemispherical reflectance rho_dt of a lobe of specular strength rho_s = 1 [-].
 
     cos_theta : cosine of the exitant angle or, equally for reciprocal models, of the incident angle
     m : roughness; broadcast against cos_theta [-]
@@ -55,7 +55,7 @@ def directional_albedo(
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
     reflected = n_l * lobe(Cosines(n_l, c, n_h, v_h), m, fresnel)
-    # The solid angle of the half vector is n_h^3 dx dy, that of the light 4 v_h times it; both halves count.
+    # The half vector's solid angle is n_h^3 dx dy; the light's is 4 v_h times as large. 2 is for y and -y.
     albedo: Floats = (8.0 * reflected * v_h * n_h**3 * dx * dy).sum(axis=(-2, -1))
     return albedo
 

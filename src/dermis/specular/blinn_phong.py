@@ -24,14 +24,14 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
-    The factor (s + 2) / 8 pi is a quarter of that of a normalised slope distribution. The lobe has no masking
-    and no division by n.l n.v, so it fades at grazing angles, where that of skin does not.
+    The factor (s + 2) / 8 pi is a quarter of the factor that normalises the slope distribution. The lobe has
+    no masking and no division by n.l n.v, so it fades at grazing angles, where the lobe of skin does not.
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
     s = blinn_phong_exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(angles, s)
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -49,7 +49,7 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
         * _power_of_n_h(angles, blinn_phong_exponent(m))
         / (np.pi * np.maximum(angles.n_l, 1e-6))
     )
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def _power_of_n_h(angles: Cosines, s: Floats) -> Floats:

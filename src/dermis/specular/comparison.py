@@ -24,7 +24,7 @@ def normal_incidence_peak(model: str, m: float) -> float:
 
 
 def reciprocity_error(model: str) -> float:
-    """Return the largest change of a model's BRDF when light and view are exchanged, over its maximum [-].
+    """Return the largest change of a BRDF when light and view are exchanged, relative to its maximum [-].
 
     Light and view are random directions up to 85 degrees from the normal. All compared roughnesses are tried.
     """

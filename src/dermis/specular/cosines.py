@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.renamed import renamed_attribute
+
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Cosines:
-    """Cosines n.l, n.v, n.h and v.h of the normal n, light l, view v and half vector h, of one array shape.
+    """Cosines n.l, n.v, n.h and v.h of normal n, light l, view v and half vector h, as arrays of equal shape.
 
     The half vector is (l + v) / |l + v|. These cosines suffice for isotropic microfacet lobes, as l.v is 2
     (v.h)^2 - 1.
@@ -24,9 +26,11 @@ class Cosines:
     v_h: Floats
 
     @property
-    def above(self) -> NDArray[np.bool_]:
+    def is_above(self) -> NDArray[np.bool_]:
         """Return the mask of directions for which both light and view are above the surface."""
         return (self.n_l > 0.0) & (self.n_v > 0.0)
+
+    above = renamed_attribute("above", "is_above")
 
 
 def cosines(n: Floats, l: Floats, v: Floats) -> Cosines:

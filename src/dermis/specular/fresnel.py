@@ -118,7 +118,7 @@ ENERGY_SCHEMES: dict[str, EnergyScheme] = {
 }
 """Energy conservation schemes by their names in scene files.
 
-`published` uses rho_dt of the book [dEonLuebke2007], whose lobe and integral lack 1/pi, and so overestimates
-the loss by pi for diffuse light that is divided by pi. `full` has the factor and also returns the light that
-the surface reflects back inside, as for a matte layer below a glossy one [Kelemen2001].
+`published` uses rho_dt of the book [dEonLuebke2007], whose lobe and integral lack 1/pi: for diffuse light
+that is divided by pi, it overestimates the loss by the factor pi. `full` includes 1/pi, and also returns the
+light that the surface reflects back inside, as for a matte layer below a glossy one [Kelemen2001].
 """

@@ -19,7 +19,7 @@ FIBRE_SAMPLES = 16
 """Number of rays across the width of the fibre over which scattering is averaged."""
 _MIN_COS_SQUARED = 1e-5
 _EUMELANIN_ABSORPTION, _PHEOMELANIN_ABSORPTION = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
-_ABSORPTION_RADIUS_MM = 0.04  # radius of a hair, over which the absorptions above are given
+_ABSORPTION_RADIUS_MM = 0.04  # radius of a hair; the absorptions above are per radius
 
 
 class FibreParameters(NamedTuple):
@@ -73,7 +73,7 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
 
 
 def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
-    """Return the longitudinal scattering function, which integrates to 1 over the sine of the light [-].
+    """Return the longitudinal scattering function, whose integral over the light's sine sin_i is 1 [-].
 
     sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
     v : variance of the lobe
@@ -116,7 +116,7 @@ def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Flo
 
     sin_o : sine of the inclination of the view
     depth : (..., 3) absorption coefficient times the radius of the fibre [-]
-    h : offset of the incident ray from the fibre's axis, over the radius, -1 to 1 [-]
+    h : offset of the incident ray from the fibre's axis, in units of its radius, -1 to 1 [-]
 
     Source: [Chiang2016] section 4.
     """
@@ -135,7 +135,7 @@ def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Flo
 def fibre_scattering(
     sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, parameters: FibreParameters
 ) -> Floats:
-    """Return the radiance (..., 3) of a fibre per irradiance, averaged over its width [1/sr].
+    """Return the radiance (..., 3) of a fibre per unit of irradiance, averaged over the fibre's width [1/sr].
 
     sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
     phi : azimuth from light to view around the fibre [rad]

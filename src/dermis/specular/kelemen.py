@@ -26,7 +26,7 @@ def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats
     """
     h2 = np.maximum(4.0 * angles.v_h**2, 1e-12)
     lobe = beckmann(angles.n_h, m) * fresnel(angles.v_h) / (np.pi * h2)
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 KELEMEN = Model(

@@ -23,7 +23,7 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """
     s = 0.25 * blinn_phong_exponent(m)
     lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power_of_r_v(angles, s)
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -38,7 +38,7 @@ def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     """
     n_l = np.maximum(angles.n_l, 1e-6)
     lobe = fresnel(n_l) * _power_of_r_v(angles, 0.25 * blinn_phong_exponent(m)) / (np.pi * n_l)
-    return np.asarray(np.where(angles.above, lobe, 0.0))
+    return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
 def _power_of_r_v(angles: Cosines, s: Floats) -> Floats:

@@ -75,7 +75,7 @@ def _clamped_cosines(angles: Cosines) -> tuple[Floats, Floats]:
 def _microfacet_brdf(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) -> Floats:
     n_l, n_v = _clamped_cosines(angles)
     lobe = slopes / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
-    return np.where(angles.above, lobe, 0.0)
+    return np.where(angles.is_above, lobe, 0.0)
 
 
 TORRANCE_SPARROW = Model(

@@ -14,8 +14,8 @@ from dermis.specular.models import Model
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
 NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
-"""Roughness of the narrow and of the wide lobe over m; the engine applies 0.75 and 1.3 to the root of m
-[EpicGames2025]."""
+"""Ratios of the roughness of the narrow and of the wide lobe to m; the engine applies 0.75 and 1.3 to the
+root of m [EpicGames2025]."""
 
 NARROW_WEIGHT = 0.85
 """Weight of the narrow lobe; the wide lobe has the weight 1 - NARROW_WEIGHT [-] [EpicGames2025]."""
@@ -42,7 +42,7 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
 
     cos_theta : cosine of the direction from the normal
-    m : roughness of the model, from which those of the narrow and the wide lobe are computed [-]
+    m : roughness of the model, from which the roughnesses of the two lobes are computed [-]
     """
     return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 

@@ -114,7 +114,7 @@ def _records(form: Form) -> list[Record]:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_results_of_each_api(tmp_path: Path, form: Form) -> None:
+def test_results_of_each_api_are_read(tmp_path: Path, form: Form) -> None:
     _check_motion(_load(_file(tmp_path, "\n".join(map(json.dumps, _records(form))))))
 
 
@@ -131,17 +131,19 @@ def test_results_of_each_api(tmp_path: Path, form: Form) -> None:
     ],
     ids=["list", "indented list", "object with a list", "list with one per line", "lines of Windows"],
 )
-def test_results_in_each_kind_of_document(tmp_path: Path, document: Callable[[list[Record]], str]) -> None:
+def test_results_in_each_document_type_are_read(
+    tmp_path: Path, document: Callable[[list[Record]], str]
+) -> None:
     _check_motion(_load(_file(tmp_path, document(_records(_javascript)))))
 
 
-def test_lines_in_utf_16_as_windows_redirects_them(tmp_path: Path) -> None:
+def test_utf_16_lines_of_windows_redirection_are_read(tmp_path: Path) -> None:
     path = tmp_path / "face.jsonl"
     path.write_bytes("\r\n".join(map(json.dumps, _records(_python))).encode("utf-16"))
     _check_motion(_load(path))
 
 
-def test_the_sample_as_javascript_returns_it(sample_folder: Path) -> None:
+def test_javascript_result_is_read(sample_folder: Path) -> None:
     clip = _load(sample_folder / "field" / "motion" / "n02_js_result.jsonl")
     assert clip.rate == 30.0
     turned = clip.pose_at(0.5).motion(HEAD.control).matrices[2, :, :3]
@@ -167,13 +169,13 @@ def test_a_file_without_any_face_says_how_to_record(tmp_path: Path) -> None:
         dermis.load_motion(path, HEAD)
 
 
-def test_of_several_faces_the_first_is_used_with_a_note(tmp_path: Path) -> None:
+def test_first_of_several_faces_is_used_with_a_note(tmp_path: Path) -> None:
     rows = _records(_android)
     rows[1]["faceBlendshapes"].append(_camel(1.0))
     _check_motion(_load(_file(tmp_path, rows), "1 of 3 frames show several faces; the first one is used"))
 
 
-def test_a_matrix_alone_turns_the_head(tmp_path: Path) -> None:
+def test_matrix_alone_rotates_the_head(tmp_path: Path) -> None:
     rows = _records(_javascript)
     clip = _load(_file(tmp_path, [row | {"faceBlendshapes": []} for row in rows]))
     assert clip.targets == () and clip.bones == ("neck", "head")
@@ -187,7 +189,7 @@ def test_a_missing_matrix_is_interpolated_with_a_note(tmp_path: Path) -> None:
     )
 
 
-def test_a_turn_without_translation_is_read_as_its_api_stores_it(tmp_path: Path) -> None:
+def test_rotation_without_translation_is_read_in_api_order(tmp_path: Path) -> None:
     pure = np.eye(4)
     pure[:3, :3] = TURN.as_matrix()
     for stored in ([pure.T.ravel().tolist()], [pure.tolist()], pure.ravel().tolist(), pure.tolist()):
@@ -196,7 +198,7 @@ def test_a_turn_without_translation_is_read_as_its_api_stores_it(tmp_path: Path)
         np.testing.assert_allclose(turned, TURN.as_matrix(), atol=1e-5)
 
 
-def test_a_head_without_bones_lacks_one_for_the_matrix(tmp_path: Path) -> None:
+def test_matrix_for_a_head_without_bones_is_noted(tmp_path: Path) -> None:
     clip = dermis.load_motion(_file(tmp_path, _records(_python)), captured_head())
     assert clip.note == "face: the head has no bone for the matrix; left out."
 
@@ -215,7 +217,7 @@ def test_a_head_without_bones_lacks_one_for_the_matrix(tmp_path: Path) -> None:
         ("timestamp", 33_000_000, "nanoseconds"),
     ],
 )
-def test_times_by_their_names_or_their_steps(tmp_path: Path, key: str, step: float, note: str | None) -> None:
+def test_times_are_found_by_name_or_by_step(tmp_path: Path, key: str, step: float, note: str | None) -> None:
     rows = [{key: 5 * step + k * step} | _android(weight) for k, weight in enumerate(WEIGHTS)]
     notes = [f"the unit of its times is not stated; they are taken as {note}"] if note else []
     _check_motion(_load(_file(tmp_path, rows), *notes))
@@ -227,7 +229,7 @@ def test_a_missing_time_is_interpolated_with_a_note(tmp_path: Path) -> None:
     _check_motion(_load(_file(tmp_path, rows), "1 of 3 frames have no time; it is interpolated"))
 
 
-def test_without_times_the_rate_of_the_file_then_thirty(tmp_path: Path) -> None:
+def test_missing_times_use_the_file_rate_or_thirty_fps(tmp_path: Path) -> None:
     rows = [_python(weight) for weight in WEIGHTS]
     path = _file(tmp_path, {"fps": 25, "frames": rows})
     assert _load(path).duration_s == pytest.approx(2 / 25)
@@ -300,7 +302,7 @@ def test_empty_cells_are_interpolated_and_counted(tmp_path: Path, cell: str) -> 
 
 
 @pytest.mark.parametrize("cells", ["0,,,,,", "0,0,0,0,0,0", "61,0.0,0,0,0,0", "0", "61,,,,,"])
-def test_rows_of_a_lost_face_are_interpolated_and_counted(tmp_path: Path, cells: str) -> None:
+def test_rows_without_a_tracked_face_are_interpolated_and_counted(tmp_path: Path, cells: str) -> None:
     lost = f"10:00:00:01.000,{cells}"
     _check_take(
         _load(
@@ -310,7 +312,7 @@ def test_rows_of_a_lost_face_are_interpolated_and_counted(tmp_path: Path, cells:
     )
 
 
-def test_a_neutral_pose_is_no_lost_face(tmp_path: Path) -> None:
+def test_neutral_pose_counts_as_tracked_face(tmp_path: Path) -> None:
     header, rows = (
         "Timecode,BlendShapeCount,JawOpen",
         ["10:00:00:00,1,0.5", "10:00:00:01,1,0", "10:00:00:02,1,0.5"],
@@ -332,7 +334,7 @@ def test_columns_without_values_are_left_out_with_a_note(tmp_path: Path) -> None
     )
 
 
-def test_weights_in_percent_and_angles_in_degrees(tmp_path: Path) -> None:
+def test_weights_in_percent_and_angles_in_degrees_are_converted(tmp_path: Path) -> None:
     yaw, pitch, roll = np.degrees([0.4, 0.1, 0.05])
     rows = [f"10:00:00:0{k}.000,61,{100 * w},12.5,{yaw},{pitch},{roll}" for k, w in enumerate(WEIGHTS)]
     notes = "weights of up to 50 are taken as percent", "its angles are taken as degrees"
@@ -362,13 +364,13 @@ def test_weights_in_percent_and_angles_in_degrees(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_columns_of_time(tmp_path: Path, column: str, times: list[str], note: str | None) -> None:
+def test_time_columns_are_recognised(tmp_path: Path, column: str, times: list[str], note: str | None) -> None:
     rows = [f"{time},{row.partition(',')[2]}" for time, row in zip(times, ROWS, strict=True)]
     rate = 60 if not column else 30 if column == "Frame" else 2 / 0.066
     _check_take(_load(_csv(tmp_path, HEADER.replace("Timecode", column), *rows), *[note] * bool(note)), rate)
 
 
-def test_a_time_that_is_no_number_is_named(tmp_path: Path) -> None:
+def test_invalid_time_is_named_in_the_error(tmp_path: Path) -> None:
     for time in ("noon", "inf", ""):
         rows = f"{time},61,0.5,0,0,0,0"
         with pytest.raises(DermisError, match=r"take\.csv, line 2: expected a "):

@@ -29,7 +29,7 @@ ROWS = (
 )
 
 
-def test_rows_of_live_link(tmp_path: Path) -> None:
+def test_live_link_rows_are_read(tmp_path: Path) -> None:
     clip = dermis.load_motion(_csv(tmp_path / "take.csv", *ROWS), HEAD)
     assert clip.name == "take" and clip.rate == 60.0 and clip.duration_s == pytest.approx(2 / 60)
     assert clip.targets == ("eyeBlinkLeft", "jawOpen") and set(clip.bones) == {"neck", "head", "LeftEye"}
@@ -42,7 +42,7 @@ def test_rows_of_live_link(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.matrices[2, :, :3], expected, atol=1e-5)
 
 
-def test_columns_count_by_their_names(tmp_path: Path) -> None:
+def test_columns_are_identified_by_name(tmp_path: Path) -> None:
     plain = dermis.load_motion(_csv(tmp_path / "a.csv", *ROWS), HEAD).pose_at(0.01)
     order = np.random.default_rng(0).permutation(11)
     turned = [",".join(np.array(row.split(","))[order]) for row in (COLUMNS.upper(), *ROWS)]
@@ -52,13 +52,13 @@ def test_columns_count_by_their_names(tmp_path: Path) -> None:
         np.testing.assert_array_equal(other.bones[name], plain.bones[name])
 
 
-def test_windows_lines_and_a_byte_order_mark(tmp_path: Path) -> None:
+def test_windows_line_ends_and_byte_order_mark_are_accepted(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join([COLUMNS, *ROWS, "", ""]).encode())
     assert dermis.load_motion(path, HEAD).rate == 60.0
 
 
-def test_a_head_without_bones_notes_what_it_cannot_turn(tmp_path: Path) -> None:
+def test_head_without_bones_notes_unused_rotations(tmp_path: Path) -> None:
     clip = dermis.load_motion(_csv(tmp_path / "a.csv", *ROWS), captured_head())
     assert clip.bones == () and clip.pose_at(0.0).bones == {}
     assert {"HeadYaw", "HeadPitch", "LeftEyeYaw"} <= set(clip.left_out)
@@ -67,7 +67,9 @@ def test_a_head_without_bones_notes_what_it_cannot_turn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("frames", "fps"), [((23, 0), 24.0), ((29, 0), 30.0), ((58.2, 0), 60.0), ((119, 0), 120.0)]
 )
-def test_the_timecode_tells_its_rate(tmp_path: Path, frames: tuple[float, float], fps: float) -> None:
+def test_frame_rate_follows_from_the_timecode(
+    tmp_path: Path, frames: tuple[float, float], fps: float
+) -> None:
     rows = [f"01:02:0{k}:{frame},0,0.5" for k, frame in enumerate(frames)]
     clip = dermis.load_motion(
         _csv(tmp_path / "a.csv", *rows, header="Timecode,BlendShapeCount,JawOpen"), HEAD
@@ -75,13 +77,13 @@ def test_the_timecode_tells_its_rate(tmp_path: Path, frames: tuple[float, float]
     assert clip.duration_s == pytest.approx(1 - frames[0] / fps)
 
 
-def test_a_short_take_is_at_sixty_and_fps_says_otherwise(tmp_path: Path) -> None:
+def test_short_take_defaults_to_sixty_fps_unless_fps_is_given(tmp_path: Path) -> None:
     path = _csv(tmp_path / "a.csv", "01:00:00:03,0,1", "01:00:00:06,0,1", header="Timecode,,JawOpen")
     assert dermis.load_motion(path, HEAD).duration_s == pytest.approx(3 / 60)
     assert dermis.load_motion(path, HEAD, fps=30).duration_s == pytest.approx(3 / 30)
 
 
-def test_midnight_is_no_step_back(tmp_path: Path) -> None:
+def test_midnight_does_not_reverse_time(tmp_path: Path) -> None:
     rows = ("23:59:59:59,0,0", "00:00:00:00,0,1")
     clip = dermis.load_motion(
         _csv(tmp_path / "a.csv", *rows, header="Timecode,BlendShapeCount,JawOpen"), HEAD
@@ -101,7 +103,7 @@ def test_midnight_is_no_step_back(tmp_path: Path) -> None:
         (("noon" + ROWS[0],), r"a\.csv, line 2: .*HH:MM:SS:FF\.fff, but got 'noon10"),
     ],
 )
-def test_broken_lines_are_named(tmp_path: Path, rows: tuple[str, ...], words: str) -> None:
+def test_broken_line_numbers_are_reported(tmp_path: Path, rows: tuple[str, ...], words: str) -> None:
     with pytest.raises(DermisError, match=words):
         dermis.load_motion(_csv(tmp_path / "a.csv", *rows), HEAD)
 
@@ -123,7 +125,7 @@ def test_other_headers_are_refused(tmp_path: Path, header: str, words: str) -> N
         dermis.load_motion(_csv(tmp_path / "a.csv", row, header=header), HEAD)
 
 
-def test_an_empty_file_and_none(tmp_path: Path) -> None:
+def test_empty_and_missing_files_are_refused(tmp_path: Path) -> None:
     for name, content in (("a.csv", ""), ("a.jsonl", "\n\n")):
         (tmp_path / name).write_text(content)
         with pytest.raises(DermisError, match=rf"{name}: .*(empty|there are none)"):
@@ -149,7 +151,7 @@ def _matrix(turn: Rotation) -> np.ndarray:
 
 
 @pytest.mark.parametrize("form", ["rows", "flat", "columns"])
-def test_lines_of_mediapipe(tmp_path: Path, form: str) -> None:
+def test_mediapipe_lines_are_read(tmp_path: Path, form: str) -> None:
     turns = Rotation.from_euler("zxy", [[5, -10, 20], [0, 0, 40]], degrees=True)
     forms = {
         "rows": lambda m: m.tolist(),
@@ -177,7 +179,7 @@ def test_lines_of_mediapipe(tmp_path: Path, form: str) -> None:
         np.testing.assert_allclose(motion.matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
 
 
-def test_lines_without_time_take_the_rate(tmp_path: Path) -> None:
+def test_lines_without_time_use_the_frame_rate(tmp_path: Path) -> None:
     path = _lines(tmp_path / "face.jsonl", *({"blendshapes": {"jawOpen": k / 4}} for k in range(5)))
     clip = dermis.load_motion(path, HEAD, fps=10)
     assert clip.duration_s == pytest.approx(0.4) and clip.rate == pytest.approx(10.0)
@@ -214,12 +216,12 @@ GOOD = {"time": 0.0, "blendshapes": {"jawOpen": 0.1}}
         (GOOD | {"matrix": np.zeros((4, 4)).tolist()}, r"line 2: expected an invertible matrix"),
     ],
 )
-def test_broken_json_is_named_by_its_line(tmp_path: Path, row: object, words: str) -> None:
+def test_broken_json_reports_its_line(tmp_path: Path, row: object, words: str) -> None:
     with pytest.raises(DermisError, match=words):
         dermis.load_motion(_lines(tmp_path / "a.jsonl", GOOD, row), HEAD)
 
 
-def test_a_time_that_is_none(tmp_path: Path) -> None:
+def test_invalid_time_is_refused(tmp_path: Path) -> None:
     clip = dermis.load_motion(_lines(tmp_path / "a.jsonl", GOOD), HEAD)
     assert clip.duration_s == 0.0 and clip.rate is None and clip.frame_count(30) == 1
     for seconds in (float("nan"), float("inf")):

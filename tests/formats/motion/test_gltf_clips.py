@@ -60,7 +60,7 @@ def _head(path: Path) -> Head:
     return Head("square", rigged.mesh, Maps(), rig=rigged.rig)
 
 
-def test_a_clip_of_the_heads_own_file(tmp_path: Path) -> None:
+def test_clip_of_the_head_file_is_read(tmp_path: Path) -> None:
     path = _file().write(tmp_path / "a.glb", 0)
     head = _head(path)
     clip = dermis.load_motion(path, head)
@@ -90,7 +90,7 @@ def test_a_clip_of_the_heads_own_file(tmp_path: Path) -> None:
         assert clip.pose_at(outside).weights == clip.pose_at(inside).weights
 
 
-def test_what_a_clip_leaves_out_rests(tmp_path: Path) -> None:
+def test_targets_absent_from_a_clip_stay_at_rest(tmp_path: Path) -> None:
     file = _file(clip=False)
     _add_clip(file, "turn", rotation={"node": 1, "output": file.numbers(TURNS)})
     path = file.write(tmp_path / "a.glb", 0)
@@ -101,7 +101,7 @@ def test_what_a_clip_leaves_out_rests(tmp_path: Path) -> None:
     assert set(pose.bones) == {"head"} and pose.weights == {}
 
 
-def test_a_clip_from_another_file_goes_by_names(tmp_path: Path) -> None:
+def test_clip_of_another_file_is_matched_by_names(tmp_path: Path) -> None:
     head = _head(_file(clip=False).write(tmp_path / "head.glb", 0))
     other = GltfFile()
     other.add("nodes", name="tail")
@@ -115,7 +115,7 @@ def test_a_clip_from_another_file_goes_by_names(tmp_path: Path) -> None:
     assert clip.pose_at(0.5).weights == {"wide": pytest.approx(1.0)}  # the first of that file's two
 
 
-def test_one_of_several_clips(tmp_path: Path) -> None:
+def test_one_of_several_clips_is_selected(tmp_path: Path) -> None:
     file = _file()
     _add_clip(file, "shake", weights={"node": 2, "output": file.numbers(WEIGHTS.reshape(-1, 1))})
     path = file.write(tmp_path / "a.glb", 0)
@@ -131,7 +131,7 @@ def test_one_of_several_clips(tmp_path: Path) -> None:
         dermis.load_motion(path, head, clip="jump")
 
 
-def test_frames_of_a_baked_clip_have_its_rate(tmp_path: Path) -> None:
+def test_baked_clip_frames_keep_their_rate(tmp_path: Path) -> None:
     file = _file(clip=False)
     times = np.arange(49)[:, None] / 24
     output = file.numbers(np.tile([0, 0, 0, 1], (49, 1)))
@@ -157,7 +157,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_clips_are_refused_by_name(tmp_path: Path, damage: str) -> None:
+def test_damaged_clips_are_named_in_the_refusal(tmp_path: Path, damage: str) -> None:
     head = _head(_file(clip=False).write(tmp_path / "head.glb", 0))
     file = _file()
     extra = {
@@ -177,7 +177,7 @@ def test_damaged_clips_are_refused_by_name(tmp_path: Path, damage: str) -> None:
     assert str(caught.value).startswith(str(path))
 
 
-def test_weights_that_no_pose_takes_name_the_file(tmp_path: Path) -> None:
+def test_invalid_pose_weights_name_the_file(tmp_path: Path) -> None:
     file = _file(clip=False)
     _add_clip(file, "far", weights={"node": 2, "output": file.numbers(1e20 * WEIGHTS.reshape(-1, 1))})
     path = file.write(tmp_path / "a.glb", 0)
@@ -186,7 +186,7 @@ def test_weights_that_no_pose_takes_name_the_file(tmp_path: Path) -> None:
         clip.pose_at(float(np.ravel(TIMES)[1]))
 
 
-def test_what_fits_nothing_is_refused(tmp_path: Path) -> None:
+def test_clip_without_matching_targets_is_refused(tmp_path: Path) -> None:
     head = _head(_file(clip=False).write(tmp_path / "head.glb", 0))
     other = GltfFile()
     other.add("nodes", name="leg")

@@ -11,6 +11,7 @@ from small_head import obj_text
 
 import dermis
 from dermis.base.errors import DermisError, DermisWarning
+from dermis.formats.axes import Axes, to_y_up
 from dermis.formats.motion.sequence import FrameReader, frame_files
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -46,7 +47,7 @@ def _head(folder: Path, name: str = "face_8.obj") -> Head:
     return dermis.load_head(folder / name, subdivide=0)
 
 
-def test_frames_come_in_the_order_of_their_numbers(folder: Path) -> None:
+def test_frames_are_sorted_by_number(folder: Path) -> None:
     names = [f"face_{k}.obj" for k in (8, 9, 10, 11)]
     (folder / "notes.txt").write_text("")
     (folder / "other_5.obj").write_text("")
@@ -69,14 +70,14 @@ def test_a_sequence_moves_the_points(folder: Path) -> None:
     assert dermis.load_motion(folder, head).duration_s == pytest.approx(3 / 30)
 
 
-def test_a_posed_frame_is_that_file_as_a_head(folder: Path) -> None:
+def test_posed_frame_equals_the_head_loaded_from_that_file(folder: Path) -> None:
     head, other = _head(folder), _head(folder, "face_11.obj")
     motion = dermis.Scene(head, pose=dermis.load_motion(folder, head).pose_at(1.0)).motion
     assert motion is not None
     np.testing.assert_array_equal(motion.positions_mm[head.mesh.point], other.mesh.positions)
 
 
-def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
+def test_sequence_uses_the_units_and_axes_of_the_head(tmp_path: Path) -> None:
     small = _frames(tmp_path / "small", (0.01, 0.011))
     head = dermis.load_head(small / "face_8.obj", unit_mm=100, up="z", subdivide=0)
     positions = dermis.load_motion(small, head, unit_mm=100, up="z").pose_at(1.0).positions_mm
@@ -90,7 +91,7 @@ def test_units_and_axes_are_those_of_the_head(tmp_path: Path) -> None:
         dermis.load_motion(small, head, unit_mm=1.0, up="z")
 
 
-def test_ply_frames(tmp_path: Path) -> None:
+def test_ply_frames_are_read(tmp_path: Path) -> None:
     import trimesh
 
     folder = _frames(tmp_path / "obj")
@@ -103,12 +104,12 @@ def test_ply_frames(tmp_path: Path) -> None:
     np.testing.assert_allclose(positions, 1.2 * head.positions_mm, rtol=1e-5, atol=1e-3)
 
 
-def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:
-    reader = FrameReader(unit_mm=2.0, up="z")
+def test_positions_alone_match_complete_files(folder: Path) -> None:
+    reader = FrameReader(2.0, to_y_up(np.eye(3), Axes("z")).T)
     files = frame_files(folder)
     first = reader.read(files[0])
     for file in files:
-        whole, quick = FrameReader(unit_mm=2.0, up="z").read(file), reader.read(file)
+        whole, quick = FrameReader(2.0, to_y_up(np.eye(3), Axes("z")).T).read(file), reader.read(file)
         assert quick.triangles is first.triangles  # which were not parsed again
         for mine, other in zip(quick, whole, strict=True):
             assert mine.dtype == other.dtype
@@ -116,7 +117,7 @@ def test_places_alone_are_read_as_whole_files_are(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("change", ["carriage returns", "UTF-16", "weights"])
-def test_frames_in_other_words_have_the_same_places(folder: Path, change: str) -> None:
+def test_frames_with_other_statement_order_have_the_same_positions(folder: Path, change: str) -> None:
     plain = [FrameReader(unit_mm=1.0).read(file) for file in frame_files(folder)]
     for file in frame_files(folder):
         text = file.read_text()
@@ -160,7 +161,7 @@ def _other_uv(text: str) -> str:
         (lambda text: text.replace("vt ", "# ").replace("f ", "# f "), r"face_10\.obj: "),
     ],
 )
-def test_mixed_topologies_name_the_file(folder: Path, change, words: str) -> None:
+def test_mixed_topologies_are_refused_with_the_file_name(folder: Path, change, words: str) -> None:
     head = _head(folder)
     file = folder / "face_10.obj"
     file.write_text(change(file.read_text()))
@@ -188,7 +189,7 @@ def test_a_subdivided_head_moves_by_its_control_points(folder: Path) -> None:
     assert len(head.positions_mm) < len(np.unique(head.mesh.point))
 
 
-def test_places_that_part_are_refused(tmp_path: Path) -> None:
+def test_frames_that_split_shared_vertices_are_refused(tmp_path: Path) -> None:
     """Lips that touch in the head's frame are one point and cannot open in another frame."""
     folder = _frames(tmp_path / "take", (1.0, 1.0))
     twin = "v 0 300 0\nv 20 300 0\nv 0 320 0\nv 0 300 0\nv 20 300 0\nv 0 280 0\n"
@@ -204,7 +205,50 @@ def test_places_that_part_are_refused(tmp_path: Path) -> None:
         dermis.load_motion(folder, head)
 
 
-def test_nothing_and_several_kinds(folder: Path) -> None:
+FAULTS = {
+    "flat triangles": "f 1/1 1/1 2/2\nf 30/30 31/31 30/30\n",
+    "repeated triangles": "f 30/30 31/31 56/56\nf 30/30 31/31 56/56\n",
+    "a fin": "v 0 20 120\nf 30/30 31/31 -1/1\n",
+}
+
+
+@pytest.mark.filterwarnings("ignore::dermis.base.errors.DermisWarning")
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("has_uv", [True, False])
+@pytest.mark.parametrize("levels", [0, 1])
+def test_sequence_animates_a_repaired_head(tmp_path: Path, fault: str, has_uv: bool, levels: int) -> None:
+    folder = _frames(tmp_path / "take")
+    for file in folder.iterdir():
+        text = file.read_text() + FAULTS[fault]
+        file.write_text(text if has_uv else re.sub(r"(?m)^vt .*\n|/\d+", "", text))
+    head = dermis.load_head(folder / "face_8.obj", unit_mm=1.0, subdivide=levels)
+    assert head.file_vertices is not None
+    found = dermis.load_motion(folder, head, fps=1, unit_mm=1.0).pose_at(2.0).positions_mm
+    moved = 0.9 if fault != "a fin" else np.where(head.positions_mm[:, 2:] == 120, 1.0, 0.9)
+    np.testing.assert_allclose(found, moved * head.positions_mm, rtol=1e-4, atol=1e-3)
+
+
+def test_other_topology_with_equal_vertex_count_is_refused(tmp_path: Path) -> None:
+    folder = _frames(tmp_path / "take")
+    head = dermis.load_head(folder / "face_8.obj", subdivide=1)
+    for file in folder.iterdir():
+        file.write_text(
+            _other_face(re.sub(r"(?m)^f 1/1 .*\n", "f 1/1 80/80 200/200\n", file.read_text(), count=1))
+        )
+    with pytest.raises(DermisError, match=r"face_8\.obj: expected the topology of the head"):
+        dermis.load_motion(folder, head)
+
+
+def test_a_sequence_has_the_axes_of_the_file_of_its_head(tmp_path: Path) -> None:
+    folder = _frames(tmp_path / "take")
+    head = dermis.load_head(folder / "face_8.obj", up="z", front="x", subdivide=0)
+    found = dermis.load_motion(folder, head, fps=1).pose_at(1.0).positions_mm
+    np.testing.assert_allclose(found, 1.1 * head.positions_mm, rtol=1e-5, atol=1e-3)
+    other = dermis.load_motion(folder, head, fps=1, up="z").pose_at(1.0).positions_mm
+    assert other is not None and np.abs(other - found).max() > 10
+
+
+def test_empty_folders_and_mixed_file_types_are_refused(folder: Path) -> None:
     head = _head(folder)
     with pytest.raises(DermisError, match=r"no_%d\.obj: expected frames .* there are none"):
         dermis.load_motion(folder / "no_%d.obj", head)

@@ -45,7 +45,7 @@ def _named(*names: str):
         (("a", "b", "c", "d"), {}),
     ],
 )
-def test_heads_and_necks(names: tuple[str, ...], fractions: dict[str, float]) -> None:
+def test_head_and_neck_bones_are_found(names: tuple[str, ...], fractions: dict[str, float]) -> None:
     assert find_rotation_bones(_named(*names)).head == fractions
 
 
@@ -53,19 +53,19 @@ def test_heads_and_necks(names: tuple[str, ...], fractions: dict[str, float]) ->
     "pair",
     [("LeftEye", "RightEye"), ("eye.L", "eye.R"), ("CC_Base_L_Eye", "CC_Base_R_Eye"), ("Eye_l", "Eye_r")],
 )
-def test_eyes(pair: tuple[str, str]) -> None:
+def test_eye_bones_are_found(pair: tuple[str, str]) -> None:
     assert find_rotation_bones(_named("Eyelid_L", "LeftEyeBrow", *pair)).eyes == {
         "left": pair[0],
         "right": pair[1],
     }
 
 
-def test_no_bones_turn_nothing() -> None:
+def test_missing_bones_rotate_nothing() -> None:
     assert find_rotation_bones(None).head == {} and find_rotation_bones(None).eyes == {}
 
 
 @pytest.mark.parametrize("names", [("root", "neck", "head", "jaw"), ("neck1", "neck2", "head", "jaw")])
-def test_the_shares_make_the_whole_turn(names: tuple[str, ...]) -> None:
+def test_bone_shares_add_up_to_the_full_rotation(names: tuple[str, ...]) -> None:
     """Neck and head together rotate the head as captured; positions may differ."""
     skeleton = _named(*names)
     turns = Rotation.from_euler("zxy", [[10, 20, 60], [0, -30, 5]], degrees=True)
@@ -76,7 +76,7 @@ def test_the_shares_make_the_whole_turn(names: tuple[str, ...]) -> None:
         np.testing.assert_allclose(matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
 
 
-def test_turns_of_matrices_leave_scale_aside() -> None:
+def test_matrix_rotations_ignore_scale() -> None:
     turns = Rotation.random(5, random_state=4)
     matrices = np.tile(np.eye(4), (5, 1, 1))
     matrices[:, :3, :3] = 1.7 * turns.as_matrix()
@@ -85,7 +85,7 @@ def test_turns_of_matrices_leave_scale_aside() -> None:
     np.testing.assert_allclose((found.inv() * turns).magnitude(), 0, atol=1e-6)
 
 
-def test_names_in_other_letters() -> None:
+def test_bone_names_ignore_case() -> None:
     targets = ("eyeBlinkLeft", "jawOpen", "JAWOPEN", "mouthSmile_L", "browInnerUp")
     names = (
         "EyeBlinkLeft",

@@ -15,7 +15,7 @@ ALBEDO = 0.5
 def chalk(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF, albedo / pi [1/sr]."""
     value = np.broadcast_to(ALBEDO / np.pi, np.broadcast_shapes(angles.n_l.shape, np.shape(m)))
-    return np.where(angles.above, value, 0.0)
+    return np.where(angles.is_above, value, 0.0)
 
 
 CHALK = Model(chalk, "the same in all directions", True, ("Phong1975",), {"chalk_albedo": ALBEDO})

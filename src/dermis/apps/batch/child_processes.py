@@ -60,7 +60,7 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
     process = _SPAWN_CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
     with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
         process.start()
-    child_pipe.close()  # only the child holds it now, so that the parent's end reports its death
+    child_pipe.close()  # the parent's end now breaks when the child dies
     return ChildProcess(process, parent_pipe)
 
 
@@ -122,7 +122,7 @@ def _sigint_blocked() -> Iterator[None]:
     if not _CAN_BLOCK_SIGNALS:
         yield
         return
-    resource_tracker.ensure_running()  # it would unblock the signal if it started later
+    resource_tracker.ensure_running()  # the tracker unblocks SIGINT when it starts, so start it first
     previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

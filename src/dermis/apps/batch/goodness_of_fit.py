@@ -25,7 +25,7 @@ MIN_P_VALUE = 1e-6
 _MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
 _QUANTILE_COUNT = 10_000  # for the moments of a distribution
 _ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
-_MAX_LISTED = 12  # texts
+_MAX_LISTED = 12  # texts per distribution in the table
 _MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
@@ -40,7 +40,8 @@ class FitTest(NamedTuple):
     expected, observed : mean and standard deviation of numbers, or probabilities of texts, in the
         distribution and in the samples
     distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
-    expected_distance : mean distance of as many samples that follow the distribution; 0 for a single text [-]
+    expected_distance : mean distance of equally many random samples of the distribution; 0 for a single text
+        [-]
     p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 

@@ -24,7 +24,7 @@ _COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
 _MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
 _MAX_COLUMN_WIDTH = 60  # characters
 _PERSON_IDS = "person.number", "person.seed"
-_MAX_VALUES = 12  # listed values of a text
+_MAX_VALUES = 12  # listed values of a text parameter
 
 
 class ParameterRow(TypedDict):

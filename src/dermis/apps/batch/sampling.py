@@ -23,20 +23,23 @@ from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand
 
 Parameters = dict[str, float | int | str]
 _JAW_TARGET = "jawOpen"
-_WEIGHT_POWER = 1.5  # random weights are a uniform number to this power, so that small ones are more frequent
-_HASH_BITS = 52  # of the hash that are used: a double represents them exactly, plus half a step
+_WEIGHT_POWER = 1.5  # power of uniform numbers, so that small weights are more frequent
+_HASH_BITS = 52  # used bits of the hash; this number of bits plus one half is exact in double precision
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
 _VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _BACKGROUND_CHANNELS = "background.red", "background.green", "background.blue"
 _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
-    (_LAMP_PREFIXES, lambda found: found["light.kind"] == LAMP_RIG),
-    (("gaze.yaw_deg", "gaze.pitch_deg"), lambda found: found["gaze.at"] == GAZE_ANGLES),
-    (("environment.turn", "environment.strength"), lambda found: found["environment.name"] != NO_ENVIRONMENT),
-    (_BACKGROUND_CHANNELS, lambda found: found["background.kind"] == "colour"),
-    ("background.blur", lambda found: found["background.kind"] == "environment"),
-    ("camera.frame_mm", lambda found: "camera.focal_mm" not in found),
+    (_LAMP_PREFIXES, lambda sampled: sampled["light.kind"] == LAMP_RIG),
+    (("gaze.yaw_deg", "gaze.pitch_deg"), lambda sampled: sampled["gaze.at"] == GAZE_ANGLES),
+    (
+        ("environment.turn", "environment.strength"),
+        lambda sampled: sampled["environment.name"] != NO_ENVIRONMENT,
+    ),
+    (_BACKGROUND_CHANNELS, lambda sampled: sampled["background.kind"] == "colour"),
+    ("background.blur", lambda sampled: sampled["background.kind"] == "environment"),
+    ("camera.frame_mm", lambda sampled: "camera.focal_mm" not in sampled),
 )
 """Prefixes of parameters that only some images have, with the condition for having them."""
 
@@ -167,18 +170,18 @@ class Sampler:
     def parameters(self, k: int) -> Parameters:
         """Return the sampled parameters of image k by dotted name; they do not depend on other images."""
         person = k // self.images_per_person
-        found: Parameters = {"person.number": person}
+        sampled: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
-            found["person.seed"] = int(hashed_uniform(self.seed, person, "person.seed") * _SEED_COUNT)
+            sampled["person.seed"] = int(hashed_uniform(self.seed, person, "person.seed") * _SEED_COUNT)
         for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
-                found[name] = self._sample(k, name, distribution)
-        if found["background.kind"] == "environment" and found["environment.name"] == NO_ENVIRONMENT:
-            found["background.kind"] = "gradient"
+                sampled[name] = self._sample(k, name, distribution)
+        if sampled["background.kind"] == "environment" and sampled["environment.name"] == NO_ENVIRONMENT:
+            sampled["background.kind"] = "gradient"
         for prefixes, applies in _CONDITIONAL_PARAMETERS:
-            if not applies(found):
-                found = {name: value for name, value in found.items() if not name.startswith(prefixes)}
-        return found | {f"pose.{name}": weight for name, weight in self._target_weights(k, found).items()}
+            if not applies(sampled):
+                sampled = {name: value for name, value in sampled.items() if not name.startswith(prefixes)}
+        return sampled | {f"pose.{name}": weight for name, weight in self._target_weights(k, sampled).items()}
 
     def _sample(self, k: int, name: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)
@@ -199,17 +202,17 @@ class Sampler:
     def _normal(self, k: int, name: str) -> float:
         return float(ndtri(self._uniform(k, name)))
 
-    def _target_weights(self, k: int, found: Parameters) -> dict[str, float]:
+    def _target_weights(self, k: int, sampled: Parameters) -> dict[str, float]:
         """Return the weights of all morph targets that the spec can move, for image k.
 
-        found : parameters of the image that have been sampled so far
+        sampled : parameters of the image that have been sampled so far
         """
-        name = str(found["expression.name"])
+        name = str(sampled["expression.name"])
         if name == RANDOM_EXPRESSION:
             weights: Weights = random_expression(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
-        intensity, asymmetry, variation = (float(found[f"expression.{key}"]) for key in _VARIATION_KEYS)
+        intensity, asymmetry, variation = (float(sampled[f"expression.{key}"]) for key in _VARIATION_KEYS)
         varied = expression_weights(
             weights,
             intensity,
@@ -217,11 +220,11 @@ class Sampler:
             variation,
             lambda name: self._normal(k, f"expression.variation.{name}"),
         )
-        sampled: dict[str, float | str] = {**varied}
+        target_weights: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():
             weight = self._sample(k, f"pose.{target}", distribution)
-            sampled |= dict.fromkeys(expand_targets([target]), weight)
-        return {target: round_significant(float(sampled.get(target, 0.0))) for target in self.targets}
+            target_weights |= dict.fromkeys(expand_targets([target]), weight)
+        return {target: round_significant(float(target_weights.get(target, 0.0))) for target in self.targets}
 
     @cached_property
     def targets(self) -> tuple[str, ...]:

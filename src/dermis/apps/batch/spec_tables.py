@@ -309,7 +309,7 @@ class BackgroundTable(FrozenModel):
     """Spec table of the picture's background, which emits no light."""
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUNDS)] = Constant("gradient")
-    """"none" for alpha, "gradient", "colour", or "environment", which is a gradient in images without one."""
+    """"none" for alpha, "gradient", "colour", or "environment", which is a gradient if the image has none."""
     red: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Red of the colour, linear Rec. 709."""
     green: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)

@@ -202,7 +202,8 @@ class Worker:
                 (plan.scene for plan in each[0]),
                 (plan.settings for plan in each[1]),
                 alpha=alpha,
-                previous=(plan.previous for plan in each[2]),  # not the frame that happened to come before
+                # motion is relative to these scenes, not to the frame rendered before
+                previous=(plan.previous for plan in each[2]),
                 outputs=spec.outputs,
                 landmarks=spec.landmark_tables.values(),
             )
@@ -231,7 +232,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
                     failed = worker.render_shard(shard, lambda: pipe.send(WorkerEvent(images=1)))
                     pipe.send(WorkerEvent(shard=shard, failed=failed))
         except (DeviceError, LostProcessError) as fault:
-            pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # text follows in the message
+            pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # the pool appends text
         except DermisError as fault:
             pipe.send(WorkerEvent(refusal=str(fault)))
 

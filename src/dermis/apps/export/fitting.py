@@ -14,12 +14,12 @@ from dermis.optics.half_space import HalfSpaceKind, half_space, tabulated_albedo
 from dermis.optics.media import Floats
 from dermis.optics.radial import SMALLEST_FLOAT
 
-_BURLEY_MEDIAN_RADIUS = 1.58  # of Burley's profile, in units of d: half of the light leaves within
+_BURLEY_MEDIAN_RADIUS = 1.58  # radius within which half of the light leaves, in units of Burley's width d
 _LOG_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
 _BISECTIONS, _MEDIUM_BISECTIONS = 40, 30
 _MIN_WIDTH_MM = 1e-9
-_MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # distances from an edge of light, in median radii
-_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES = 1e-2, 60.0, 400  # radii of least squares fits, in median radii
+_MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # largest distance from a shadow edge, in median radii
+_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES = 1e-2, 60.0, 400  # of least squares fits, in median radii
 _CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
 _LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
 
@@ -66,10 +66,10 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return a cumulative profile with the radii of each channel multiplied by one length.
+    """Return a cumulative profile whose radii are multiplied by a length, separately in each channel.
 
-    unit : profile with radii in units of that length
-    scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
+    unit : profile with radii in units of these lengths
+    scale_mm : (3,) length of each channel [mm]
     """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
@@ -108,12 +108,12 @@ def fit_homogeneous_medium(
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
     curve : reference profile
-    energy : (3,) light that leaves the medium per incident light, by default that of `curve` [-]
+    energy : (3,) light that leaves the medium per incident light, by default the energy of `curve` [-]
     kind : surface and illumination of the half-space, see `half_space`
     """
     albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
     unit = half_space(kind, albedo, np.ones(3))
-    middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of equivalent Burley profiles
+    middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of Burley widths
     mfp = _fit_scale_near(curve, unit, middle, 2.0, _MEDIUM_BISECTIONS)
     return HomogeneousMedium(albedo, mfp, half_space(kind, albedo, mfp))
 
@@ -184,7 +184,7 @@ class CurveError:
     energy: Floats
 
     def as_json(self) -> dict[str, list[float]]:
-        """Return the three errors as lists of red, green and blue, by the names of the fields."""
+        """Return a dictionary from the name of each error to its values in red, green and blue."""
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 

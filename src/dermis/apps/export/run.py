@@ -168,12 +168,13 @@ def export_skin(
     version : str, optional
         Version of the program; the newest supported one by default.
     variant : str, optional
-        Variant of the target, such as a scattering method; its first one by default.
+        Variant of the target, such as a scattering method; the target's first variant by default.
     model : {"montecarlo", "layered", "multipole", "dipole", "better-dipole"}, optional
         Model of the diffusion profile. By default tabulated Monte Carlo for homogeneous media of the package,
         layered diffusion for other tissue, and the Gaussians themselves for a table of Gaussians.
     profile : str or Path, optional
-        Skin of a head; by default a person's own pigments, or the default skin.
+        Skin of a head. By default a parametric person has skin with its own pigments, and other heads have
+        the default skin.
     library : str or Path, optional
         Folder node_modules of npm with the JavaScript library of a page; the page then embeds the library.
     side : int, default 2048
@@ -211,8 +212,8 @@ def export_skin(
         subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
-    if to != "web" and subject.head is not None and subject.head.maps.parts is not None:
-        notify(f"{subject.name}: parts that are not skin are exported with their mean colours, not pictures")
+    if subject.part_pictures is not None and target.part_limitations:
+        notify(f"{subject.name}: {target.part_limitations}")
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
@@ -225,6 +226,7 @@ def export_skin(
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
     """Return the report of an export without writing any file: parameters and predicted errors."""
+    part_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
         curve_error(subject.curve, target.predicted_curve(one, subject, version))
@@ -242,7 +244,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
         d_mm=fit_burley_width(subject.curve),
         error=errors[0],
         naive_error=errors[1],
-        limitations=target.limitations,
+        limitations=" ".join([target.limitations, *part_limitations]).rstrip(),
         untested=target.untested,
     )
 
@@ -284,7 +286,7 @@ def _write_report(report: ExportReport, output: Path) -> list[Path]:
     """Write the report as Markdown and JSON beside the output file or into the folder; return both paths."""
     single = bool(output.suffix)
     page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
-    numbers = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
+    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
     page.write_text(report.markdown(), encoding="utf-8")
-    numbers.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
-    return [page, numbers]
+    data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+    return [page, data_file]

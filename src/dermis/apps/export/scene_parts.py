@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.errors import notify
+from dermis.mesh.mesh import Mesh
 from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights, with unsupported ones replaced by point or directional lights; warn of each.
+    """Return the lights, with unsupported ones replaced by point or directional lights, and warn of these.
 
     supported : kinds of light that the program supports, including point and directional
     program : name of the program for the warnings
@@ -20,14 +21,28 @@ def supported_lights(lights: Iterable[Light], supported: Container[str], program
     return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
 
 
-def _nearest_kind(light: Light, supported: Container[str], culprit: str) -> Light:
+def _nearest_kind(light: Light, supported: Container[str], message_start: str) -> Light:
     if light.kind in supported:
         return light
     bases = (one for one in type(light).__mro__ if issubclass(one, Light))
     base = next(one for one in bases if one.model_fields["kind"].default in supported)
     replacement = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
-    notify(f"{culprit} has no {light.kind} light, so it becomes a {replacement.kind} light")
+    notify(f"{message_start} has no {light.kind} light, so it becomes a {replacement.kind} light")
     return replacement
+
+
+def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float], *, v_up: bool) -> bytes:
+    """Return selected triangles of a mesh as a binary PLY file with normals and uv.
+
+    faces : (t,) mask of the selected triangles
+    centre_mm : (3,) point that becomes the origin of the file [mm]
+    v_up : whether v points upwards
+    """
+    vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
+    u, v = mesh.uv[vertex].astype("<f4").T
+    positions = mesh.positions[vertex] - np.asarray(centre_mm)
+    uv = np.column_stack([u, 1.0 - v if v_up else v])
+    return encode_ply(corner.reshape(-1, 3), positions, mesh.normals[vertex], uv)
 
 
 def encode_ply(

@@ -14,7 +14,8 @@ import numpy as np
 from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
 from dermis.formats.gltf.materials import skin_pictures
-from dermis.formats.read import MESH_READERS
+from dermis.formats.mesh_formats import find_format
+from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyeTextures
@@ -35,7 +36,7 @@ from dermis.scene.skin import Skin
 from dermis.scene.tissue import skin_tissue
 
 BALL_MM = 100.0
-"""Diameter of the ball that replaces the head of a skin without one [mm]."""
+"""Diameter of the ball that is exported with a skin that has no head [mm]."""
 
 ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
 PROFILE_MODELS: tuple[ModelName, ...] = get_args(ModelName)
@@ -75,6 +76,11 @@ class Subject:
         """Return the head, or a ball of diameter `BALL_MM` if there is none."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
 
+    @cached_property
+    def part_pictures(self) -> PartPictures | None:
+        """Return the pictures of the head's parts that are not skin, or None if there are none."""
+        return None if self.head is None else PartPictures.of(self.head)
+
     @property
     def identifier(self) -> str:
         """Return the name as ASCII letters, digits and underscores, for names of files and materials."""
@@ -91,10 +97,10 @@ class Subject:
         return np.clip(self.albedo, low, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return a program's profile with its total energy expressed relative to the reference profile.
+        """Return a program's profile with its energy rescaled for comparison with the reference profile.
 
-        The energy becomes that of the reference, times the ratio of the light that the program returns to the
-        albedo for which it returns this light.
+        A program may return more or less light than the albedo that it is given. The
+        returned energy is the reference's, multiplied by the ratio of the program's light to the albedo.
 
         curve : profile that the program renders, with the energy that it returns for the subject's albedo
         """
@@ -128,8 +134,8 @@ class Subject:
     def encode_maps(self) -> dict[str, bytes]:
         """Return the maps of the head as PNG files by role: colour, normal, roughness, specular and height.
 
-        Colour is sRGB, and green of the normal points up. Roughness is Beckmann's m and specular the specular
-        strength, both linear; height spans its range in 16 bits.
+        The colour is sRGB, and the green channel of the normal map points up. Roughness, which is Beckmann's
+        m, and specular strength are linear. Heights are scaled to their range and stored in 16 bits.
         """
         if self.head is None:
             return {}
@@ -144,7 +150,7 @@ def load_subject(
 
     source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a mesh (.glb, .obj, .usdz, ...)
-    profile : skin of a head; by default a person's own pigments, or the default skin
+    profile : skin of a head; by default skin with a parametric person's own pigments, or the default skin
     model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
 
@@ -152,23 +158,23 @@ def load_subject(
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
-    if not (is_person_name(name) or name in SAMPLES or path.suffix.lower() in MESH_READERS):
+    if not (is_person_name(name) or name in SAMPLES or find_format(path)):
         return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(source, **head)
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:
         skin = skin_of(load_person(name)) if is_person_name(name) else Skin()
-    curve, used, tissue = reference_curve(skin, model)
+    curve, used_model, tissue = reference_curve(skin, model)
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
-    return Subject(path.name, curve, albedo, used, tissue, Scene(loaded, skin=skin))
+    return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
 
 def _load_skin(name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
         refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
-    curve, used, tissue = reference_curve(Skin(profile=name), model)
-    return Subject(Path(name).name, curve, curve.energy, used, tissue)
+    curve, used_model, tissue = reference_curve(Skin(profile=name), model)
+    return Subject(Path(name).name, curve, curve.energy, used_model, tissue)
 
 
 def reference_curve(
@@ -194,9 +200,13 @@ def reference_curve(
     may_be_tabulated = tissue.rgb is None and model in (None, "montecarlo")
     if may_be_tabulated and (tabulated := tabulated_cumulative(tissue.medium)) is not None:
         return tabulated, "montecarlo", tissue
-    used: ModelName = model or "layered"
+    used_model: ModelName = model or "layered"
     transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
-    return CumulativeProfile.from_radial_profile(_model_profile(tissue, used), transmitted), used, tissue
+    return (
+        CumulativeProfile.from_radial_profile(_model_profile(tissue, used_model), transmitted),
+        used_model,
+        tissue,
+    )
 
 
 def _model_profile(tissue: Tissue, model: ModelName) -> RadialProfile:

@@ -115,11 +115,15 @@ class Target(ABC):
     """Whether `write` needs the maps of a head as arrays, so that procedural maps are painted first."""
     limitations: ClassVar[str]
     """Differences from the reference that no parameters can remove, in one or two sentences."""
+    part_limitations: ClassVar[str] = (
+        "Only skin is exported; an export to gltf contains the other parts with their pictures."
+    )
+    """Limitations of eyes and other parts that are not skin, for the report on heads with their pictures."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """Return the target with one of its variants; None selects the first.
+        """Return this target with a variant selected; None selects the first.
 
         Parameters
         ----------

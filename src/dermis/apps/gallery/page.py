@@ -124,9 +124,9 @@ def _short_number(value: float) -> str:
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
-    """Return HTML table rows for the slides of the 2007 talk, with links to pictures, and commands.
+    """Return HTML table rows for the slides of the 2007 talk, with links to their pictures.
 
-    The command in a row draws its picture.
+    Each row also has a command that draws its pictures.
     """
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")

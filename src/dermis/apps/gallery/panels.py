@@ -102,6 +102,7 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
 
 
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
+"""Factor by which each output that is light is multiplied for display."""
 _LABEL_COLOUR_COUNT = 8192
 _SHOWN_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 

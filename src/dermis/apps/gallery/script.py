@@ -133,7 +133,7 @@ _WEBP_QUALITY, _FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """Picture that a gallery script has drawn, as WebP files, or the reason why it could not.
+    """Picture that a gallery script has drawn, as WebP files, or the reason why there is none.
 
     script : gallery script
     panels : WebP file of each panel, by caption
@@ -186,6 +186,6 @@ def write_panels(folder: Path, picture: GalleryPicture) -> None:
 
     Raises DermisError when a file cannot be written.
     """
-    for number, data in enumerate(picture.panels.values(), 1):
-        with atomic_file(folder / f"{picture.script.name}-{number}.webp") as file:
+    for panel_number, data in enumerate(picture.panels.values(), 1):
+        with atomic_file(folder / f"{picture.script.name}-{panel_number}.webp") as file:
             file.write_bytes(data)

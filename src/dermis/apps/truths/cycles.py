@@ -43,17 +43,17 @@ _PASS_COUNT = 4
 _SCRIPT = Path(__file__).with_name("cycles_script.py")
 _TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
 _MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
-"""Time limits for the start and per path: a hundred times the time on two cores."""
+"""Time limits for the start of Blender and for each path: a hundred times the times on two cores."""
 
 
 @dataclass(frozen=True, eq=False)
 class CyclesPass:
-    """Rendering by Cycles with one number of paths, black outside the head.
+    """Rendering by Cycles with a given number of paths per pixel, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
     coverage : (h, w) fraction of each pixel that the head covers
     samples : paths per pixel
-    seconds : elapsed time; for the first pass including the scene and its acceleration structure [s]
+    seconds : elapsed time; for the first pass including the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """
@@ -75,7 +75,7 @@ def cycles_render(
     method: SubsurfaceMethod = "random-walk",
     python: str | Path | None = None,
 ) -> PathTraced:
-    """Return the scene rendered by Cycles on the CPU, as the mean of 4 passes with variance.
+    """Return the scene rendered by Cycles on the CPU: the mean of 4 passes, and its variance.
 
     The parameters are those of `cycles_passes`, except:
 
@@ -110,9 +110,10 @@ def cycles_passes(
 
     There is no clamping, denoising or surface reflection.
 
-    medium : medium with a single layer, whose index of refraction is ignored, as Cycles' random walks end at
-        an index-matched surface; its colour in Cycles is its diffuse reflectance, its radius 4 pi mean free
-        paths. Or a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`
+    medium : material of the skin: a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`, or a medium with a
+        single layer. The medium's index of refraction is ignored, as Cycles' random walks end at an
+        index-matched surface. Its colour in Cycles is its diffuse reflectance, and its radius is 4 pi mean
+        free paths
     samples : paths per pixel of each pass
     settings : settings of the frame, of which only the size is used
     method : subsurface method of Cycles
@@ -186,7 +187,7 @@ class BeckmannSurface:
 
 @dataclass(frozen=True, eq=False)
 class PrincipledSkin:
-    """Skin as a Blender user makes it: Principled BSDF, a random walk below a rough boundary of index 1.4.
+    """Skin as Blender users model it: Principled BSDF, a random walk below a rough boundary of index 1.4.
 
     The head's normal map is applied. Cycles uses GGX facets here; light that they reflect does not enter.
 
@@ -208,7 +209,7 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
-    """Return the JSON description of a scene for Cycles without its passes, and its arrays by name.
+    """Return the JSON description of a scene for Cycles, except its passes, and the scene's arrays by name.
 
     They are stored in scene.json and arrays.npz.
 
@@ -263,11 +264,11 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
     The colour is the diffuse reflectance of the medium, the radius 4 pi mean free paths. Cycles divides radii
-    by 4 pi, and finds the albedo of its random walk from the colour by a fit whose inverse is
-    `diffuse_albedo` within 1 %, so that the walk is through this medium; but light enters and leaves through
-    a Lambertian surface. Its other method is the profile of [ChristensenBurley2015] for this colour and
-    radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5 % by the
-    profile.
+    by 4 pi, and derives the albedo of its random walk from the colour by a fit, which inverts
+    `diffuse_albedo` within 1 %. The walk is therefore through this medium, but light enters and leaves
+    through a Lambertian surface. The method "burley" is the profile of [ChristensenBurley2015] for this
+    colour and radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
+    % by the profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)

@@ -50,7 +50,7 @@ def diffuse_albedo(albedo: float) -> float:
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Return the radiance that a half-space reflects over the irradiance of parallel light [1/sr].
+    """Return the ratio of the radiance that a half-space reflects to the irradiance of parallel light [1/sr].
 
     cosine_in, cosine_out : cosines between light and normal, and between view and normal
     albedo : single-scattering albedo [-]

@@ -42,7 +42,7 @@ class IrradianceSamples:
     """Irradiance on a surface of small triangles, linear within each.
 
     positions : (n, 3) sample positions [mm]
-    triangles : (m, 3) sample indices of the corners; the triangles cover the surface once
+    triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
     irradiance : (n, 3) irradiance at each sample, 0 or more
     """
 
@@ -63,11 +63,11 @@ def sample_irradiance(
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
     finest_mm : length down to which sides with a high contrast are halved further; None to keep them [mm]
-    contrast : irradiance difference between the ends of a side that counts as high, over the largest
-        irradiance [-]
+    contrast : threshold of a high contrast: difference of irradiance between the ends of a side, relative to
+        the largest irradiance [-]
 
-    Samples at the corners of triangles with linear interpolation have a smaller error for their number than
-    random points, points of even distances [Turk1992] or centres of triangles. A sum over points without
+    For equal numbers of samples, linear interpolation between triangle corners has a smaller error than
+    random points, evenly distributed points [Turk1992] or triangle centroids. A sum over points without
     interpolation misses the profile's peak between them.
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
@@ -104,7 +104,7 @@ class _Subdivision:
     barycentric: Floats
 
     @property
-    def count(self) -> int:
+    def sample_count(self) -> int:
         return int(self.corners.max()) + 1
 
 
@@ -156,7 +156,7 @@ def _bisect(subdivision: _Subdivision, side: Index, halved: NDArray[np.bool_]) -
     side : (m, 3) edge index of each side of the triangles
     halved : (e,) mask of edges to halve
     """
-    new_index = subdivision.count + np.cumsum(halved) - 1
+    new_index = subdivision.sample_count + np.cumsum(halved) - 1
     corners, source, barycentric = split_triangles(
         subdivision.corners, subdivision.barycentric, np.where(halved, new_index, -1)[side]
     )
@@ -165,7 +165,7 @@ def _bisect(subdivision: _Subdivision, side: Index, halved: NDArray[np.bool_]) -
 
 def _sample_points(subdivision: _Subdivision, first: int = 0) -> MeshPoints:
     """Return the samples from index `first` on as points on the mesh."""
-    count = subdivision.count
+    count = subdivision.sample_count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     face[subdivision.corners] = subdivision.face[:, None]
     barycentric[subdivision.corners] = subdivision.barycentric

@@ -37,7 +37,7 @@ _FAR_MM = 2e5
 positioned within 0.02 mm in single precision."""
 _SPOT_TEXELS = 1024
 _STRIPE_HALF_EXTENT = 1.25  # in widths; the Gaussian is 4e-6 there
-_STRIPE_TEXELS = 40, 64  # least number across a width and along the length
+_STRIPE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
 _MAX_STRIPE_TEXELS = 2**23
 
 
@@ -45,7 +45,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : module `mitsuba` with a variant set
-    number : index of the light in the scene, for messages
+    number : position of the light in the scene, from 1, for messages
 
     Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
     kind of light: references use no approximations.
@@ -57,7 +57,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
 def cycles_lamp(light: Light, number: int) -> SceneDict:
     """Return Cycles' description of a light, in Cycles' units.
 
-    number : index of the light in the scene, for messages
+    number : position of the light in the scene, from 1, for messages
     """
     _check_shadows(light, number, "Cycles")
     return CYCLES[light.kind](light)
@@ -90,16 +90,16 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
     """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
-    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light))
-    return mitsuba_shape("rectangle", np.divide(light.irradiance, unit), to_world=to_world)
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light))
+    return mitsuba_shape("rectangle", np.divide(light.irradiance, unit_irradiance), to_world=to_world)
 
 
 def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
     """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
-    unit = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
+    unit_irradiance = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
     return mitsuba_shape(
         "sphere",
-        np.divide(light.irradiance, unit),
+        np.divide(light.irradiance, unit_irradiance),
         center=[float(c) for c in light.position],
         radius=float(light.radius_mm),
     )
@@ -158,12 +158,12 @@ def cycles_sphere(light: SphereLight) -> SceneDict:
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return Cycles' area light; its power P gives the radiance P / (pi A) on its area A."""
     width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
-    unit = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
         np.pi * width * height
     )
     to_target = np.subtract(light.target, light.position)
     shape: dict[str, float | str] = {"shape": "RECTANGLE", "size": width, "size_y": height}
-    return cycles_light("AREA", light.irradiance, 1.0 / unit, light.position, to_target, **shape)
+    return cycles_light("AREA", light.irradiance, 1.0 / unit_irradiance, light.position, to_target, **shape)
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:
@@ -186,15 +186,17 @@ def cycles_stripe(light: StripeLight) -> SceneDict:
     return distant | {"stripe": {**axes, "distance": _FAR_MM}}
 
 
-def _cycles_point_light(kind: str, light: PointLight, *, radius_mm: float = 0.0, **unit: float) -> SceneDict:
+def _cycles_point_light(
+    kind: str, light: PointLight, *, radius_mm: float = 0.0, **fields: float
+) -> SceneDict:
     power = 4.0 * np.pi * (_target_distance_mm(light) / UNIT_MM) ** 2
     to_target = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
-    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **unit)
+    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **fields)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance of a rectangle of radiance 1 on a parallel surface in front of its centre.
+    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface before its centre.
 
     width, height, distance : size of the rectangle, and its distance from the surface, all in the same unit
 
@@ -227,8 +229,8 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.MITSUBA its replacement",
 )
-"""Functions that describe a kind of light for Mitsuba, from its module with a variant set, the light and its
-name for messages."""
+"""Functions that describe a light for Mitsuba, by kind of light. Their arguments are the module `mitsuba`
+with a variant set, the light, and its name for messages."""
 
 CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     "light of Cycles",
@@ -242,4 +244,4 @@ CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
     },
     f"Leave the light out, or register in {__name__}.CYCLES its replacement",
 )
-"""Functions that describe a kind of light for Cycles: its type, fields and transform."""
+"""Functions that describe a light for Cycles (type, fields and transform), by kind of light."""

@@ -18,7 +18,7 @@ Mask = NDArray[np.bool_]
 PIXELS_PER_DEGREE = 67.0
 """FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
 MID_GREY = 0.5
-"""sRGB value of no difference, near the middle of lightness (L* 53)."""
+"""sRGB value that shows equality in `signed_difference`, near the middle of lightness (L* 53)."""
 
 
 class Estimate(NamedTuple):
@@ -32,7 +32,7 @@ class Estimate(NamedTuple):
 class FlipDifference:
     """Perceived difference of two pictures by FLIP, from 0 to 1.
 
-    mean : mean over the mask
+    mean : mean of the pixels in the mask
     error : (h, w) difference of each pixel; 0 outside the mask
     pixels_per_degree : assumed resolution at the viewer's eye
     """
@@ -51,22 +51,22 @@ def relative_rmse(
 ) -> Estimate:
     """Return the relative root mean square error, corrected for the noise of the reference [-].
 
-    It is the root of the sum of squared differences over the sum of the reference's squares.
+    It is the root of the sum of squared differences divided by the sum of the reference's squares.
 
     image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
     variance : unbiased estimate of the variance of each value of `reference`: the variance of its samples
-        over their number
+        divided by their number
     image_variance : variance of each value of `image`, whose noise is then removed too
 
-    With reference T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is
-    that of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of
+    Let T = t + n be the reference, with noise n of mean 0 and variance s², and D = I - T the difference. Then
+    mean(D²) = mean((I - t)²) + s² and mean(T²) = mean(t²) + s², so E = sum(D² - s²) / sum(T² - s²) is free of
     noise. A pixel contributes U = D² - s² - E (T² - s²) to the error of E; its random part is -2 n (I - t + E
     t) + (1 - E)(n² - s²). For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased
     estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
     too small, by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share
-    paths, so their deviations are added, which is at most sqrt(c) too much. The root's standard error is the
-    larger distance to sqrt(E ± error of E), or to 0.
+    paths, so their standard deviations are added, which overestimates by at most sqrt(c). The root's standard
+    error is the larger distance to sqrt(E ± error of E), or to 0.
 
     Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's variance.
     Only the first term is counted, because few passes estimate v² badly: the standard error is then too large
@@ -88,10 +88,11 @@ def relative_rmse(
 def energy_ratio(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Return the sum of the image over the sum of the reference [-].
+    """Return the ratio of the sum of the image to the sum of the reference [-].
 
-    The parameters are those of `relative_rmse`. The ratio's relative error is that of the reference's sum,
-    whose variance is the sum of the variances; channels may share paths, so their deviations are added.
+    The parameters are those of `relative_rmse`. The ratio and the reference's sum have the same relative
+    error. The variance of that sum is the sum of the pixels' variances; channels may share paths, so their
+    standard deviations are added.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())

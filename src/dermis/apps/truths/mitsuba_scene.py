@@ -33,12 +33,12 @@ ROULETTE_DEPTH = 100
 """Scattering events before Russian roulette. Earlier roulette leaves few paths of high weight: red on skin2
 then has nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
 _DIRECT_DEPTH = 2
-_GAP_FLOAT_STEPS = 0.97
-"""Distance between the two surfaces of an interface, over the offset by which Mitsuba avoids a second hit of
-the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean free path of
-1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower one, an outward
-ray hits the lower one and skips the upper one, so that only the gap is skipped."""
-_REPORTED_FOLD = 1e-3
+_RELATIVE_GAP = 0.97
+"""Ratio of the distance between the two surfaces of an interface to the offset by which Mitsuba avoids a
+second hit of the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean
+free path of 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower
+one, an outward ray hits the lower one and skips the upper one, so that only the gap is skipped."""
+_REPORTED_FOLD = 1e-3  # fraction of a folded surface above which a note reports it
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
 
     skin : closed skin surface relative to the head's centre
     """
-    return np.asarray(_GAP_FLOAT_STEPS * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
+    return np.asarray(_RELATIVE_GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
 def _homogeneous_medium(layer: Layer) -> SceneDict:
@@ -250,7 +250,8 @@ def mesh_shape(
 ) -> MitsubaObject:
     """Return triangles as a Mitsuba mesh.
 
-    vertices, normals, uv : (v, 3), (v, 3), (v, 2); normals are None for flat shading, uv without textures
+    vertices, normals, uv : positions (v, 3), normals (v, 3) and uv (v, 2) of the vertices; normals are None
+        for flat shading, uv are None without textures
     triangles : (f, 3) vertex indices
     attributes : BSDF, emitter and media
     """

@@ -14,7 +14,7 @@ from dermis.mesh.mesh import Mesh
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int32]
-_MIN_DEPTH_MM = 0.05  # 3 V / A of a body of volume V and surface A; the radius of a ball
+_MIN_DEPTH_MM = 0.05  # least 3 V / A for volume V and surface area A; for a ball, this is its radius
 _MAX_FOLDED = 0.02
 
 
@@ -38,7 +38,7 @@ def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
 
     name : name of the head, for messages
 
-    Raises DermisError when the skin encloses no volume: a single sheet, or a surface turned inside out.
+    Raises DermisError when the skin encloses no volume: an open surface, or one with inward normals.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
@@ -60,8 +60,9 @@ def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[
     depth_mm : (p,) depth of each point; negative for an offset outwards [mm]
     name : name of the head, for messages
 
-    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
-    thin parts whose two sides pass through one another: none may be thinner than twice the depth.
+    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. Thin
+    parts whose opposite sides intersect after the offset are not detected: all parts must be thicker than
+    twice the depth.
     """
     shifted = (solid.positions - depth_mm[:, None] * _mitre_vectors(solid)).astype(np.float32)
     before, after = (_area_vectors(vertices[solid.triangles]) for vertices in (solid.positions, shifted))
@@ -77,7 +78,7 @@ def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[
 
 
 def _mitre_vectors(solid: ClosedSurface) -> Doubles:
-    """Return the outward vector (p, 3) of each point that moves all faces around it by a distance of 1.
+    """Return for each point the outward vector (p, 3) that moves all faces around the point by 1.
 
     At sharp edges it is longer than 1, but at most 2.
     """
@@ -108,7 +109,7 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
-    """Return directed edges (n, 2) that lack an opposite edge, repeated as often as opposites are missing.
+    """Return directed edges (n, 2) that lack an opposite edge, each repeated for every missing opposite edge.
 
     count : number of points
     """
@@ -146,7 +147,7 @@ def _area_vectors(corners: Floats) -> Doubles:
 
 
 def _enclosed_volume(corners: Doubles) -> float:
-    """Return the volume enclosed by triangles [mm3]; negative for a surface turned inside out.
+    """Return the volume enclosed by triangles [mm3]; negative for inward normals.
 
     corners : (f, 3, 3) corner positions [mm]
     """

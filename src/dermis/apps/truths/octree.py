@@ -28,8 +28,8 @@ class Octree(NamedTuple):
     points, flux : (n, 3, 3) three points that replace the node's light [mm], and their flux by channel, which
         may be below 0 [mm²]
     second_moment, moment_error, centroid_error : (n,) error bounds of the three points, for the worst
-        channel: sum of the mean square distances of the light and of the points from the centre [mm²],
-        difference of their second moments [mm²], distance between their centroids [mm]
+        channel: mean square distance of the light from the centre, plus that of the points [mm²]; difference
+        between the second moments of light and points [mm²]; distance between the centroids of both [mm]
     corners : (m, 3, 3) corners of the triangles [mm]
     irradiance : (m, 3, 3) irradiance at the corners
     area : (m,) areas of the triangles [mm²]
@@ -103,7 +103,7 @@ def _morton_keys(points: Floats) -> Index:
 
 
 def _octree_nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
-    """Return for each octree node its first triangle, the end of its triangles, and the next node.
+    """Return the first triangle, the end of the triangles and the next node of each node, see `Octree`.
 
     morton_keys : (m,) sorted keys of the triangles
     """
@@ -140,8 +140,8 @@ def _point_approximation(
 
     corners : relative to the middle of all triangles
 
-    The points have the flux and, within their plane, the centroid of each channel, and the second moments of
-    the sum of all channels. For white light this is exact up to the second order.
+    The points preserve each channel's flux and its centroid within their plane, and the second moments of the
+    sum of all channels. For white light this is exact up to the second order.
     """
     flux, first_moments, second_moments = _central_moments(corners, irradiance, area, first, end)
     centre, total = first_moments.pop(), np.maximum(flux.sum(axis=1), np.finfo(float).tiny)

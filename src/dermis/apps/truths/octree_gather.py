@@ -1,6 +1,6 @@
 """Gathering of light from an octree of triangles, compiled by numba: import this inside functions.
 
-A node, a triangle or a part of one that is far enough is replaced by three points with the same flux and
+A node, a triangle or a sub-triangle that is far enough is replaced by three points with the same flux and
 nearly the same centroid and second moments. The error is at most the node's `second_moment` times the
 profile's curvature, plus its `centroid_error` times the slope.
 """
@@ -24,10 +24,10 @@ _MAX_SUBDIVISIONS = 20
 
 
 class TriangleStack(NamedTuple):
-    """Stack of triangle pieces that are still to be gathered.
+    """Stack of sub-triangles that are still to be gathered.
 
-    Its fields are the corners of the pieces (p, 3, 3) [mm], the irradiance at the corners (p, 3, 3), and the
-    areas of the pieces (p,) [mm²].
+    Its fields are the corners of the sub-triangles (p, 3, 3) [mm], the irradiance at the corners (p, 3, 3),
+    and their areas (p,) [mm²].
     """
 
     corners: Floats
@@ -37,7 +37,7 @@ class TriangleStack(NamedTuple):
 
 @compiled
 def gather_exitance(points: Floats, tree: Octree, table: ProfileTable, bound: float, exitance: Floats) -> int:
-    """Add the exitance at each point to `exitance` (n, 3), and return the number of visited nodes and pieces.
+    """Add the exitance at each point to `exitance` (n, 3); return the number of visited nodes and triangles.
 
     points : (n, 3) positions [mm]
     bound : largest total error, relative to the profile's energy times the irradiance near a point [-]
@@ -86,7 +86,7 @@ def _gather_triangle(
     stack: TriangleStack,
     exitance: Floats,
 ) -> int:
-    """Add the light of triangle t, split in four until its pieces are far enough, and count the pieces."""
+    """Add the light of triangle t, split until its parts are far enough; return the number of parts."""
     stack.corners[0], stack.irradiance[0], stack.area[0] = (tree.corners[t], tree.irradiance[t], tree.area[t])
     count, visit_count = 1, 0
     while count > 0:
@@ -120,7 +120,7 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
 def _add_midpoints(
     point: Floats, i: int, stack: TriangleStack, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add the light of a triangle piece by the midpoints of its sides.
+    """Add the light of sub-triangle i of the stack, evaluated at the midpoints of its sides.
 
     This quadrature is exact to second order in the product of irradiance and profile.
     """
@@ -138,7 +138,7 @@ def _add_midpoints(
 
 @compiled
 def _split_triangle(i: int, stack: TriangleStack) -> None:
-    """Replace piece i of the stack by its four quarters, pieces i to i + 3."""
+    """Replace sub-triangle i of the stack by its four quarters, at i to i + 3."""
     stack.area[i : i + 4] = 0.25 * stack.area[i]
     for values in (stack.corners, stack.irradiance):
         for axis in range(3):
@@ -172,7 +172,7 @@ def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[in
 def _add_flux(
     distance: float, red: float, green: float, blue: float, table: ProfileTable, exitance: Floats
 ) -> None:
-    """Add flux by channel times the profile at a distance, interpolated in its table, to `exitance`."""
+    """Add each channel's flux times the profile at a distance, interpolated in its table, to `exitance`."""
     row_position = math.sqrt(distance) * table.rows_per_root
     row = int(row_position)
     if row < len(table.R) - 1:

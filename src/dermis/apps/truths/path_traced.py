@@ -79,8 +79,8 @@ def path_trace(
     invisible and do not shadow one another.
 
     medium : index-matched (eta 1), isotropic medium with three channels; layers become nested bodies, whose
-        interfaces are the skin offset inwards by their depths. Or a `Lambertian`, for directly lit skin
-        without scattering
+        interfaces are the skin offset inwards by the depths of the layers. Or a `Lambertian`, for directly
+        lit skin without scattering
     samples : smallest number of paths per pixel, in passes of 4. Passes are cached on disk by the scene's
         content, so a later call with more samples adds to them
     settings : settings of the frame, of which only the size is used
@@ -242,7 +242,7 @@ def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
 
 
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
-    """Return a hash of all inputs of a path-traced image, which names its cached passes.
+    """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.
 
     trace_settings : versions and settings of the path tracer
     """

@@ -82,7 +82,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
     The cosine is 0 for total reflection.
 
-    eta : index of refraction on the near side over that on the far side
+    eta : index of refraction on the near side divided by that on the far side
 
     Source: [Born1999] section 1.5.
     """

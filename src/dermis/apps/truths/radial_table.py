@@ -17,7 +17,7 @@ TABLE_ROWS = 8192
 
 _GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
 _FAR_ERROR_FRACTION = 0.2
-"""Fraction of the permitted error in a slowly decreasing tail, so that distant nodes are not opened."""
+"""Fraction of the permitted error given to a slowly decreasing tail, so that distant nodes stay closed."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ class ProfileTable(NamedTuple):
     There are `rows_per_root` rows per mm^(1/2).
 
     R : (rows, 3) profile [mm^-2], 0 in the last row
-    slope : (rows,) upper bound of |dR/dr| from this radius on, over the profile's energy [mm^-3]
-    curvature : (rows,) upper bound of half the largest second derivative, over the energy [mm^-4]
+    slope : (rows,) upper bound of |dR/dr| from this radius on, divided by the profile's energy [mm^-3]
+    curvature : (rows,) upper bound of half the largest second derivative, divided by the energy [mm^-4]
     error_density : (rows,) density of the permitted error, decreasing, with integral 1 over the plane [mm^-2]
     """
 
@@ -128,7 +128,7 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
 
 
 def _upper_bound(values: Floats, energy: Floats, nonzero: NDArray[np.bool_]) -> Floats:
-    """Return the largest value (rows,) of any channel from each radius on, over the energy.
+    """Return the largest value (rows,) of any channel from each radius on, divided by its energy.
 
     values : (rows, 3) function of the radius by channel
     energy : (3,) energy of the profile

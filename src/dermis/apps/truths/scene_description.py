@@ -71,7 +71,7 @@ def mitsuba_projector(
     cosine : (h, w) cosine of the angle between texel and axis
     half_tangent : tangent of half the horizontal field of view
     """
-    # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, over pi.
+    # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, divided by pi.
     slide = intensity * cosine[..., None] ** 3 / np.pi
     return {
         "type": "projector",
@@ -107,19 +107,19 @@ def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
 
 
 def cycles_light(
-    kind: str, irradiance: Vector, factor: float, position: Vector, forward: Vector, **given: float | str
+    kind: str, irradiance: Vector, factor: float, position: Vector, forward: Vector, **properties: float | str
 ) -> SceneDict:
     """Return Cycles' description of a light.
 
     kind : Cycles' type of the light
     irradiance : (3,) irradiance of the light in dermis
     factor : factor from irradiance to Cycles' energy of the light
-    given : further properties of the light
+    properties : further properties of the light
     """
     brightest = float(max(irradiance))
     colour = [float(component) / brightest if brightest > 0.0 else 0.0 for component in irradiance]
-    fields: SceneDict = {"color": colour, "energy": brightest * float(factor), **given}
-    for name, value in given.items():  # NumPy's numbers are not valid JSON
+    fields: SceneDict = {"color": colour, "energy": brightest * float(factor), **properties}
+    for name, value in properties.items():  # NumPy's numbers are not valid JSON
         fields[name] = value if isinstance(value, str) else float(value)
     return {"type": kind, "set": fields, "to_world": cycles_look_at(position, forward)}
 
@@ -140,7 +140,7 @@ def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
 
 
 def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, NDArray[np.float32]]]:
-    """Return Cycles' description of an environment, and its panorama as an array by name."""
+    """Return Cycles' description of an environment, and a dictionary with its panorama if it has one."""
     if environment is None:
         return {"strength": 0.0}, {}
     world: SceneDict = {"strength": environment.exposure}

@@ -30,7 +30,7 @@ MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
 _PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
-_REPORTED_LOSS = 1e-3
+_REPORTED_LOSS = 1e-3  # fraction of dropped photons from which on a warning reports it
 
 
 def default_ring_edges() -> Floats:
@@ -48,7 +48,7 @@ def trace_slab(
     """Trace a pencil beam at normal incidence through a stack of layers in air.
 
     layers : layers, topmost first; interfaces between unequal indices of refraction reflect and refract
-    photons : number of photons; standard errors fall with its square root
+    photons : number of photons; standard errors are proportional to 1 / sqrt(photons)
     seed : random seed, which gives equal results on any number of processors
     edges_mm : (n + 1,) radii of the ring edges, from 0; None for `default_ring_edges` [mm]
     progress : function called with the number of finished batches and the number of all batches
@@ -72,14 +72,14 @@ def trace_medium(
     """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
     g : mean cosine of the scattering angle in all layers, whose scattering coefficient is the reduced one
-        over 1 - g [-]
+        divided by 1 - g [-]
     """
     check_anisotropy(g)
     results: list[SlabResult] = []
 
-    def report_channel(done: int, of: int) -> None:
+    def report_channel(done: int, total: int) -> None:
         if progress is not None:
-            progress(len(results) * of + done, medium.channels * of)
+            progress(len(results) * total + done, medium.channels * total)
 
     for i in range(medium.channels):
         layers = [_scattering_layer(layer, i, g, medium.eta) for layer in medium.layers]
@@ -97,7 +97,8 @@ def monte_carlo_profile(
 ) -> RadialProfile:
     """Return the diffusion profile of a medium by Monte Carlo, averaged over rings, with standard errors.
 
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; the profile is then per incident power
+    rgb : (3, c) weights that convert wavelengths to linear Rec. 709; the profile is then normalised by the
+        incident power, otherwise by the power that enters the medium
     photons : number of photons per channel or wavelength
     g : mean cosine of the scattering angle; the reduced scattering coefficient is kept [-]
 
@@ -130,7 +131,7 @@ def monte_carlo_profile(
 
 
 def _unfinished_warnings(runs: Sequence[SlabResult]) -> list[str]:
-    lost = max(run.per_entering.unfinished for run in runs)
+    lost = max(run.relative_to_entering.unfinished for run in runs)
     if lost < _REPORTED_LOSS:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
@@ -293,7 +294,7 @@ class ScatteringLayer:
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Reflected, transmitted and absorbed fractions of the beam's power; `_se` are standard errors [-].
+    """Reflected, transmitted and absorbed fractions of the beam's power; `_se` marks standard errors [-].
 
     The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The errors are binomial, and
     0 where no photon arrived.
@@ -329,7 +330,7 @@ class SlabResult:
     unfinished: float
 
     @property
-    def per_entering(self) -> SlabResult:
+    def relative_to_entering(self) -> SlabResult:
         """Return all fractions relative to the power that enters the stack, as in diffusion profiles."""
         names = [field.name for field in fields(self)][3:]
         entering_fraction = 1.0 - self.specular

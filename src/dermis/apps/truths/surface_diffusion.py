@@ -24,11 +24,12 @@ if TYPE_CHECKING:
 STEPS_PER_LEVEL = 12
 """Time steps per level; the peak of a diffused point is then within 0.2 % of the limit."""
 EDGES_PER_SIGMA = 2.0
+"""Smallest ratio of the standard deviation that a level adds to the length of an edge [-]."""
 MARGIN_SIGMAS = 4.0
 """Standard deviations beyond which a Gaussian has 0.03 % of its energy."""
 
 _TRAPEZOIDAL_FRACTION = 2 - np.sqrt(2)
-"""Fraction of the step by the trapezoidal stage; this value gives both stages the same matrix."""
+"""Fraction of a time step that the trapezoidal stage covers; this value gives both stages one matrix."""
 
 
 def diffuse_on_surface(
@@ -81,7 +82,7 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (k,) of blur levels that edges of a given length resolve.
 
-    A level is resolved if the standard deviation that it adds is at least two edges.
+    A level is resolved if the standard deviation that it adds is at least two edge lengths.
 
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     edge_mm : length of the longest edge, see `longest_edge_mm` [mm]
@@ -105,7 +106,7 @@ def max_edge_mm(variances_mm2: ArrayLike) -> float:
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return how far a patch must extend beyond its radius: four deviations of the widest level [mm].
+    """Return how far a patch must extend beyond its radius: four sigmas of the widest level [mm].
 
     variances_mm2 : (k,) increasing variances [mm2]
     """
@@ -121,11 +122,11 @@ def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: fl
     step = variance / 2 / steps
     solve = _lu_solver((mass + (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsc())
     explicit = (mass - (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsr()
-    first = 1 / (_TRAPEZOIDAL_FRACTION * (2 - _TRAPEZOIDAL_FRACTION))
-    lumped = mass.tocsr()
+    intermediate_weight = 1 / (_TRAPEZOIDAL_FRACTION * (2 - _TRAPEZOIDAL_FRACTION))
+    mass_rows = mass.tocsr()
     for _ in range(steps):
         intermediate = solve(explicit @ values)
-        values = solve(lumped @ (first * intermediate + (1 - first) * values))
+        values = solve(mass_rows @ (intermediate_weight * intermediate + (1 - intermediate_weight) * values))
     return values
 
 
@@ -178,7 +179,7 @@ def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, st
 
 
 _MIN_TRIANGLE_SLACK = 1e-5
-"""Least slack of the triangle inequality, over the mean edge; angles of flatter triangles are not usable."""
+"""Least slack of the triangle inequality, relative to the mean edge; flatter angles are not usable."""
 _FLIP_TOLERANCE = 1e-6
 """Edges whose cotangents sum to less than minus this are flipped; four points on a circle sum to 0."""
 _MAX_SWEEPS = 1000

@@ -19,7 +19,7 @@ _ERROR_AT_UNIT_BOUND = 1e-3
 """Error at an error bound of 1, measured on waves, spheres, bumps and the scan. The errors of three points
 are of third order in the size of a patch, their bound is of second order."""
 _UNCANCELLED_FACTOR = 50.0
-"""Factor for errors of differently lit channels, which are of second order and cancel less well."""
+"""Factor for errors caused by different light in the channels; they are of second order and cancel less."""
 
 
 def integrate_exitance(
@@ -29,11 +29,11 @@ def integrate_exitance(
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
-    profile : profile R, by Euclidean distance, through thin parts too
+    profile : profile R, a function of the Euclidean distance, so that light also passes through thin parts
     error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a piece of one is replaced by three points if Taylor's remainder is
-    below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
+    A node of the octree, a triangle or a part of a triangle is replaced by three points if Taylor's remainder
+    is below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
     integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
     relation between the bound and `error` is measured.
 

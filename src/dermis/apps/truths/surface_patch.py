@@ -1,4 +1,4 @@
-"""Patch of a surface, subdivided until its edges are short enough for diffusion, with its shape kept."""
+"""Patch of a surface with unchanged shape, subdivided until its edges are short enough for diffusion."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2
     """Return a patch of a mesh, with welded uv seams, on which light can be blurred by given variances.
 
     centre_mm, radius_mm : ball inside which results are valid; an infinite radius takes the whole mesh [mm]
-    variances_mm2 : (k,) increasing variances; the smallest step sets the edge length, the largest variance
-        the margin [mm2]
+    variances_mm2 : (k,) increasing variances; the smallest difference of successive ones determines the edge
+        length, and the largest variance the margin [mm2]
 
     Short edges over a wide margin are costly: use separate patches for narrow and wide levels.
     """
@@ -142,8 +142,8 @@ def refine_patch(
 def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (f,) of triangles whose bounding balls are within reach of the centre.
 
-    Raises DermisError when there is none, or when those entirely within reach will become too many: a
-    triangle with edges of at most `edge_mm` has at most the area of the equilateral one.
+    Raises DermisError when there is none, or when splitting those entirely within reach would give too many
+    triangles. The estimate assumes equilateral triangles with edges of `edge_mm`, the largest ones possible.
 
     corners : (f, 3, 3) corner positions [mm]
     reach : distance from the centre [mm]

@@ -17,7 +17,7 @@ _SPLIT_PATTERNS = (
     [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
     [[3, 1, 4], [0, 3, 2], [3, 4, 2]],
 )
-"""Triangles that replace one with 0, 1, 2 or 3 halved sides, from side 0 on; vertex 3 + k halves side k.
+"""Triangles that replace a triangle whose first 0, 1, 2 or 3 sides are halved; vertex 3 + k halves side k.
 
 Two halved sides leave a quadrilateral; the last entry splits it along the other diagonal.
 """
@@ -62,8 +62,8 @@ def split_triangles(
         first_longer = np.subtract(*np.square(diagonals).sum(axis=2).T) > 0
         pattern_index = np.where((count == 2) & first_longer, len(_SPLIT_PATTERNS) - 1, count)
     parts = []
-    for number, pattern in enumerate(_SPLIT_PATTERNS):
-        parent = np.flatnonzero(pattern_index == number)
+    for index, pattern in enumerate(_SPLIT_PATTERNS):
+        parent = np.flatnonzero(pattern_index == index)
         new_triangles = vertices[parent][:, pattern].reshape(-1, 3)
         new_weights = vertex_weights[parent][:, pattern].reshape(-1, 3, 3)
         parts.append((new_triangles, np.repeat(parent, len(pattern)), new_weights))

@@ -62,15 +62,15 @@ def tally_exits(
     rng: RandomState,
     tally: Counts,
 ) -> None:
-    """Trace photons and count them by the strips where they enter and leave, in `tally` (n, n).
+    """Trace photons, and add to `tally` (n, n) how many of those entering each strip leave from each strip.
 
     photons : number of photons that enter each strip
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
     edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
     """
-    bins = len(edges_mm) - 1
-    width = (edges_mm[-1] - edges_mm[0]) / bins
-    for start in range(bins):
+    strip_count = len(edges_mm) - 1
+    width = (edges_mm[-1] - edges_mm[0]) / strip_count
+    for start in range(strip_count):
         for _ in range(photons):
             end = _trace_photon(
                 edges_mm[0] + (start + random_uniform(rng)) * width, sigma_t, albedo, eta, rng

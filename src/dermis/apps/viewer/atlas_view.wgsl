@@ -6,7 +6,7 @@ const BACKGROUND: vec3f = vec3f(0.13); // outside the atlas
 
 struct AtlasView {
     centre: vec2f,
-    span: f32, // extent of the shorter image side, in sides of the atlas
+    span: f32, // part of the atlas along the shorter image side, 1 for its whole side
     quantity: u32,
     scale: f32,
 }

@@ -13,10 +13,10 @@ from dermis.scene.camera import CAMERA_PRESETS, camera_preset
 Event = Mapping[str, Any]
 Point = tuple[float, float]
 PRESET_NAMES = tuple(CAMERA_PRESETS)
-"""Names of the camera presets that the keys from 1 on select."""
+"""Names of the camera presets, in the order of the digit keys that select them, from 1."""
 LIGHT_DRAG_KEY = "Shift"
 _WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
-_MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event, which sums all rotations of a frame
+_MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event; an event sums all rotations in a frame
 _LEFT_BUTTON = 1
 _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs it [logical pixel]
 
@@ -35,9 +35,9 @@ class Controls:
         self.history = history
         self._displayed_state = displayed_state or (lambda: history.state)
         self.light = 0
-        self._gesture = 0
-        self._button = 0
-        self._pointer = (0.0, 0.0)
+        self._gesture_count = 0
+        self._pressed_button = 0
+        self._pointer_position = (0.0, 0.0)
         self._pinch: tuple[float, float, float] | None = None
 
     def handle(self, event: Event, size: Point) -> None:
@@ -48,7 +48,7 @@ class Controls:
         kind = event["event_type"]
         if kind == "pointer_down":
             self._press(event)
-        elif kind == "pointer_move" and self._button:
+        elif kind == "pointer_move" and self._pressed_button:
             self._drag(event, size)
         elif kind == "pointer_up":
             self._release(event, size)
@@ -68,33 +68,33 @@ class Controls:
 
     def _press(self, event: Event) -> None:
         self.history.end_gesture()
-        self._gesture += 1
-        self._button = int(event.get("button", 0)) or _LEFT_BUTTON
-        self._pointer = event["x"], event["y"]
+        self._gesture_count += 1
+        self._pressed_button = int(event.get("button", 0)) or _LEFT_BUTTON
+        self._pointer_position = event["x"], event["y"]
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, size: Point) -> None:
         """End a drag at the position of the release, which may differ from that of the last move."""
-        if self._button and not self._pinch and (event["x"], event["y"]) != self._pointer:
+        if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, size)
-        self._button, self._pinch = 0, None
+        self._pressed_button, self._pinch = 0, None
         self.history.end_gesture()
 
     def _drag(self, event: Event, size: Point) -> None:
-        pinch, (x0, y0) = _measure_pinch(event), self._pointer
-        self._pointer = event["x"], event["y"]
+        pinch, (x0, y0) = _measure_pinch(event), self._pointer_position
+        self._pointer_position = event["x"], event["y"]
         if pinch or self._pinch:
             self._pan_and_zoom(pinch, size)
             return
         state, side = self.history.state, self._drag_unit(size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
-        if state.view == ATLAS_VIEW_NAME or self._button != _LEFT_BUTTON:
+        if state.view == ATLAS_VIEW_NAME or self._pressed_button != _LEFT_BUTTON:
             new_state = _pan(state, right, down)
         elif LIGHT_DRAG_KEY in event.get("modifiers", ()):
             new_state = drag_light(state, self.light, math.pi * right, -math.pi * down)
         else:
             new_state = state.with_camera(orbit(state.scene.camera, -math.pi * right, math.pi * down))
-        self.history.change(new_state, f"drag {self._gesture}")
+        self.history.change(new_state, f"drag {self._gesture_count}")
 
     def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
         """Pan and zoom with two fingers; lifting one of them does not move the picture.
@@ -105,8 +105,8 @@ class Controls:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
             side = self._drag_unit(size)
             new_state = _pan(self.history.state, (x - x0) / side, (y - y0) / side)
-            self.history.change(new_state, f"drag {self._gesture}")
-            self._zoom(spread0 / spread, (x, y), size, f"drag {self._gesture}")
+            self.history.change(new_state, f"drag {self._gesture_count}")
+            self._zoom(spread0 / spread, (x, y), size, f"drag {self._gesture_count}")
         self._pinch = pinch
 
     def _zoom(self, factor: float, pointer: Point, size: Point, gesture: str) -> None:
@@ -195,7 +195,7 @@ def picture_event(event: Event, left: float) -> Event:
 
 
 def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
-    """Return the state with its camera, or its part of the atlas, moved along with the pointer.
+    """Return the state with the camera, or the displayed part of the atlas, moved along with the pointer.
 
     right, down : motion of the pointer, divided by `Controls._drag_unit`
     """

@@ -13,7 +13,7 @@ struct ViewParameters {
     forward: vec3f,
     samples: u32,
     right: vec3f,
-    scale: f32, // from light to display values, or the mean number of texels per mm
+    scale: f32, // factor from light to display values; for stretch, mean number of texels per mm
     up: vec3f,
     shift: vec2f, // offset of the image centre from the optical axis, in half images
     jitter: array<vec4f, 64>,

@@ -15,7 +15,7 @@ fn stretch_colour(metric: vec4f, mean: f32) -> vec3f {
     return vec3f(0.5 + 0.25 * log2(metric.xy / mean), 0.5 + 0.5 * metric.z);
 }
 
-// scale : from light to display values, or the mean number of texels per mm
+// scale : factor from light to display values; for stretch, mean number of texels per mm
 fn layer_colour(quantity: u32, value: vec4f, scale: f32) -> vec3f {
     // Without branches, because the software driver Mesa 22.3 leaks memory at each dispatch of branching code.
     let light = encode_srgb(scale * value.rgb / 3.14159265);

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _MAX_ELEVATION = math.radians(85.0)
 _MIN_DISTANCE_MM = 90.0  # distance from the target; nearer cameras would enter the head
 _FRAME_RANGE_MM = (4.0, 3000.0)  # height of the visible frame at the target
-_EASING_TIME_S = 0.05  # time constant of the exponential decay
+_EASING_TIME_S = 0.05  # time constant with which the displayed camera approaches its target
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
@@ -121,14 +121,14 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
-    """Return the surface point under a position of the image [mm]; None beside the head.
+    """Return the surface point at a position in the image [mm]; None if the ray misses the head.
 
     The point is relative to the centre of the head.
 
     scene : scene with the posed head
-    camera : camera to use instead of that of the scene
+    camera : camera, which replaces the scene's camera
     x, y : position in the image, from -1 (left, bottom) to 1
-    aspect : image width over height
+    aspect : ratio of image width to height [-]
 
     Source: [MollerTrumbore1997].
     """

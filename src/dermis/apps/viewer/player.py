@@ -14,7 +14,7 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file, and the clip that was loaded from it for the last head.
+    """Motion file, with a cache of the clip that was last loaded from it for a head.
 
     path : file that `load_motion` accepts
     fps : frame rate of files without times [1/s]
@@ -37,8 +37,8 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, with its current time and the displayed state.
 
-    While the motion plays, its current pose replaces that of the state, which other controls can still
-    change. When it pauses or ends, that pose becomes a step of the undo history.
+    While the motion plays, its current pose is displayed instead of the state's pose; other controls can
+    still change the state. When it pauses or ends, that pose becomes a step of the undo history.
 
     motion : motion to play, None for none
     clock : function that returns the time [s]
@@ -63,7 +63,7 @@ class MotionPlayer:
         self.is_playing = False
         self._starting = False  # whether no frame of the motion has been drawn yet
         self._start_time: float | None = None  # time of the clock at the beginning of the motion
-        self._cached: tuple[ViewerState, float, ViewerState] | None = None
+        self._cached_display: tuple[ViewerState, float, ViewerState] | None = None
 
     @property
     def has_motion(self) -> bool:
@@ -95,14 +95,18 @@ class MotionPlayer:
         clip = self.clip if self.is_playing else None
         if clip is None:
             return state
-        if self._cached is None or self._cached[0] is not state or self._cached[1] != self._seconds:
+        if (
+            self._cached_display is None
+            or self._cached_display[0] is not state
+            or self._cached_display[1] != self._seconds
+        ):
             try:
-                self._cached = state, self._seconds, state.with_motion(clip, self._seconds)
+                self._cached_display = state, self._seconds, state.with_motion(clip, self._seconds)
             except DermisError as error:  # an unreadable frame of a sequence
                 self.stop()
                 self.note = str(error)
                 return state
-        return self._cached[2]
+        return self._cached_display[2]
 
     def open(self, motion: MotionFile) -> None:
         """Replace the motion and play it from its beginning.
@@ -127,7 +131,7 @@ class MotionPlayer:
 
     def stop(self) -> None:
         """Stop, and return to the pose from before playing."""
-        self.is_playing, self._cached = False, None
+        self.is_playing, self._cached_display = False, None
 
     def pause(self) -> None:
         """Stop, and add the current pose to the undo history as one step."""

@@ -47,8 +47,8 @@ class HeadLoader:
     def __init__(self) -> None:
         self.recent: list[str] = []
         self.request_frame: Callable[[], None] = lambda: None
-        self._names: dict[str, str] = {}  # original names of uploaded files, by path
-        self._thread = ThreadPoolExecutor(1, "head")
+        self._original_names: dict[str, str] = {}  # original names of uploaded files, by path
+        self._executor = ThreadPoolExecutor(1, "head")
         self._future: Future[LoadedHead] | None = None
         self._name = ""
 
@@ -63,7 +63,7 @@ class HeadLoader:
 
     def uploaded_name(self, name: str) -> str:
         """Return the original name of an uploaded file from its path; other names are returned unchanged."""
-        return self._names.get(name, name)
+        return self._original_names.get(name, name)
 
     def open(self, name: str, uploaded_as: str = "") -> None:
         """Start to load a head or a scene; a load that has not started yet is cancelled.
@@ -75,12 +75,12 @@ class HeadLoader:
             self._future.cancel()
         self._name = str(Path(name).resolve()) if Path(name).is_file() else name
         if uploaded_as:
-            self._names[self._name] = uploaded_as
-        self._future = self._thread.submit(_load_head_or_scene, self._name)
+            self._original_names[self._name] = uploaded_as
+        self._future = self._executor.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with the head that has been loaded, once; None if no load has ended.
+        """Return the state with the loaded head, once after each load; None if no load has ended since.
 
         state : current state, in which the head is replaced
 
@@ -211,7 +211,7 @@ class Session:
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
-        """Replace the state by that of a scene file.
+        """Replace the state by the state in a scene file.
 
         Raises DermisError if the file is not a scene.
         """
@@ -275,7 +275,7 @@ def _shorten(text: str) -> str:
 
 
 def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerState] = ()) -> ViewerState:
-    """Return the state with roughness and specular maps from a table of face regions, or without these.
+    """Return the state with roughness and specular maps from a table of face regions, or without such maps.
 
     name : name of the table, "auto" or "none"
     known_states : states whose heads are reused if they already have these maps

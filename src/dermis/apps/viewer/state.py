@@ -38,7 +38,7 @@ class AtlasView:
 
     layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
-    span : extent of the picture's shorter side, in sides of the atlas [-]
+    span : part of the atlas along the picture's shorter side, 1 for the whole side of the atlas [-]
     """
 
     layer: str = "irradiance"
@@ -138,7 +138,7 @@ class ViewerState:
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Return a copy with another environment; None for none."""
+        """Return a copy with another environment; None removes it."""
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:
@@ -298,7 +298,7 @@ class UndoHistory:
     def change(self, state: ViewerState, gesture: str = "") -> None:
         """Add a state; within one gesture it replaces the last state.
 
-        gesture : name of the gesture, empty for a step of its own
+        gesture : name of the gesture, empty for a change that is undone separately
         """
         if states_equal(state, self.state):
             return

@@ -32,7 +32,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
 _BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
-_SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # frame time over the budget above or below which the quality changes
+_SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # ratios of frame time to budget at which the quality changes
 _STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
 
 
@@ -71,7 +71,7 @@ class QualityController:
     def __init__(self, software: bool) -> None:
         self.software = software
         self._budget_ms = _BUDGET_MS[software]
-        self._level = self._first = _BEST_LEVEL_ON_CPU if software else 0
+        self._level = self._best_level = _BEST_LEVEL_ON_CPU if software else 0
         self._streak = 0
 
     @property
@@ -91,7 +91,7 @@ class QualityController:
         if not step:
             self._streak = 0
         if abs(self._streak) >= _STREAK_LENGTH:
-            self._level = max(self._first, min(len(QUALITY_LEVELS) - 1, self._level + step))
+            self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
     def limited_settings(self, settings: Settings, size: tuple[int, int], moving: bool) -> Settings:
@@ -111,11 +111,11 @@ class QualityController:
 
 
 Images = tuple[Texture, Texture | None]
-"""Image of the live state, and that of the frozen state or None."""
+"""Image of the live state, and image of the frozen state; None if no state is frozen."""
 _CACHED_RESOURCES = 2  # resources for frames in motion and for still frames
-_PREPARATION_SIZE = (96, 64)  # size of quick frames that need all shaders
+_PREPARATION_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
 _TIMED_FRAMES = 120
-_FROZEN_SIDE = "before"  # view with its own light, so that a moving camera relights neither side
+_FROZEN_SIDE = "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class ViewRenderer:
         size: tuple[int, int],
         moving: bool,
     ) -> Images:
-        """Return the images of the live state and of the frozen state, None without a frozen one.
+        """Return the images of the live and the frozen state; the second is None if no state is frozen.
 
         moving : whether the picture is changing, which limits its quality
 
@@ -320,9 +320,9 @@ class HeadPreparation:
 
     def __init__(self, request_frame: Callable[[], None]) -> None:
         self._request_frame = request_frame
-        self._ready: Mesh | None = None  # other maps of this mesh need no preparation
+        self._ready_mesh: Mesh | None = None  # other maps of this mesh need no preparation
         self._future: Future[None] | None = None
-        self._next: Mesh | None = None
+        self._next_mesh: Mesh | None = None
         self._held_image: Texture | None = None
 
     @property
@@ -332,7 +332,7 @@ class HeadPreparation:
 
     def reset(self) -> None:
         """Forget all preparations, because the renderer has been replaced."""
-        self._ready = self._future = self._next = self._held_image = None
+        self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
         """Start to prepare the head of `state` if it is new; return the last image until it is ready.
@@ -343,14 +343,14 @@ class HeadPreparation:
             if not self._future.done():
                 return self._held_image
             future, self._future, self._held_image = self._future, None, None
-            self._ready = self._next
+            self._ready_mesh = self._next_mesh
             future.result()
         mesh = state.scene.head.mesh
-        if view_renderer.last_image is None or mesh is self._ready:
-            self._ready = mesh
+        if view_renderer.last_image is None or mesh is self._ready_mesh:
+            self._ready_mesh = mesh
             return None
         self._held_image = copy_texture(view_renderer.renderer.device, view_renderer.last_image)
-        self._next, view_renderer.is_preparing = mesh, True
+        self._next_mesh, view_renderer.is_preparing = mesh, True
         self._future = run_in_thread(lambda: view_renderer.prepare(state))
         self._future.add_done_callback(lambda _: self._request_frame())
         return self._held_image

@@ -79,7 +79,7 @@ class BlitProgram(Program):
 
 
 _STILL_AFTER_S = 0.25  # time since the last change after which the picture is refined
-_MAX_EASING_STEP_S = 0.2  # of the camera easing per frame
+_MAX_EASING_STEP_S = 0.2  # largest time step of the camera easing in a frame
 _MAX_DEVICE_FAILURES = 1  # consecutive failures of the device
 _PANEL_SETTLING_FRAMES = 3  # frames that the panel needs to settle after an event
 _POINTER_EVENTS = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
@@ -126,7 +126,7 @@ class Viewer:
         self._rejected_state: ViewerState | None = None
         self._failures = self._panel_frames = 0
         self.failure: DermisError | None = None
-        self._on_panel, self._pressed_left = False, 0.0
+        self._is_drag_on_panel, self._left_at_press = False, 0.0
         self._configure_canvas()
         canvas.add_event_handler(self._on_event, *_POINTER_EVENTS, *_KEY_EVENTS)
         canvas.request_draw(self.draw)
@@ -254,23 +254,23 @@ class Viewer:
         self._panel_frames = _PANEL_SETTLING_FRAMES
         is_for_panel = self.panel.handle_event(event, self.canvas.get_logical_size())
         if kind == "pointer_down":
-            self._on_panel = is_for_panel
-        if not (self._on_panel if kind in ("pointer_move", "pointer_up") else is_for_panel):
+            self._is_drag_on_panel = is_for_panel
+        if not (self._is_drag_on_panel if kind in ("pointer_move", "pointer_up") else is_for_panel):
             self._on_picture_event(event)
         if kind == "pointer_up":
-            self._on_panel = False
+            self._is_drag_on_panel = False
         self.canvas.request_draw()
 
     def _on_picture_event(self, event: Event) -> None:
         """Handle an event over the picture.
 
-        During a drag, positions stay relative to the left edge that the picture had at the press.
+        During a drag, positions are relative to the left edge of the picture at the start of the drag.
         """
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
         if event["event_type"] == "pointer_down":
-            self._pressed_left = left
-        start = self._pressed_left if event["event_type"] in ("pointer_move", "pointer_up") else left
+            self._left_at_press = left
+        start = self._left_at_press if event["event_type"] in ("pointer_move", "pointer_up") else left
         shifted, size = picture_event(event, start), (max(1.0, width - left), height)
         if not self.session.split.handle(shifted, size[0]):
             self.session.controls.handle(shifted, size)

@@ -34,7 +34,7 @@ LEVEL_VIEWS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Level of the blur pyramid that each view of irradiance shows."""
 
 ATLAS_LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
-"""Names of the maps over the atlas that the view "atlas" can show."""
+"""Names of the atlas maps that the view "atlas" can show."""
 
 VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
 """Names of all views."""
@@ -110,7 +110,7 @@ class IntermediateViews:
         return self._image
 
     def _atlas_layer(self, inputs: FrameInputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
-        """Return the texture over the atlas that a view shows, and a scale for its display.
+        """Return the atlas texture that a view shows, and a scale for its display.
 
         For light, the scale is the factor by which texels are multiplied for display. For stretch, it is the
         mean number of texels per mm, and for thickness 1.
@@ -157,7 +157,7 @@ class IntermediateViews:
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
     """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
 
-    The thickness is the least depth of a cell below the tangent planes of its source cells, and at most the
+    The thickness is the least depth of a cell below the tangent planes of its source cells. It is at most the
     radius within which source cells are searched.
 
     target : texture to fill, with one texel per cell; cells without pairs are unchanged

@@ -16,6 +16,7 @@ from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState, make_state
 from dermis.apps.viewer.viewer import Viewer
 from dermis.base.errors import refuse
+from dermis.base.renamed import renamed_keywords
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
@@ -100,8 +101,9 @@ def serve(
         _raise_failure(viewer)
 
 
+@renamed_keywords(shown="subject")
 def view(
-    shown: Head | Human | Scene | ViewerState | str | os.PathLike[str] = "human",
+    subject: Head | Human | Scene | ViewerState | str | os.PathLike[str] = "human",
     adapter: str = "auto",
     size: Size = (720, 540),
     motion: str = "",
@@ -113,7 +115,7 @@ def view(
 
     Parameters
     ----------
-    shown : Head, Human, Scene, ViewerState, str or path, optional
+    subject : Head, Human, Scene, ViewerState, str or path, optional
         What to show: a head, a person, a scene, or a name that `dermis view` accepts (human, a sample, a mesh
         file or a TOML scene). Default: the human.
     adapter : str, optional
@@ -131,7 +133,7 @@ def view(
     Raises
     ------
     DermisError
-        If `shown` is of another type, if it cannot be loaded, or without the extra `notebook`.
+        If `subject` is of another type, if it cannot be loaded, or without the extra `notebook`.
 
     Examples
     --------
@@ -141,7 +143,7 @@ def view(
     'picture'
     """
     canvas = _notebook_canvas(_load_backend("anywidget", ("anywidget",), "notebook"))
-    state = make_state(shown)
+    state = make_state(subject)
     motion_file = MotionFile(motion) if motion else None
     widget = canvas(size=size, max_fps=_MAX_FPS)
     widget.viewer = Viewer(state, widget, adapter, motion=motion_file)
@@ -149,7 +151,7 @@ def view(
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """Return the notebook widget class of rendercanvas with two of its faults corrected."""
+    """Return the notebook widget class of rendercanvas with workarounds for two of its bugs."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:

@@ -20,9 +20,9 @@ from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.mesh import Mesh
 
-_MIN_DENSITY = 0.05  # uv density of a piece over the mean; light is not blurred in pieces with less
-_SPECK_MM2 = 1.0  # mirrored parts of a chart with less area are no pieces of their own
-_DENSITY_RANGE = (0.5, 1.4)  # uv density over the mean; pieces outside this range are scaled towards it
+_MIN_DENSITY = 0.05  # lowest ratio of a piece's uv density to the mean at which light is blurred in it
+_SPECK_MM2 = 1.0  # parts of a chart with less area are merged into its largest part
+_DENSITY_RANGE = (0.5, 1.4)  # ratio of uv density to the mean; pieces outside are scaled towards this range
 _MAX_GUTTER = 1 / 8  # largest width of gutters as a fraction of the map's side
 
 
@@ -64,7 +64,8 @@ def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
 def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
     """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
 
-    The density is the square root of uv area over surface area: the length in uv of 1 mm on the surface.
+    The density is the length in uv of 1 mm on the surface: the square root of the ratio of uv area to surface
+    area.
     """
     inside, index = piece >= 0, np.maximum(piece, 0)
     uv = np.bincount(index, np.abs(surface.area_uv) * inside)
@@ -89,11 +90,11 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     packing = pack_pieces(surface, piece, scale, size, width)
     if packing is None:
         return None
-    # where a piece overlaps itself, gutters must read only the layer that has texels
+    # where a piece overlaps itself, only one layer owns texels, and gutters must not read the hidden one
     piece = np.where(hidden_triangles(surface, piece, packing, size), -1, piece)
-    own = np.flatnonzero(piece >= 0)
-    border = find_border(surface, piece, own)
-    coverage = compute_coverage(surface, piece, own, border, packing, width, (size, size))
+    members = np.flatnonzero(piece >= 0)
+    border = find_border(surface, piece, members)
+    coverage = compute_coverage(surface, piece, members, border, packing, width, (size, size))
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 

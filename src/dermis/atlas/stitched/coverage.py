@@ -26,8 +26,8 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 class Coverage:
     """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of the piece to which it belongs: for a texel of the piece its
-    own point, for a gutter texel a point on the border.
+    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece it is
+    the point that the texel shows, in the gutter a point on the border.
 
     triangle : (h, w) index of the triangle that the texel shows, -1 for none
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
@@ -50,7 +50,7 @@ class Coverage:
 def compute_coverage(
     surface: FlatSurface,
     piece: Index,
-    own: Index,
+    members: Index,
     border: Border,
     packing: Packing,
     width: GutterWidth,
@@ -59,11 +59,11 @@ def compute_coverage(
     """Compute the surface points that the texels of packed pieces and their gutters show.
 
     piece : (f,) piece of each triangle, -1 for none
-    own : (t,) indices of the triangles to rasterise
+    members : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
     shape : height and width of the grid of texels
     """
-    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), shape)
+    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, members), shape)
     weights = centre_weights(packing.corners, owner)
     coverage = Coverage(
         owner,
@@ -101,42 +101,44 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
 
 def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Mask:
     """Return the mask (f,) of triangles most of whose texels are owned by other triangles of their piece."""
-    own = np.flatnonzero(piece >= 0)
-    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, own), (size, size))
-    return mostly_hidden(packing.corners, own, owner)
+    members = np.flatnonzero(piece >= 0)
+    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, members), (size, size))
+    return mostly_hidden(packing.corners, members, owner)
 
 
-def _drawing_order(surface: FlatSurface, piece: Index, own: Index) -> Index:
-    """Return triangle indices sorted so that triangles mirrored within their piece are overwritten.
+def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
+    """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    own : (t,) indices of the triangles
+    They are then overwritten by the other triangles.
+
+    members : (t,) indices of the triangles
     """
-    return own[np.argsort(~_mirrored_triangles(surface, piece[own], own), kind="stable")]
+    return members[np.argsort(~_mirrored_triangles(surface, piece[members], members), kind="stable")]
 
 
-def _mirrored_triangles(surface: FlatSurface, piece: Index, own: Index) -> Mask:
-    """Return the mask of triangles whose uv orientation is opposite to that of most of their piece.
+def _mirrored_triangles(surface: FlatSurface, piece: Index, members: Index) -> Mask:
+    """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
 
-    piece, own : (t,) piece and index of each triangle
+    piece, members : (t,) piece and index of each triangle
     """
-    total = np.bincount(piece, surface.area_uv[own])
-    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[own]))
+    total = np.bincount(piece, surface.area_uv[members])
+    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[members]))
 
 
-def _repeat_edge(coverage: Coverage, piece: Index, ended: Mask, y: Index, x: Index) -> None:
+def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge where the surface ends.
 
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
-    ended : (h, w) mask of texels beyond the end of the surface
+    beyond_end : (h, w) mask of texels beyond the end of the surface
     y, x : (n,) row and column of the gutter texels among them
     """
-    last = np.array(ended.shape) - 1
-    own, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
+    last = np.array(beyond_end.shape) - 1
+    piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
         anchor = coverage.anchor_triangle[next_y, next_x]
-        same = (anchor >= 0) & ~ended[next_y, next_x] & (piece[anchor] == own)
+        same = (anchor >= 0) & ~beyond_end[next_y, next_x] & (piece[anchor] == piece_of_texel)
         from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
     for grid in (coverage.triangle, coverage.weights):
         grid[y, x] = grid[from_y, from_x]

@@ -13,10 +13,13 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 Complex = NDArray[np.complex128]
 
 START_SHIFT = 1e-3
-"""Fraction of the way by which start points move to an inner point, so that none is at a corner."""
+"""Fraction of the way to an inner point of the triangle by which start points move, to avoid corners."""
 
 INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
-"""Barycentric weights of that inner point; the centroid would let more geodesics hit corners."""
+"""Barycentric weights of the inner point to which start points move.
+
+The centroid would let more geodesics hit corners.
+"""
 
 _MAX_STEPS = 4096
 
@@ -28,7 +31,7 @@ class Geodesics(NamedTuple):
 
     ray : index of each geodesic in the arrays of `trace_geodesics`
     triangle : index of the current triangle
-    side : side (0, 1, 2) through which the geodesic leaves it
+    side : side (0, 1, 2) through which the geodesic leaves this triangle
     a, b : end points of that side
     direction : vector from the start to the target
     orientation : 1, or -1 in triangles that face opposite to the first triangle
@@ -42,9 +45,9 @@ class Geodesics(NamedTuple):
     direction: Complex
     orientation: Doubles
 
-    def select(self, chosen: Mask) -> Geodesics:
+    def select(self, selected: Mask) -> Geodesics:
         """Return the geodesics for which a mask is true."""
-        return Geodesics._make(part[chosen] for part in self)
+        return Geodesics._make(part[selected] for part in self)
 
 
 class GeodesicEnds(NamedTuple):

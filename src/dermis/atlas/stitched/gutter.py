@@ -17,7 +17,7 @@ from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_bo
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-_MAX_STRETCH = 2.0  # largest texels per mm at a border over the mean of its piece, for the width of a gutter
+_MAX_STRETCH = 2.0  # largest width of a gutter on the grid, relative to the width at its piece's mean density
 
 
 class Border(NamedTuple):
@@ -53,15 +53,15 @@ class GutterWidth(NamedTuple):
     max_texels: float
 
 
-def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
+def find_border(surface: FlatSurface, piece: Index, members: Index) -> Border:
     """Return the triangle sides at which pieces of charts end.
 
     piece : (f,) piece of each triangle, -1 for none
-    own : (t,) indices of the triangles whose sides are examined, each in a piece
+    members : (t,) indices of the triangles whose sides are examined, each in a piece
     """
-    neighbour = surface.uv_neighbour[own]
-    row, index = np.nonzero((neighbour == own[:, None]) | (piece[own, None] != piece[neighbour]))
-    triangle = own[row]
+    neighbour = surface.uv_neighbour[members]
+    row, index = np.nonzero((neighbour == members[:, None]) | (piece[members, None] != piece[neighbour]))
+    triangle = members[row]
     across = surface.adjacency.neighbour[triangle, index]
     return Border(triangle, index, (across >= 0) & surface.adjacency.passable[across])
 
@@ -81,7 +81,7 @@ def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: 
 
 def needed_texels(
     surface: FlatSurface,
-    own: Index,
+    members: Index,
     border: Border,
     packing: Packing,
     width: GutterWidth,
@@ -89,11 +89,11 @@ def needed_texels(
 ) -> Mask:
     """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
 
-    own : (t,) indices of the triangles of the pieces
+    members : (t,) indices of the triangles of the pieces
     shape : height and width of the grid of texels
     """
     found = np.zeros(shape, np.bool_)
-    found.ravel()[covered_texels(packing.corners[own], shape)[0]] = True
+    found.ravel()[covered_texels(packing.corners[members], shape)[0]] = True
     found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
     return found
 
@@ -139,9 +139,9 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from nearest border points to texels; return their ends, and the weights of the points.
+    """Trace geodesics from nearest border points to texels; return the ends, and the weights of the starts.
 
-    The weights (n, 2) are those of the second and third corner of the border triangle.
+    The weights (n, 2) of a start are those of the second and third corner of the border triangle.
 
     sides : border sides on the texel grid
     nearest : nearest border point of each texel

@@ -50,14 +50,14 @@ _MAX_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along 
 class Conflicts(NamedTuple):
     """Pairs of border points of a chart piece whose gutters meet, although they are apart on the surface.
 
-    one, other : (n, 2) both border points of each pair, at the scale of the grid [texel]
+    first, second : (n, 2) both border points of each pair, at the scale of the grid [texel]
     inside : (m, 2) texels of the piece
     texels_per_uv : texels per unit of uv
     texel_mm : side of a texel on the surface [mm]
     """
 
-    one: Doubles
-    other: Doubles
+    first: Doubles
+    second: Doubles
     inside: Doubles
     texels_per_uv: float
     texel_mm: float
@@ -65,7 +65,7 @@ class Conflicts(NamedTuple):
     @property
     def length_mm(self) -> float:
         """Return the length of the line along which gutters meet [mm]."""
-        return len(self.one) * self.texel_mm
+        return len(self.first) * self.texel_mm
 
 
 class _PieceGrid(NamedTuple):
@@ -87,32 +87,36 @@ class _PieceGrid(NamedTuple):
     nearest: NearestPoints
 
 
-def find_conflicts(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Conflicts:
+def find_conflicts(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Conflicts:
     """Find where gutters of one chart piece meet, by drawing the piece on a texel grid of its own.
 
     mapped : (f,) mask of triangles that belong to any piece
-    own : (t,) indices of the triangles of this piece
+    members : (t,) indices of the triangles of this piece
     """
-    mm2, area_uv = surface.area_mm2[own].sum(), np.abs(surface.area_uv[own]).sum()
-    low, high = surface.uv[own].min(axis=(0, 1)), surface.uv[own].max(axis=(0, 1))
+    mm2, area_uv = surface.area_mm2[members].sum(), np.abs(surface.area_uv[members]).sum()
+    low, high = surface.uv[members].min(axis=(0, 1)), surface.uv[members].max(axis=(0, 1))
     box_mm2 = float((high - low).prod()) * mm2 / area_uv
     texel_mm = float(max(_MIN_TEXEL_MM, np.sqrt(mm2 / _MAX_TEXELS), np.sqrt(box_mm2 / _MAX_GRID_CELLS)))
     texels_per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
     width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
     margin, ones = width.max_texels + 2, np.ones(len(mapped))
     corners = np.zeros(surface.uv.shape)
-    corners[own] = (surface.uv[own] - low) * texels_per_uv + margin
+    corners[members] = (surface.uv[members] - low) * texels_per_uv + margin
     columns, rows = np.ceil((high - low) * texels_per_uv + 2 * margin + 1).astype(int)
     piece = np.where(mapped, 1, -1)
-    piece[own] = 0
+    piece[members] = 0
     packing, shape = Packing(corners, texels_per_uv * ones, ones / texel_mm), (int(rows), int(columns))
     grid = _draw_grid(
-        surface, find_border(surface, piece, own), packing, width, rasterise_owners(corners, own, shape)
+        surface,
+        find_border(surface, piece, members),
+        packing,
+        width,
+        rasterise_owners(corners, members, shape),
     )
-    one, other = (grid.anchored.select(found) for found in _gap_pairs(surface, mapped, grid))
+    first, second = (grid.anchored.select(texels) for texels in _gap_pairs(surface, mapped, grid))
     origin = low * texels_per_uv - margin
     inside = grid.anchored.texels[: np.count_nonzero(grid.owner >= 0)] + origin
-    return Conflicts(one.anchors + origin, other.anchors + origin, inside, texels_per_uv, texel_mm)
+    return Conflicts(first.anchors + origin, second.anchors + origin, inside, texels_per_uv, texel_mm)
 
 
 def _draw_grid(
@@ -120,13 +124,13 @@ def _draw_grid(
 ) -> _PieceGrid:
     sides = border_sides(surface, border, packing, width)
     sides = sides._replace(gutter_mm=_CONFLICT_RANGE * sides.gutter_mm)
-    nearest, own = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
-    f, texel = owner.ravel()[own], np.concatenate((own, nearest.texel))
+    nearest, covered = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
+    f, texel = owner.ravel()[covered], np.concatenate((covered, nearest.texel))
     row, labels = np.full(owner.shape, -1), np.where(owner >= 0, owner, -2)
     row.ravel()[texel] = np.arange(len(texel))
     labels.ravel()[nearest.texel] = -1
     texels = np.column_stack(np.divmod(texel, owner.shape[1])[::-1]).astype(np.float64)
-    anchors = np.concatenate((texels[: len(own)], border_points(sides, nearest)))
+    anchors = np.concatenate((texels[: len(covered)], border_points(sides, nearest)))
     steps = surface.uv_metric[f, 0, :2] / packing.texels_per_uv[f, None]
     step_mm = np.concatenate((steps, np.linalg.norm(border_steps(sides, nearest), axis=2)))
     return _PieceGrid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
@@ -140,24 +144,24 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
         far = anchors_diverge(grid.anchored.select(a), grid.anchored.select(b))
         a, b = a[far], b[far]
         found.append((a, b, gap_limit_mm(grid.anchored.select(a), grid.anchored.select(b), axis)))
-    one, other, limit = (np.concatenate(part) for part in zip(*found, strict=True))
-    points = _texel_points(surface, mapped, grid, np.concatenate((one, other)))
+    first, second, limit = (np.concatenate(part) for part in zip(*found, strict=True))
+    points = _texel_points(surface, mapped, grid, np.concatenate((first, second)))
     # points beyond the end of the surface are NaN, which compares as no gap
-    gap = np.linalg.norm(points[one] - points[other], axis=1) > limit
-    return one[gap], other[gap]
+    gap = np.linalg.norm(points[first] - points[second], axis=1) > limit
+    return first[gap], second[gap]
 
 
 def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
-    """Return the surface points (n, 3) of the texels in `chosen`; those of other texels are NaN [mm].
+    """Return the surface point of each texel of the grid (n, 3), or NaN where it is not computed [mm].
 
-    Texels beyond the end of the surface are NaN too.
+    It is computed for the texels in `chosen`, except for those beyond the end of the surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
     is_chosen[chosen] = True
-    own, beyond = np.flatnonzero(is_chosen[: len(owner)]), np.flatnonzero(is_chosen[len(owner) :])
-    f = owner[own]
-    points[own] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[own]))
+    members, beyond = np.flatnonzero(is_chosen[: len(owner)]), np.flatnonzero(is_chosen[len(owner) :])
+    f = owner[members]
+    points[members] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[members]))
     nearest = NearestPoints._make(part[beyond] for part in grid.nearest)
     ends, _ = trace_from_border(surface, grid.border, grid.sides, nearest, texels[len(owner) + beyond])
     there = nearest.rim | (ends.complete & mapped[ends.triangle])
@@ -174,63 +178,63 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     done, count = np.full(len(piece), -1, np.int64), 0
     order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
     starts = np.flatnonzero(np.diff(piece[order])) + 1
-    queue = [(own, 0) for own in np.split(order, starts) if len(own)]
+    queue = [(members, 0) for members in np.split(order, starts) if len(members)]
     budget_mm2 = _MAX_GROWTH * surface.area_mm2[order].sum()
     while queue:
-        own, depth = queue.pop()
-        parts = _cut_piece(surface, piece >= 0, own, gutter_mm) if depth < _MAX_DEPTH else None
-        cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_length_mm(surface, own, parts)
+        members, depth = queue.pop()
+        parts = _cut_piece(surface, piece >= 0, members, gutter_mm) if depth < _MAX_DEPTH else None
+        cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_length_mm(surface, members, parts)
         if parts is None or cost_mm2 > budget_mm2:
-            done[own] = count
+            done[members] = count
             count += 1
         else:
             budget_mm2 -= cost_mm2
-            queue += [(own[parts == k], depth + 1) for k in range(int(parts.max()) + 1)]
+            queue += [(members[parts == k], depth + 1) for k in range(int(parts.max()) + 1)]
     return done
 
 
-def _cut_length_mm(surface: FlatSurface, own: Index, part: Index) -> float:
+def _cut_length_mm(surface: FlatSurface, members: Index, part: Index) -> float:
     """Return the length of all triangle sides along which a chart piece is cut into parts [mm].
 
-    own, part : (t,) indices of the piece's triangles, and the part of each
+    members, part : (t,) indices of the piece's triangles, and the part of each
     """
     part_of = np.full(len(surface.uv), -1, np.int64)
-    part_of[own] = part
-    other = part_of[surface.uv_neighbour[own]]
-    length = np.linalg.norm(np.roll(surface.corners[own], -1, axis=1) - surface.corners[own], axis=2)
+    part_of[members] = part
+    other = part_of[surface.uv_neighbour[members]]
+    length = np.linalg.norm(np.roll(surface.corners[members], -1, axis=1) - surface.corners[members], axis=2)
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
 
-def _cut_piece(surface: FlatSurface, mapped: Mask, own: Index, gutter_mm: float) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None.
+def _cut_piece(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Index | None:
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None without cuts.
 
-    own : (t,) indices of the piece's triangles
+    members : (t,) indices of the piece's triangles
     """
-    found = find_conflicts(surface, mapped, own, gutter_mm)
-    reach = gutter_mm / found.texel_mm
-    part = np.zeros(len(own), np.int64)
-    for row, cluster in enumerate(_conflict_clusters(found, reach), start=1):
-        if len(cluster) * found.texel_mm < _MIN_CONFLICT_LENGTH * gutter_mm:
+    conflicts = find_conflicts(surface, mapped, members, gutter_mm)
+    reach = gutter_mm / conflicts.texel_mm
+    part = np.zeros(len(members), np.int64)
+    for row, cluster in enumerate(_conflict_clusters(conflicts, reach), start=1):
+        if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_LENGTH * gutter_mm:
             continue
-        overlap = found._replace(one=found.one[cluster], other=found.other[cluster])
+        overlap = conflicts._replace(first=conflicts.first[cluster], second=conflicts.second[cluster])
         normal, offset, separated = _best_line(overlap, reach)
-        half = surface.uv[own].mean(axis=1) * found.texels_per_uv @ normal > offset
-        across = float(np.count_nonzero(np.abs(found.inside @ normal - offset) < 0.5))
+        half = surface.uv[members].mean(axis=1) * conflicts.texels_per_uv @ normal > offset
+        across = float(np.count_nonzero(np.abs(conflicts.inside @ normal - offset) < 0.5))
         around = float(separated + 2 * reach)
         if separated < _MIN_BENEFIT * min(across, around):
             continue
         if across <= around:
-            return _connected_parts(surface, own, half.astype(np.int64), gutter_mm)
-        part[_conflict_strip(surface, own, overlap, half, reach) & (part == 0)] = row
-    return _connected_parts(surface, own, part, gutter_mm)
+            return _connected_parts(surface, members, half.astype(np.int64), gutter_mm)
+        part[_conflict_strip(surface, members, overlap, half, reach) & (part == 0)] = row
+    return _connected_parts(surface, members, part, gutter_mm)
 
 
-def _conflict_clusters(found: Conflicts, reach: float) -> list[Index]:
+def _conflict_clusters(conflicts: Conflicts, reach: float) -> list[Index]:
     """Group neighbouring conflicts between gutters; return the indices of the conflicts in each group.
 
     reach : gutter width [texel]
     """
-    cells = np.floor((found.one + found.other) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
+    cells = np.floor((conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
     label = components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
@@ -252,31 +256,37 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
     return np.asarray(found[index[..., 0], index[..., 1]])  # cell 0 is always empty
 
 
-def _conflict_strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Mask, reach: float) -> Mask:
-    """Return the mask (t,) of triangles near meeting gutters, on the side of a line with less such area.
+def _conflict_strip(
+    surface: FlatSurface, members: Index, overlap: Conflicts, half: Mask, reach: float
+) -> Mask:
+    """Return the mask (t,) of the triangles near meeting gutters on one side of a line.
 
-    The area is that of the triangles near meeting gutters on each side.
+    It is the side on which these triangles have the smaller area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
     """
-    corners = surface.uv[own] * overlap.texels_per_uv
+    corners = surface.uv[members] * overlap.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
-    near = np.asarray(_within_reach(points, np.concatenate((overlap.one, overlap.other)), reach).any(axis=1))
-    area = surface.area_mm2[own]
+    near = np.asarray(
+        _within_reach(points, np.concatenate((overlap.first, overlap.second)), reach).any(axis=1)
+    )
+    area = surface.area_mm2[members]
     return near & (half if area[near & half].sum() < area[near & ~half].sum() else ~half)
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts for its length.
+    """Return the line that separates most conflicts per length.
 
     Returns its normal and offset, and the number of conflicts that it separates.
     """
-    close = overlap.inside[_within_reach(overlap.inside, np.concatenate((overlap.one, overlap.other)), reach)]
+    close = overlap.inside[
+        _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), reach)
+    ]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_LINE_DIRECTIONS) * np.pi / _LINE_DIRECTIONS:
         normal = np.array([np.cos(angle), np.sin(angle)])
-        one, other, inside = (points @ normal for points in (overlap.one, overlap.other, close))
+        one, other, inside = (points @ normal for points in (overlap.first, overlap.second, close))
         low, high = np.minimum(one, other), np.maximum(one, other)
         first, last = low.min(), high.max()
         offsets = first + (last - first) * (np.arange(_LINE_OFFSETS)[:, None] + 0.5) / _LINE_OFFSETS
@@ -289,17 +299,17 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
     return line
 
 
-def _connected_parts(surface: FlatSurface, own: Index, part: Index, gutter_mm: float) -> Index | None:
+def _connected_parts(surface: FlatSurface, members: Index, part: Index, gutter_mm: float) -> Index | None:
     """Divide the parts of a cut chart into connected ones, and merge small ones into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
     """
     index = np.full(len(surface.uv), -1, np.int64)
-    index[own] = np.arange(len(own))
-    there = index[surface.uv_neighbour[own]]
-    neighbour = np.where(there >= 0, there, np.arange(len(own))[:, None])
+    index[members] = np.arange(len(members))
+    there = index[surface.uv_neighbour[members]]
+    neighbour = np.where(there >= 0, there, np.arange(len(members))[:, None])
     part = connected_pieces(part, neighbour)
-    area = np.bincount(part, surface.area_mm2[own])
+    area = np.bincount(part, surface.area_mm2[members])
     is_small = area[part] < _MIN_PART_AREA * gutter_mm**2
     largest_neighbour = np.take_along_axis(
         part[neighbour], area[part[neighbour]].argmax(axis=1)[:, None], axis=1

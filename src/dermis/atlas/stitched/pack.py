@@ -17,12 +17,12 @@ Span = tuple[int, int, int]
 _MAX_CELLS = 512  # largest number of cells along each side of the square
 _COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTIONS = 8  # number of trials in the search for the scale
-_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest gain of scale by them
+_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
 _ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
-_MASK_RATIO = 0.65  # found scale over the scale of the masks, below which the masks are computed again
-_MASK_EXCESS = 1.15  # scale of the next masks over the found scale
+_MASK_RATIO = 0.65  # masks are computed again if the ratio of the found scale to their scale is smaller
+_MASK_EXCESS = 1.15  # ratio of the scale of the next masks to the found scale
 
 
 def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
@@ -55,7 +55,7 @@ def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
     width = 1 + max(last for _, _, last in spans)
     if max(height, width) > n:
         return 0
-    blocked, ahead = 0, [occupied]  # cells of which one of the next 1, 2, 4, ... in the row is occupied
+    blocked, ahead = 0, [occupied]  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
     for row, first, last in spans:
         length = last - first + 1
         step = length.bit_length() - 1
@@ -78,7 +78,7 @@ class _Piece(NamedTuple):
     surface : triangles of the piece
     uv : (t, 3, 2) uv of the corners, scaled and moved so that the lowest coordinates are 0
     extent : (2,) largest u and v of the scaled uv
-    scale : factor of the mesh's uv
+    scale : factor by which the mesh's uv is scaled
     uv_per_mm : scaled uv per mm on the surface [1/mm]
     border : border of the piece, with triangle indices within the piece
     """
@@ -126,8 +126,10 @@ def pack_pieces(
     """
     cells = min(size, _MAX_CELLS)
     order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
-    groups = [own for own in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(own)]
-    pieces = [_single_piece(surface, piece, own, float(scale[own[0]])) for own in groups]
+    groups = [
+        members for members in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(members)
+    ]
+    pieces = [_single_piece(surface, piece, members, float(scale[members[0]])) for members in groups]
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
     if not pieces:
         return packing
@@ -135,19 +137,19 @@ def pack_pieces(
     if found is None:
         return None
     per_cell = size / cells
-    for own, one, low in zip(groups, pieces, found.origins, strict=True):
-        packing.corners[own] = (one.uv * found.scale + low) * per_cell - 0.5
-        packing.texels_per_uv[own] = one.scale * found.scale * per_cell
-        packing.texels_per_mm[own] = one.uv_per_mm * found.scale * per_cell
+    for members, one, low in zip(groups, pieces, found.origins, strict=True):
+        packing.corners[members] = (one.uv * found.scale + low) * per_cell - 0.5
+        packing.texels_per_uv[members] = one.scale * found.scale * per_cell
+        packing.texels_per_mm[members] = one.uv_per_mm * found.scale * per_cell
     return packing
 
 
-def _single_piece(surface: FlatSurface, piece: Index, own: Index, scale: float) -> _Piece:
-    border = find_border(surface, piece, own)
-    number = np.empty(len(piece), np.int64)
-    number[own] = np.arange(len(own))
-    border = border._replace(triangle=number[border.triangle])
-    uv, subset = surface.uv[own] * scale, surface.subset(own)
+def _single_piece(surface: FlatSurface, piece: Index, members: Index, scale: float) -> _Piece:
+    border = find_border(surface, piece, members)
+    index_in_piece = np.empty(len(piece), np.int64)
+    index_in_piece[members] = np.arange(len(members))
+    border = border._replace(triangle=index_in_piece[border.triangle])
+    uv, subset = surface.uv[members] * scale, surface.subset(members)
     uv -= uv.min(axis=(0, 1))
     uv_per_mm = scale * float(np.sqrt(np.abs(subset.area_uv).sum() / subset.area_mm2.sum()))
     return _Piece(subset, uv, uv.max(axis=(0, 1)), scale, uv_per_mm, border)
@@ -233,15 +235,15 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
     return np.cumsum(steps, axis=1)[:, :-1] > 0, -low.astype(np.float64)
 
 
-def _piece_mask(one: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
+def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
     """Return the cells in which a piece with its gutter may need a texel, at one scale."""
-    margin = np.ceil(_gutter_extent(one, scale, width)) + 2
-    columns, rows = np.ceil(one.extent * scale + 2 * margin).astype(int) + 1
-    ones = np.ones(len(one.uv))
-    corners = one.uv * scale + margin - 0.5
-    packing = Packing(corners, ones * one.scale * scale, ones * one.uv_per_mm * scale)
+    margin = np.ceil(_gutter_extent(piece, scale, width)) + 2
+    columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1
+    ones = np.ones(len(piece.uv))
+    corners = piece.uv * scale + margin - 0.5
+    packing = Packing(corners, ones * piece.scale * scale, ones * piece.uv_per_mm * scale)
     mask = needed_texels(
-        one.surface, np.arange(len(ones)), one.border, packing, width, (int(rows), int(columns))
+        piece.surface, np.arange(len(ones)), piece.border, packing, width, (int(rows), int(columns))
     )
     # a cell may contain a needed texel although its centre is not needed
     mask[1:] |= mask[:-1].copy()
@@ -258,9 +260,9 @@ def _spans(mask: Mask) -> Index:
     return np.column_stack((row, begin, np.nonzero(step < 0)[1] - 1))
 
 
-def _gutter_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:
+def _gutter_extent(piece: _Piece, scale: float, width: GutterWidth) -> Doubles:
     """Return the largest width (2,) of a piece's gutters along u and v [cell]."""
-    steps = one.surface.uv_steps[one.border.triangle] / (one.scale * scale)
+    steps = piece.surface.uv_steps[piece.border.triangle] / (piece.scale * scale)
     if not len(steps):
         return np.ones(2)
     e, g = ((steps[..., k, :] ** 2).sum(axis=-1) for k in (0, 1))

@@ -23,8 +23,8 @@ class Adjacency(NamedTuple):
     neighbour : (f, 3) index of the triangle across each side, -1 for none
     neighbour_side : (f, 3) side of the neighbour at the shared edge
     flipped : (f, 3) mask of neighbours that face the opposite way
-    apex : (f, 3, 2) third corner relative to each side: coordinate along the side and to its left, in lengths
-        of the side
+    apex : (f, 3, 2) third corner relative to each side: coordinates along the side and to its left, as
+        fractions of the side's length
     passable : (f,) mask of triangles that geodesics may cross
     """
 
@@ -72,10 +72,10 @@ class FlatSurface:
         """
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
-    def subset(self, own: Index) -> FlatSurface:
+    def subset(self, members: Index) -> FlatSurface:
         """Return the triangles with the given indices; their adjacency is not valid for geodesics."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
-        return replace(self, **{name: getattr(self, name)[own] for name in names})
+        return replace(self, **{name: getattr(self, name)[members] for name in names})
 
 
 def interpolate_corners(
@@ -155,7 +155,7 @@ def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
 def _apexes(flat: Doubles) -> Doubles:
     """Return the third corner relative to each side (f, 3, 2), along and to the left of the side.
 
-    The coordinates are in lengths of the side.
+    The coordinates are fractions of the side's length.
     """
     side = np.roll(flat, -1, axis=1) - flat
     third = np.roll(flat, -2, axis=1) - flat
@@ -184,11 +184,11 @@ def _uv_steps(
     # projected to the triangle's plane, with the length preserved
     uv_steps = np.einsum("fksi,fai->fksa", steps, axes)
     uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
-    own = _triangle_steps(flat, uv)[:, None]
+    triangle_steps = _triangle_steps(flat, uv)[:, None]
     # the mean over triangles of very different normals may be meaningless: use the triangle's own steps there
     area = cross_2d(uv_steps[..., 0, :], uv_steps[..., 1, :])
-    bad = area * np.sign(area_uv)[:, None] >= -0.05 * product
-    uv_steps = np.where(bad[..., None, None], own, uv_steps)
+    is_meaningless = area * np.sign(area_uv)[:, None] >= -0.05 * product
+    uv_steps = np.where(is_meaningless[..., None, None], triangle_steps, uv_steps)
     return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
 
 

@@ -10,7 +10,7 @@ from dermis.atlas.raster import barycentric_weights, covered_texels
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
-# Texels have a gap if their surface points are farther apart than so many texel steps plus the slack.
+# There is a gap between texels whose surface points are farther apart than this many steps plus the slack.
 _GAP_STEPS, _GAP_SLACK_MM = 2.0, 0.5
 _INNER_MARGIN = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
 
@@ -64,13 +64,13 @@ class AnchoredTexels(NamedTuple):
     anchors: Doubles
     step_mm: Doubles
 
-    def select(self, chosen: Index) -> AnchoredTexels:
+    def select(self, selected: Index) -> AnchoredTexels:
         """Return the texels at the given indices."""
-        return AnchoredTexels._make(part[chosen] for part in self)
+        return AnchoredTexels._make(part[selected] for part in self)
 
 
 def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:
-    """Return flat indices of adjacent texels whose triangles share no side in uv, as pairs, (n,) each.
+    """Return the flat indices (n,) of both texels of each adjacent pair whose triangles share no side in uv.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
@@ -87,23 +87,23 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
     return first[apart], first[apart] + step
 
 
-def anchors_diverge(one: AnchoredTexels, other: AnchoredTexels) -> Mask:
-    """Return the mask of texel pairs whose anchors are farther apart than both texels are from them.
+def anchors_diverge(first: AnchoredTexels, second: AnchoredTexels) -> Mask:
+    """Return the mask of texel pairs whose anchors are farther apart than either texel is from its anchor.
 
     The anchor of a texel is the nearest point of its chart.
     """
     distance2 = np.maximum(
-        _squared_length(one.texels - one.anchors), _squared_length(other.texels - other.anchors)
+        _squared_length(first.texels - first.anchors), _squared_length(second.texels - second.anchors)
     )
-    return np.asarray(_squared_length(one.anchors - other.anchors) > distance2)
+    return np.asarray(_squared_length(first.anchors - second.anchors) > distance2)
 
 
-def gap_limit_mm(one: AnchoredTexels, other: AnchoredTexels, axis: int) -> Doubles:
+def gap_limit_mm(first: AnchoredTexels, second: AnchoredTexels, axis: int) -> Doubles:
     """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """
-    return _GAP_STEPS * np.maximum(one.step_mm[:, axis], other.step_mm[:, axis]) + _GAP_SLACK_MM
+    return _GAP_STEPS * np.maximum(first.step_mm[:, axis], second.step_mm[:, axis]) + _GAP_SLACK_MM
 
 
 def _squared_length(offset: Doubles) -> Doubles:

@@ -18,15 +18,12 @@ TILE_CELLS = 4
 TILE_MARGIN_TEXELS = 0.7
 """Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
 
-_PAIR_RADIUS_SIGMAS = 3.2  # largest distance of a pair, in standard deviations of the widest Gaussian
-_CELL_SIGMAS = (
-    0.36  # side of a cell in the same unit, so small that light interpolated between cells is smooth
-)
-_MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs
-_MAX_TEXELS = 1024  # largest number of texels per side whose light is averaged, if there are fewer cells
-_SAME_POINT_TEXELS = (
-    0.1  # distance of a texel from the atlas position of its surface point, below which it shows itself
-)
+# In standard deviations of the widest Gaussian: largest distance between an entry and an exit cell; and side
+# of a cell, so small that light interpolated between cells is smooth.
+_PAIR_RADIUS_SIGMAS, _CELL_SIGMAS = 3.2, 0.36
+_MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs of cells
+_MAX_TEXELS = 1024  # texels per side whose light is averaged into cells; more if there are more cells
+_SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a surface point count as equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +77,20 @@ class Cells:
         return -(-self.side // TILE_CELLS)
 
 
-def divide_into_cells(atlas: Atlas, max_sigma_mm: float, coarser: float = 1.0) -> Cells:
+def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
     """Divide an atlas into cells for the light that Gaussians spread through thin parts.
 
     max_sigma_mm : standard deviation of the widest Gaussian, clipped so that pairs are at most 32 mm apart
         [mm]
-    coarser : cell size relative to the default [-]
+    relative_cell_size : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
-    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * coarser)))
+    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * relative_cell_size)))
     side = min(max(side, 1), atlas.size)
     stride = max(1, atlas.size // max(_MAX_TEXELS, side))
     tiles = -(-side // TILE_CELLS)
     centre = _centre_texels(atlas.size, side)
-    lit = _cells_with(atlas.lit[::stride, ::stride], atlas.size, side, stride)
+    lit = _cells_with_texels(atlas.lit[::stride, ::stride], atlas.size, side, stride)
     triangle = atlas.triangle[np.ix_(centre, centre)]
     receiver = _dilate_cells(lit) & (triangle >= 0)
     weights = atlas.barycentric[np.ix_(centre, centre)][receiver]
@@ -128,7 +125,7 @@ def _centre_texels(size: int, side: int) -> Index:
     return np.asarray(((np.arange(side) + 0.5) * size / side).astype(np.int64))
 
 
-def _cells_with(texels: Mask, size: int, side: int, stride: int) -> Mask:
+def _cells_with_texels(texels: Mask, size: int, side: int, stride: int) -> Mask:
     """Return the (side, side) mask of cells that contain a marked texel.
 
     texels : mask of every `stride`-th texel of the map along each axis
@@ -182,14 +179,14 @@ def _tile_triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
     low, high = uv.min(axis=1) - margin, uv.max(axis=1) + margin
     first, last = (np.clip((uv * side).astype(np.int64) // TILE_CELLS, 0, tiles - 1) for uv in (low, high))
     width, height = (last - first + 1).T
-    which, number = expand_runs(np.zeros_like(width), width * height)
-    x, y = first[which].T + np.stack([number % width[which], number // width[which]])
+    which, tile_in_box = expand_runs(np.zeros_like(width), width * height)
+    x, y = first[which].T + np.stack([tile_in_box % width[which], tile_in_box // width[which]])
     order, begin = _sort_by_tile(y * tiles + x, tiles)
     return begin.astype(np.uint32), index[which[order]].astype(np.uint32)
 
 
 def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
-    """Return the start of each cell's entries, and its gutter texels with the texels that they copy."""
+    """Return the start of each cell's entries, and the gutter texels with the texels that they copy."""
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, uv])), 0, atlas.size - 1).astype(np.int64).T
@@ -200,10 +197,10 @@ def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return lit texels at chart rims whose surface point is elsewhere in the atlas, and that position.
+    """Return lit texels at chart rims that show a point elsewhere in the atlas, and this point's position.
 
-    Both arrays are (r, 2): texel indices, and positions of the points in the atlas [texel]. Such texels are
-    outside the triangles of their chart, but interpolation reads them.
+    Both arrays are (r, 2): texel indices, and positions in the atlas [texel]. Such texels are outside the
+    triangles of their chart, but interpolation reads them.
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):

@@ -8,11 +8,11 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
 
 _SMOOTHING_STEPS = 4
-_BEND_PENALTY = 3.0  # extra length of a step across a right angle, over the length of the step
+_BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, relative to the step's length
 
 
 def opposite_sides(triangles: Index) -> Index:
-    """Return the index of the neighbour's side at the edge of each triangle side, (3 f,).
+    """Return for each triangle side the index of the neighbour's side at the same edge, (3 f,).
 
     Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. A side without exactly one
     neighbour has its own index.
@@ -29,7 +29,7 @@ def opposite_sides(triangles: Index) -> Index:
 def neighbours(triangles: Index) -> Index:
     """Return the index of the triangle across each side 01, 12 and 20, (f, 3).
 
-    Without exactly one neighbour it is the triangle itself.
+    Across a side without exactly one neighbour, it is the triangle itself.
     """
     return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
@@ -44,7 +44,7 @@ def merge_strays(chart: Index, triangles: Index) -> Index:
     adjacent = neighbours(triangles)
     is_stray = _stray_triangles(chart, adjacent)
     while is_stray.any():
-        # strays beside other strays are assigned after those
+        # triangles that only have stray neighbours wait until these are assigned
         adjacent_chart = np.where(
             is_stray[adjacent] | (adjacent == np.arange(len(chart))[:, None]), -1, chart[adjacent]
         )

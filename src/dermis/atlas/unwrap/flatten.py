@@ -109,11 +109,11 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
 
     points : (n, 3) vertices [mm]
     triangles : (f, 3) vertex indices
-    density : (f,) desired length in the plane over that on the surface [-]
+    density : (f,) desired ratio of length in the plane to length on the surface [-]
     weight : (f,) importance of each triangle's stretch [-]
 
-    The start is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is then
-    made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
+    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is
+    then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
     [Rabinovich2017].
     """
     shapes = planar_triangles(points[triangles])
@@ -149,7 +149,7 @@ def _laplacian(triangles: Index, weights: Doubles, n: int) -> Any:
 
 
 def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: Complexes) -> Complexes:
-    """Return the complex positions (n,) of a least squares conformal map, with the least change of angles.
+    """Return the complex positions (n,) of a least squares conformal map, which changes angles least.
 
     Two points of each connected component are fixed.
     """

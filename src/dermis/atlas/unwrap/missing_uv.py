@@ -1,4 +1,4 @@
-"""A uv layout for the triangles of a mesh whose file has none."""
+"""New uv layouts for triangles that have no uv in the mesh's file."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 
 
 def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
-    """Return a mesh with a new uv layout for some triangles, and the source of each of its vertices.
+    """Return a mesh with a new uv layout for some triangles, and the old vertex of each of its vertices.
 
-    The triangles keep their order; vertices on the new seams are duplicated. The disk cache keeps
-    the layout.
+    The order of the triangles is unchanged; vertices on the new seams are duplicated. The layout is cached on
+    disk.
 
-    unwrapped : (f,) triangles to lay out
+    unwrapped : (f,) mask of the triangles that need a layout
     """
     used, corners = compact_vertices(mesh.triangles[unwrapped])
     point = np.unique(mesh.point[used], return_inverse=True)[1]

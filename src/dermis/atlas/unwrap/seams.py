@@ -23,7 +23,7 @@ def border_edges(corners: Index) -> tuple[Index, Index]:
 
 
 def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
-    """Split vertices at seams; return the new vertices (f, 3) of each triangle and their old ones (v,).
+    """Split vertices at seams; return each triangle's new vertices (f, 3), and the old vertex of each (v,).
 
     Two triangles share the vertices of their common edge only if they belong to one chart.
 
@@ -140,7 +140,11 @@ def _repair_charts(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
     """
     if not flat.faulty.any():
         return flat.chart
-    chart = _reassign_faulty(mesh, flat) if depth < _MAX_REASSIGNMENTS else _split_faulty(mesh, flat)
+    chart = (
+        _reassign_faulty_triangles(mesh, flat)
+        if depth < _MAX_REASSIGNMENTS
+        else _split_faulty_charts(mesh, flat)
+    )
     changed = flat.faulty | (chart != flat.chart)
     affected = np.isin(flat.chart, flat.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
@@ -148,14 +152,14 @@ def _repair_charts(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
     return chart
 
 
-def _reassign_faulty(mesh: ChartMesh, flat: FlatCharts) -> Index:
+def _reassign_faulty_triangles(mesh: ChartMesh, flat: FlatCharts) -> Index:
     """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
     adjacent = flat.chart[neighbours(mesh.triangles)]
     other = np.where(adjacent == flat.chart[:, None], -1, adjacent).max(axis=1)
     return merge_strays(np.where(flat.faulty & (other >= 0), other, flat.chart), mesh.triangles)
 
 
-def _split_faulty(mesh: ChartMesh, flat: FlatCharts) -> Index:
+def _split_faulty_charts(mesh: ChartMesh, flat: FlatCharts) -> Index:
     """Return charts (f,) in which each chart with faulty triangles is split in two."""
     chart = 2 * flat.chart
     for k in np.unique(flat.chart[flat.faulty]):

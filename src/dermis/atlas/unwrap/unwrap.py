@@ -36,8 +36,8 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     orders is returned.
 
     outlines : edges (k, 2, 2) of each chart's border, counter-clockwise
-    padding : empty space between charts, half as much at the edge of the square, as a fraction of the
-        square's side
+    padding : width of the empty space between charts as a fraction of the square's side; half as much is left
+        at the square's edge
 
     Raises DermisError if there are more charts than fit side by side.
     """

@@ -23,10 +23,10 @@ _TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
-    """Animated property of several nodes or morph targets, with the curve of its values.
+    """Animated property of one or more nodes or morph targets, with the curve of its values.
 
     path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
-    names : (m,) of the nodes or of the morph targets
+    names : (m,) names of the nodes or morph targets
     """
 
     path: str
@@ -49,14 +49,14 @@ class _Keyframes(NamedTuple):
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's animation clips; a clip without a name is called "clip" and its index."""
+    """Return the names of a file's animation clips; a clip without a name gets one by its index: "clip 0"."""
     return _document_clip_names(read_document(path))
 
 
 def read_clip(path: Path, name: str | None) -> Animation:
     """Read an animation clip of a .glb or .gltf file.
 
-    name : of the clip; None for the only clip of the file
+    name : name of the clip; None for the only clip of the file
 
     Raises DermisError for a missing or damaged clip.
     """
@@ -86,8 +86,8 @@ def _read_tracks(document: Document, index: int, name: str) -> list[AnimationTra
     check_limit(culprit, len(clip["channels"]), MAX_CHANNELS, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
-    for number, channel in enumerate(clip["channels"]):
-        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
+    for channel_index, channel in enumerate(clip["channels"]):
+        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {channel_index}"
         if "node" not in target or target["path"] not in (*_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
         _check_node(nodes, target["node"], culprit)
@@ -115,7 +115,7 @@ def _weight_track(
     """Return the track of the morph target weights of a node.
 
     culprit : clip and channel, named in errors
-    known : names of morph targets by mesh index; this function adds those of the node's mesh
+    known : names of morph targets by mesh index; this function adds the names for the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in known:
@@ -164,7 +164,7 @@ class AnimationCurve:
     """Values as functions of time for m nodes that have the same keys, with n components each.
 
     times_s : (k,) times of the keys, not decreasing [s]
-    values : (k, m, n) at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
+    values : (k, m, n) values at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
     kind : interpolation between keys
     is_rotation : whether the values are quaternions (n = 4), for which "LINEAR" is spherical interpolation
 

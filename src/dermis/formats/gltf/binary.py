@@ -14,17 +14,17 @@ from dermis.base.arrays import Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
 
 VERTICES, INDICES = 34962, 34963
-"""Targets of buffer views."""
+"""Kinds of data in a buffer view, which glTF calls its target."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
 """Sampler with mip levels and without repetition."""
 _COMPONENT_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_MAX_SHORT_COUNT = 65535  # the value 65535 itself means primitive restart
+_MAX_SHORT_COUNT = 65535  # most vertices with 16-bit indices, of which 65535 means primitive restart
 
 
 @dataclass
 class BufferBuilder:
-    """Binary buffer of an exported glTF file, which grows, with its buffer views and accessors."""
+    """Binary buffer of an exported glTF file that grows, with its buffer views and accessors."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
@@ -47,7 +47,7 @@ class BufferBuilder:
 
         rows : float32 or unsigned integers
         target : `VERTICES` or `INDICES`; None for data that is neither
-        bounded : store the minimum and the maximum of each component, which glTF requires for positions
+        bounded : whether to store each component's minimum and maximum, which glTF requires for positions
         """
         values = _little_endian(rows)
         bounds = _bounds(values) if bounded else {}
@@ -66,8 +66,8 @@ class BufferBuilder:
 
         They are stored as sparse accessors, or densely if that is smaller.
 
-        row : (m,) increasing indices of the rows that are not 0, equal for all arrays
-        columns : the values of these rows, (m, 3) for each array
+        row : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
+        columns : for each array, the values of these rows (m, 3)
         count : number of vertices
         """
         if not len(row):

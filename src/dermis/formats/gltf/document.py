@@ -29,7 +29,7 @@ _GLB_MAGIC = 0x46546C67
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_MIN_READ_COST = 512  # components whose decoding takes as long as the overhead of an accessor
+_MIN_READ_COST = 512  # smallest number of components that one read of an accessor counts as
 _TOP_LEVEL_ARRAYS = [
     "accessors",
     "animations",
@@ -58,7 +58,7 @@ class Document:
     tree: Tree
     binary: bytes = b""
     _buffers: dict[int, bytes] = field(default_factory=dict)
-    _accessor_components: int = 0
+    _read_components: int = 0
 
     def items(self, key: str) -> list[Tree]:
         """Return a top-level array of the JSON tree, such as "nodes"; empty if the file has none."""
@@ -91,12 +91,12 @@ class Document:
         return data
 
     def accessor_shape(self, index: int) -> tuple[int, int]:
-        """Return the number of elements of an accessor, and that of their components."""
+        """Return the number of elements of an accessor, and the number of components of an element."""
         accessor = self.item("accessors", index)
         return _checked_size(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
 
     def replace_values(self, index: int, values: Numbers) -> None:
-        """Store other values of the shape of an accessor; they are converted to its type."""
+        """Replace the values of an accessor by an array of the same shape, converted to its type."""
         accessor = self.item("accessors", index)
         data = values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
         buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))
@@ -110,8 +110,8 @@ class Document:
         """Return n elements of k components of an accessor in their stored type, (n, k)."""
         accessor, shape = self.item("accessors", index), self.accessor_shape(index)
         kind = np.dtype(_COMPONENT_TYPES[accessor["componentType"]])
-        self._accessor_components += max(shape[0] * shape[1], _MIN_READ_COST)
-        if self._accessor_components > MAX_ACCESSOR_COMPONENTS:
+        self._read_components += max(shape[0] * shape[1], _MIN_READ_COST)
+        if self._read_components > MAX_ACCESSOR_COMPONENTS:
             actual = f"accessor {index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
             limit = f"accessors of at most {MAX_ACCESSOR_COMPONENTS / 1e6:.0f} million numbers"
@@ -123,7 +123,7 @@ class Document:
             values = np.zeros(shape, kind)
         if "sparse" not in accessor:
             return values
-        return self._with_sparse(values, accessor["sparse"])
+        return self._substitute_sparse(values, accessor["sparse"])
 
     def read_floats(self, index: int) -> Doubles:
         """Return n elements of k components of an accessor as floats, (n, k).
@@ -135,7 +135,7 @@ class Document:
             return values.astype(np.float64)
         return to_floats(values)
 
-    def _with_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
+    def _substitute_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
         count = _checked_size(sparse["count"])
         if count > len(values):
             raise ValueError(f"{count} of {len(values)} values are listed as sparse")
@@ -225,7 +225,10 @@ def _parse_tree(path: Path, text: bytes) -> Tree:
 
 
 def _glb_chunks(data: bytes) -> list[tuple[int, bytes]]:
-    """Return type and bytes of the chunks of a .glb file, last first: in a dict the first of a type wins."""
+    """Return type and bytes of each chunk of a .glb file.
+
+    The order is reversed, so that a dict made of the list keeps the first chunk of each type.
+    """
     chunks, offset = [], 12
     while offset + 8 <= len(data):
         length, kind = struct.unpack_from("<II", data, offset)

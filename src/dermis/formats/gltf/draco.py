@@ -21,7 +21,7 @@ _ADVICE = "Decimate it, or export without compression"
 
 
 class _Primitive(NamedTuple):
-    """Compressed primitive: its own tree, and that of its extension."""
+    """Compressed primitive: its JSON tree, and the tree of its compression extension."""
 
     tree: Tree
     extension: Tree
@@ -32,8 +32,8 @@ def decompress(document: Document) -> None:
 
     Primitives that are also stored without compression are left as they are.
 
-    Raises DermisError without the package DracoPy, for damaged data, and for data that does not have the
-    size that its accessors state.
+    Raises DermisError if the package DracoPy is missing, for damaged data, and for data whose size differs
+    from the one that its accessors state.
     """
     found = [_compressed(document, one) for mesh in document.items("meshes") for one in mesh["primitives"]]
     primitives = [one for one in found if one is not None]
@@ -50,7 +50,7 @@ def decompress(document: Document) -> None:
 
 
 def _compressed(document: Document, primitive: Tree) -> _Primitive | None:
-    """Return a primitive if it is stored only in compressed form, else None."""
+    """Return the compressed form of a primitive; None if the primitive is also stored without compression."""
     extension = (primitive.get("extensions") or {}).get(EXTENSION)
     positions = document.item("accessors", primitive["attributes"]["POSITION"])
     if extension is None or "bufferView" in positions:
@@ -66,12 +66,12 @@ def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _ADVICE)
 
 
-def _store(document: Document, primitive: _Primitive, answer: Arrays, name: str) -> None:
+def _store(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
     tree, compressed = primitive
     for attribute, identifier in compressed["attributes"].items():
-        _replace(document, tree["attributes"][attribute], answer[f"{name}/{identifier}"], attribute)
+        _replace(document, tree["attributes"][attribute], answer[f"{mesh_name}/{identifier}"], attribute)
     if "indices" in tree:
-        triangles = answer[f"{name}/triangles"]
+        triangles = answer[f"{mesh_name}/triangles"]
         _replace(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
         tree["mode"] = _TRIANGLES
 

@@ -11,8 +11,8 @@ from dermis.base.native_decoding import answer_request
 def decode(request: Arrays) -> Arrays:
     """Return the attributes and triangles of compressed meshes.
 
-    They are called by the name of the mesh in the request, a slash, and the attribute's identifier or
-    "triangles".
+    An array is called MESH/ATTRIBUTE: the name of the mesh in the request, a slash, and the attribute's
+    identifier, or "triangles".
     """
     import DracoPy
 

@@ -1,4 +1,4 @@
-"""Materials with their pictures, and eye parameters, of glTF files."""
+"""Reading of materials with their pictures, and of eye parameters, from glTF files."""
 
 from __future__ import annotations
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dermis.base.arrays import Bytes, Floats, Numbers
+from dermis.base.arrays import Floats, Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
+from dermis.formats.part_pictures import PartPictures, PartRole, linear_levels, normal_levels
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyeTextures
@@ -21,7 +22,7 @@ _SKIN_IOR = {"KHR_materials_ior": {"ior": 1.4}}
 EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 """Names of the pictures of an eye."""
 _TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
-_CLEARCOAT_FACTOR = 0.52  # of glTF's clear coat, which reflects 0.04 at normal incidence; eyes reflect 0.021
+_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
 _HAIR_ROUGHNESS = 0.45
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
@@ -62,7 +63,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
 
     The extras reference pictures as {"index": name}; `embedded_materials` reads them.
 
-    slopes : (n, n, 2) of the relief, written as normal map for other programs if `maps` has none
+    slopes : (n, n, 2) slopes of the relief, written as normal map for other programs if `maps` has none
     """
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
@@ -70,7 +71,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         pictures["colour"] = encode_srgb8(maps.colour)
     displayed = slopes if maps.normal is None else maps.normal
     if displayed is not None:
-        pictures["normal"] = _normal_colours(displayed)
+        pictures["normal"] = normal_levels(displayed)
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
@@ -80,10 +81,10 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        pictures["metallic roughness"] = _to_bytes(perceptual)
+        pictures["metallic roughness"] = linear_levels(perceptual)
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            pictures[role] = _to_bytes(grey_map)[..., None]
+            pictures[role] = linear_levels(grey_map)[..., None]
     if maps.region is not None:
         pictures["region"] = maps.region[..., None]
     stored = (role for role in ("height", "specular", "roughness", "region") if role in pictures)
@@ -103,9 +104,10 @@ def surface_material(
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
-        matches = (value for word, value in _ROUGHNESS_BY_WORD.items() if word in material.name.casefold())
-        factor = next(matches, _DEFAULT_ROUGHNESS)
-        return {"name": material.name, "pbrMetallicRoughness": _base_material(material, factor)}
+        return {
+            "name": material.name,
+            "pbrMetallicRoughness": _base_material(material, _usual_roughness(material)),
+        }
     surface = _base_material(material, float(np.sqrt(roughness)))
     if "colour" in pictures:
         del surface["baseColorFactor"]
@@ -119,19 +121,60 @@ def surface_material(
     return gltf | {"extensions": _SKIN_IOR, "extras": {"dermis": dict(roles)}}
 
 
+def part_pictures(parts: PartPictures) -> dict[str, bytes]:
+    """Return the PNG files of parts that are not skin, by name; the colour has alpha where parts need it."""
+    found = parts.encode(("cutout", "surface", "normal", "emission"))
+    if "cutout" not in found:
+        found |= parts.encode(("colour",))
+    names = {role: f"parts {'colour' if role == 'cutout' else role}" for role in found}
+    return {names[role]: data for role, data in found.items()}
+
+
+def part_material(material: Material, parts: PartPictures) -> Tree:
+    """Return the glTF material of a part with the pictures that `part_pictures` returns.
+
+    Its textures reference pictures by name, as {"index": name}.
+    """
+    roles = parts.roles(material)
+    surface: Tree = {
+        "baseColorTexture": _part_texture("colour"),
+        "metallicFactor": float("metalness" in roles),
+        "roughnessFactor": 1.0 if "roughness" in roles else _usual_roughness(material),
+    }
+    if "surface" in roles:
+        surface["metallicRoughnessTexture"] = _part_texture("surface")
+    gltf: Tree = {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}
+    if "cutout" in roles:
+        gltf |= {"alphaMode": "MASK", "alphaCutoff": 0.5}
+    if "normal" in roles:
+        gltf["normalTexture"] = _part_texture("normal")
+    if "emission" in roles:
+        gltf["emissiveTexture"] = _part_texture("emission")
+    if max(material.emission) > 0.0:
+        strength, colour = parts.emission(material)
+        gltf["emissiveFactor"] = [min(strength, 1.0) * value for value in colour]
+        if strength > 1.0:
+            gltf["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    return gltf
+
+
+def _part_texture(role: PartRole) -> Tree:
+    return {"index": f"parts {role}"}
+
+
 def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
     """Return the colour map and the normal map of an eyeball as PNG files by name."""
     return {
         EYE_PICTURE: colours_png(eyes.colour),
-        EYE_NORMAL_PICTURE: encode_png(_to_bytes(0.5 * eyes.normal + 0.5)),
+        EYE_NORMAL_PICTURE: encode_png(linear_levels(0.5 * eyes.normal + 0.5)),
     }
 
 
 def eye_material(material: Material) -> Tree:
     """Return the glTF material of a textured eyeball, whose tear film is a clear coat.
 
-    Its normal map applies to the surface below the coat, which is specular only in programs without clear
-    coat.
+    The normal map applies to the surface below the coat. Programs that support clear coat show highlights
+    only on the coat; other programs show them on that surface.
     """
     surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]
@@ -164,12 +207,7 @@ def _base_material(material: Material, roughness: float) -> Tree:
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
 
 
-def _normal_colours(slopes: Floats) -> Bytes:
-    """Return the tangent-space normal map (h, w, 3) of slopes (h, w, 2) as 8-bit colours, green up."""
-    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return _to_bytes(0.5 * normal + 0.5)
-
-
-def _to_bytes(values: Numbers) -> Bytes:
-    return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)
+def _usual_roughness(material: Material) -> float:
+    """Return a default perceptual roughness for a material, chosen by words in its name [-]."""
+    matches = (value for word, value in _ROUGHNESS_BY_WORD.items() if word in material.name.casefold())
+    return next(matches, _DEFAULT_ROUGHNESS)

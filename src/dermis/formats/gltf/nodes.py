@@ -21,8 +21,8 @@ class Nodes:
     parent : (n,) index of each node's parent, -1 for a root
     order : (n,) node indices, parents before children
     local, world : (n, 4, 4) transforms at rest from a node's space to its parent's, and to the scene's
-    scene_nodes : indices of the nodes of the scene, in the order in which meshes are read; None without
-        scenes
+    scene_nodes : indices of the nodes of the scene, in the order in which meshes are read; None if the file
+        has no scenes
     """
 
     names: tuple[str, ...]
@@ -65,11 +65,11 @@ def node_names(nodes: list[Tree]) -> tuple[str, ...]:
     names: dict[str, None] = {}
     counts: dict[str, int] = {}
     for index, node in enumerate(nodes):
-        name = own = str(node.get("name") or f"node {index}")
-        count = counts.get(own, 2)
+        name = stated = str(node.get("name") or f"node {index}")
+        count = counts.get(stated, 2)
         while name in names:
-            name, count = f"{own} {count}", count + 1
-        names[name], counts[own] = None, count
+            name, count = f"{stated} {count}", count + 1
+        names[name], counts[stated] = None, count
     return tuple(names)
 
 

@@ -22,9 +22,9 @@ _METRES_PER_MM = 1e-3
 HAIR_COLOURS = 64
 """Number of colours into which the hairs of a head are sorted."""
 _TUBE_SIDES = 3
-_RADIUS_FACTOR = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))  # the mean width equals that of a circle
+_RADIUS_FACTOR = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))  # makes a tube as wide on average as a round hair
 _MIN_DISPLACEMENT_MM = 0.01  # smaller displacements count as 0
-_ALBEDO_EXPONENT = 5.89  # of fibres of roughness 0.3 in hair: [Chiang2016] equation 9
+_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
@@ -44,7 +44,7 @@ class PrimitiveSource(Protocol):
 class SurfacePrimitive:
     """Triangles of one material, with the vertices that they use.
 
-    points : the whole mesh
+    points : deformable mesh of the head
     faces : (f,) indices of the triangles
     eye : index of the eye whose uv layout a textured eyeball uses; -1 for other surfaces
     """
@@ -59,7 +59,7 @@ class SurfacePrimitive:
 
     @cached_property
     def vertices(self) -> Ints:
-        """Return the indices of the mesh vertices that the triangles use, (v,), increasing."""
+        """Return the indices of the mesh vertices that the triangles use, (v,), in increasing order."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def primitive(self, binary: BufferBuilder) -> Tree:
@@ -291,7 +291,7 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
+        """Return a palette of c linear hair colours (1, c, 3), and uv of the tube vertices in it (n m, 2)."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
 from dermis.formats.parts import Colour, parse_colour
@@ -47,15 +47,37 @@ _NOT_DRAWN = {
     "KHR_materials_volume": "absorbing volume",
     "VRMC_materials_mtoon": "cartoon shading (shade colour, outline, rim light)",
 }
-KNOWN_EXTENSIONS = (
-    *_SOURCE_EXTENSIONS,
-    *_SCATTERING,
-    *_NOT_DRAWN,
-    _GLOSS,
-    _UNLIT,
-    _STRENGTH,
-    "KHR_texture_transform",
+_BASISU = "KHR_texture_basisu"
+GLTF_MATERIALS = (
+    drawn("`baseColorFactor`, `baseColorTexture`"),
+    drawn("`normalTexture` with `scale`"),
+    drawn_with_note(
+        "`metallicRoughnessTexture`",
+        "roughness, squared for skin, which has no metalness (note)",
+        other_parts="drawn",
+    ),
+    noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
+    noted("`metallicFactor`", other_parts="drawn"),
+    noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
+    noted(f"`{_STRENGTH}`", "factor of the emission", _STRENGTH, other_parts="drawn"),
+    drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
+    noted(f"`{_UNLIT}`", "the colour is taken for the reflectance", _UNLIT),
+    noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
+    noted("`occlusionTexture`", "computed from the shape"),
+    no_effect("`doubleSided`", "back faces are always drawn"),
+    drawn("`texCoord`, `KHR_texture_transform`", "", "KHR_texture_transform"),
+    drawn("`wrapS`, `wrapT`", "repeated, mirrored or clamped"),
+    noted("`magFilter`", "always interpolated (no note if it is linear)"),
+    no_effect("`minFilter`", "maps always have mip levels"),
+    drawn("pictures in PNG, JPEG, WebP, AVIF", in_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
+    refused(f"`{_BASISU}` without another picture", "KTX2"),
+    drawn_with_note(in_code(_SCATTERING), "the material is skin", *_SCATTERING),
+    drawn_with_note(f"`{_GLOSS}`", "without the specular colour", _GLOSS),
+    *(noted(f"`{name}`", text, name) for name, text in _NOT_DRAWN.items()),
+    noted("other extensions of materials"),
 )
+"""Properties of glTF materials and textures."""
+KNOWN_EXTENSIONS = keys_of(GLTF_MATERIALS)
 """Extensions of materials and textures that are read or named in a note."""
 
 
@@ -74,7 +96,7 @@ class _Reader:
 
     def read(self) -> FileMaterial:
         """Return the material."""
-        own = (self.material.get("extras") or {}).get("dermis")
+        own_extras = (self.material.get("extras") or {}).get("dermis")
         pbr: Tree = self.material.get("pbrMetallicRoughness") or {}
         if _GLOSS in self.extensions:
             pbr = self._from_glossiness(self.extensions[_GLOSS])
@@ -103,23 +125,23 @@ class _Reader:
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
             scatters=any(name in self.extensions for name in _SCATTERING),
-            maps=self._own_maps(own) if isinstance(own, dict) else None,
+            maps=self._own_maps(own_extras) if isinstance(own_extras, dict) else None,
             unused=tuple(self.unused),
         )
 
-    def _own_maps(self, own: Tree) -> dict[str, object]:
+    def _own_maps(self, extras: Tree) -> dict[str, object]:
         """Return keyword arguments of `load_maps` from the extras of a file that this package wrote."""
-        colour = own.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
+        colour = extras.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
             "baseColorTexture"
         )
-        references = {"colour": colour, **{role: own.get(role) for role in EMBEDDED_ROLES}}
+        references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_ROLES}}
         pictures = {
             role: self._picture(self.document.item("textures", reference["index"]))
             for role, reference in references.items()
             if reference is not None
         }
         maps: dict[str, object] = {role: picture for role, picture in pictures.items() if picture is not None}
-        height_mm = _checked_relief(own.get("height_mm"))
+        height_mm = _checked_relief(extras.get("height_mm"))
         return maps if height_mm is None else maps | {"height_mm": height_mm}
 
     def _from_glossiness(self, gloss: Tree) -> Tree:
@@ -155,7 +177,10 @@ class _Reader:
         return r, g, b
 
     def _texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
-        """Return the texture of a reference, None if there is none or its picture cannot be read."""
+        """Return the texture that a material references; None without a reference or a readable picture.
+
+        channel : see `Texture`
+        """
         if reference is None:
             return None
         entry = self.document.item("textures", reference["index"])
@@ -170,14 +195,14 @@ class _Reader:
         wrap = _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
         return Texture(picture, uv_set, _transform(extension), wrap, channel)
 
-    def _picture(self, entry: Tree) -> EmbeddedPicture | Path | None:
+    def _picture(self, entry: Tree) -> EmbeddedPicture | None:
         extensions = entry.get("extensions") or {}
         sources = [extensions[name].get("source") for name in _SOURCE_EXTENSIONS if name in extensions]
         sources.append(entry.get("source"))
         source = next((one for one in sources if one is not None), None)
         if source is None:
-            if "KHR_texture_basisu" in extensions:
-                actual = "a texture has only a KTX2 picture (KHR_texture_basisu)"
+            if _BASISU in extensions:
+                actual = f"a texture has only a KTX2 picture ({_BASISU})"
                 refuse(
                     self.document.path, "PNG, JPEG, WebP or AVIF", actual, "Export with one of these formats"
                 )
@@ -185,8 +210,8 @@ class _Reader:
         return read_picture(self.document, source)
 
 
-def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
-    """Return the bytes or the file of an image of a document; its content decides on its format.
+def read_picture(document: Document, source: Any) -> EmbeddedPicture:
+    """Return the image with an index in a document; its format is detected from its content.
 
     Raises DermisError for a file outside the folder.
     """
@@ -197,7 +222,8 @@ def read_picture(document: Document, source: Any) -> EmbeddedPicture | Path:
     uri = image["uri"]
     if uri.startswith("data:"):
         return EmbeddedPicture(name, base64.b64decode(uri.partition(",")[2]))
-    return resolve_uri(document.path, uri)
+    file = resolve_uri(document.path, uri)
+    return EmbeddedPicture(str(file), file)
 
 
 def _checked_relief(height_mm: object) -> float | None:
@@ -211,7 +237,7 @@ def _checked_relief(height_mm: object) -> float | None:
 
 
 def _transform(extension: Tree) -> UvTransform:
-    """Return the transform of KHR_texture_transform: scaled, rotated, then offset."""
+    """Return the uv transform that KHR_texture_transform states: first scale, then rotation, then offset."""
     if not extension:
         return IDENTITY
     (x, y), (scale_x, scale_y) = extension.get("offset", (0.0, 0.0)), extension.get("scale", (1.0, 1.0))

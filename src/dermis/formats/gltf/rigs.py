@@ -18,13 +18,13 @@ from dermis.mesh.rig import INFLUENCES
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
-_BATCH_VERTICES = 1 << 16  # vertices
+_BATCH_VERTICES = 1 << 16
 
 
 class SkinInfluences(NamedTuple):
     """Bones that move each vertex, and their weights, which sum to 1.
 
-    bone, weight : (v, 4)
+    bone, weight : (v, 4) bone indices, and their weights
     """
 
     bone: Index
@@ -44,7 +44,10 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
-        """Return the bone that moves a mesh without skin: that of its node, else of the nearest ancestor."""
+        """Return the bone that moves the mesh of a node without a skin; None if there is none.
+
+        It is the bone of the node, else of the nearest ancestor that is a bone, else the static bone.
+        """
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)
 
@@ -101,11 +104,11 @@ def _node_skin(document: Document, node: int) -> Tree:
 def read_influences(
     document: Document, nodes: Nodes, armature: Armature, node: int, primitive: Tree
 ) -> tuple[SkinInfluences, Doubles]:
-    """Return bones and weights of a skinned primitive, and the rest skinning matrix of each vertex.
+    """Return the bones and weights of a skinned primitive, and the skinning matrix of each vertex at rest.
 
     The skinning matrices (v, 4, 4) map mesh space to scene space.
 
-    node : index of the node with the skin
+    node : index of the mesh's node, which names the skin
 
     Raises DermisError for invalid weights and joints.
     """
@@ -133,17 +136,19 @@ def read_influences(
     return SkinInfluences(bone[joint], weight), np.asarray(matrices)
 
 
-def _check_weights(document: Document, name: str, joint: Index, weight: Doubles, count: int) -> None:
+def _check_weights(
+    document: Document, node_name: str, joint: Index, weight: Doubles, joint_count: int
+) -> None:
     if joint.shape != weight.shape:
-        actual = f"{name!r} has {joint.shape} of joints and {weight.shape} of weights"
+        actual = f"{node_name!r} has {joint.shape} of joints and {weight.shape} of weights"
         refuse(document.path, "as many joints as weights", actual, DAMAGED_ADVICE)
     invalid = np.flatnonzero(~(np.isfinite(weight) & (weight >= 0)).all(axis=1))
     if len(invalid):
-        actual = f"those of {name!r} are invalid at {len(invalid)} vertices, first {invalid[0]}"
+        actual = f"those of {node_name!r} are invalid at {len(invalid)} vertices, first {invalid[0]}"
         refuse(document.path, "skin weights of 0 and more", actual, DAMAGED_ADVICE)
-    if joint[weight > 0].max(initial=0) >= count:
-        actual = f"{name!r} names joint {joint[weight > 0].max()}"
-        refuse(document.path, f"joints of a skin from 0 to {count - 1}", actual, DAMAGED_ADVICE)
+    if joint[weight > 0].max(initial=0) >= joint_count:
+        actual = f"{node_name!r} names joint {joint[weight > 0].max()}"
+        refuse(document.path, f"joints of a skin from 0 to {joint_count - 1}", actual, DAMAGED_ADVICE)
 
 
 def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:
@@ -174,8 +179,8 @@ class VertexDisplacements(NamedTuple):
 def target_names(mesh: Tree) -> tuple[str, ...]:
     """Return the names of a mesh's morph targets.
 
-    They are "targetNames" of its extras, which most programs write; a target without a name is called
-    "target" and its index.
+    They are "targetNames" of its extras, which most programs write; a target without a name gets one by its
+    index, such as "target 0".
     """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
@@ -192,7 +197,7 @@ def read_targets(
 ) -> dict[str, VertexDisplacements]:
     """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
-    names : of the morph targets of the mesh
+    names : names of the morph targets of the mesh
     count : number of vertices of the primitive
 
     Raises DermisError if the number of displacements is not `count`, and for values that are not finite.
@@ -214,7 +219,7 @@ def read_targets(
 
 
 def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
-    """Return the default weights of the scene's morph targets by name, without those of weight 0.
+    """Return the default weights of the scene's morph targets by name; weights of 0 are omitted.
 
     Weights of a node override those of its mesh. Targets with the same name in several meshes are one target;
     the first weight is used.
@@ -239,7 +244,7 @@ def apply_targets(
 ) -> Doubles:
     """Return positions (v, 3) displaced by morph targets.
 
-    weights : by target name; missing ones are 0
+    weights : weights by target name; missing ones are 0
     """
     result = positions
     for name, target in targets.items():

@@ -10,6 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
@@ -38,11 +39,47 @@ _MAX_COUNTS = {
     "vertices": limits.MAX_VERTICES,
     "displacements by targets": limits.MAX_DISPLACEMENTS,
 }
-_READ_EXTENSIONS = (*KNOWN_EXTENSIONS, *vrm.EXTENSIONS, draco.EXTENSION, "KHR_mesh_quantization", LIGHTS)
+_MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+_QUANTISED = "KHR_mesh_quantization"
+GLTF_PROPERTIES = (
+    drawn("triangles, strips, fans"),
+    noted("points and lines"),
+    drawn("`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "missing normals are computed"),
+    drawn("`COLOR_0`", "linear; multiplies the base colour"),
+    noted("alpha of `COLOR_0`", "no note if it is 1"),
+    drawn(f"sparse accessors, normalised integers, `{_QUANTISED}`", "", _QUANTISED),
+    drawn(
+        f"`{draco.EXTENSION}`",
+        'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
+        "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
+        "accessors state",
+        draco.EXTENSION,
+    ),
+    refused(
+        f"{in_code(_MESHOPT)}, if required",
+        "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
+        "`gltf-transform copy`",
+    ),
+    refused("other extensions that are required", "the error names them"),
+    noted("other extensions that are used but not required"),
+    drawn("transforms of nodes"),
+    drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
+    drawn("animations", "by `--motion`, see [motion](motion.md)"),
+    noted(f"`{LIGHTS}`, cameras", "`--lights` and `--camera` set others", LIGHTS),
+    noted("several scenes", "the default scene is read"),
+    refused("buffers without data", "such as the fallback of a compressed one"),
+    drawn_with_note(
+        "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
+        "they decide [what is skin](#materials-and-parts)",
+    ),
+    no_effect("`asset`, `extras`, other names", "information for programs and people"),
+)
+"""Properties of glTF files besides their materials."""
+_READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
 _COMPRESSION_ADVICE = (
     "Export without this compression: gltfpack without -c and -cc, or gltf-transform copy IN.glb OUT.glb"
 )
-_ADVICE = dict.fromkeys(("EXT_meshopt_compression", "KHR_meshopt_compression"), _COMPRESSION_ADVICE)
+_ADVICE = dict.fromkeys(_MESHOPT, _COMPRESSION_ADVICE)
 _OTHER_ADVICE = "Export without it"
 
 
@@ -78,7 +115,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
-    notes : on what is left out of the parts that are read
+    notes : notes on content that was not read
     """
 
     document: Document
@@ -103,7 +140,7 @@ class _SceneReader:
     def _check_count(self, name: str, count: int) -> None:
         """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
 
-        name : of the limit, a key of `_MAX_COUNTS`
+        name : name of the limit, a key of `_MAX_COUNTS`
         """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
@@ -127,7 +164,7 @@ class _SceneReader:
     def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
-        names : of the morph targets of the mesh
+        names : names of the morph targets of the mesh
         """
         part, targets = self._read_primitive(mesh, names, primitive)
         if node is None:
@@ -145,7 +182,7 @@ class _SceneReader:
     def _read_primitive(
         self, mesh: Tree, names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """Return a primitive in mesh space with morph targets at default weights, and all morph targets."""
+        """Return a primitive in mesh space, deformed by the default weights, and all its morph targets."""
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
@@ -158,7 +195,7 @@ class _SceneReader:
         targets = self.avatar.with_expressions(mesh, names, targets)
         displaced = apply_targets(positions, targets, self.weights)
         if displaced is not positions:
-            normals = None  # they are those of the undisplaced shape
+            normals = None  # the normals of the file belong to the undisplaced shape
         if colours is not None and colours.shape[1] > 3 and colours[:, 3].min() < 1.0:
             self.notes["the transparency of vertices (alpha of COLOR_0) is left out"] = None
         triangles = self._triangles(primitive, len(positions))
@@ -177,7 +214,7 @@ class _SceneReader:
         ), targets
 
     def _other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
-        """Return the further uv coordinates (count, 2) that textures of a material use, by their index."""
+        """Return the additional uv sets (count, 2) that textures of a material use, by index of the set."""
         material = self.materials[group.material] if group.material >= 0 else FileMaterial()
         found = {}
         for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
@@ -239,9 +276,9 @@ def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], mat
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """Return the nearest rigid transform of a matrix (4, 4) that deviates from one only by rounding.
+    """Return the rigid transform that a matrix (4, 4) equals except for rounding errors.
 
-    Other matrices are returned unchanged. Exporters write scales such as 1.0000001.
+    Other matrices are returned unchanged. The errors come from exporters, which write scales like 1.0000001.
     """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:

@@ -13,7 +13,7 @@ _POINTS_AND_LINES = range(4)  # modes of primitives
 
 
 def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[str]) -> Iterator[str]:
-    """Yield notes on lights, cameras, points, lines, further scenes and extensions that are left out.
+    """Yield notes on lights, cameras, points, lines, further scenes and extensions that are not read.
 
     read_extensions : names of the extensions that are read, or noted elsewhere
     """

@@ -8,31 +8,49 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dermis.base.file_properties import drawn, no_effect, noted
 from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
 from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_TARGETS, check_limit
 from dermis.formats.text_files import listed
 
-OLD, NEW = "VRM", "VRMC_vrm"
+VRM_0, VRM_1 = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
-EXTENSIONS = (OLD, NEW, "VRMC_springBone", "VRMC_node_constraint", "VRMC_materials_mtoon")
+_TOON = "VRMC_materials_mtoon"
 _NOT_READ = {
     "springs of hair and cloth": ("secondaryAnimation", "VRMC_springBone"),
     "constraints of bones": ("VRMC_node_constraint",),
     "visibility in first person": ("firstPerson",),
 }
+VRM_PROPERTIES = (
+    drawn(
+        f"`{VRM_0}` (0.x)",
+        "the face looks along -Z and is turned to the viewer, unless `--front` is given",
+        VRM_0,
+    ),
+    no_effect(f"`{VRM_1}` (1.0)", "the face looks along +Z, as in other files", VRM_1),
+    drawn(
+        "expressions: presets and custom ones",
+        "morph targets beside those of the file (`happy`, `aa`, `blink`, in VRM 0 `joy`, `a`); "
+        "a target of the file keeps its name",
+    ),
+    noted("changes of materials by expressions"),
+    noted(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON),
+    *(noted(text, "", *keys) for text, keys in _NOT_READ.items()),
+)
+"""Properties of VRM files in addition to those of glTF."""
 _MATERIAL_BINDS = ("materialValues", "materialColorBinds", "textureTransformBinds")
-_UNNAMED = ("", "unknown")
+_CUSTOM_PRESETS = ("", "unknown")  # values of presetName for expressions that have a name of their own
 _PERCENT = 0.01
 _MAX_WEIGHT = 100.0
 
 
 @dataclass(frozen=True)
 class Avatar:
-    """Properties of a VRM file; those of other glTF files are the defaults.
+    """Properties that a VRM file adds to glTF; the defaults are for other glTF files.
 
-    expressions : weights by index of the morph target, by name of the expression, by identity of the mesh
+    expressions : for each mesh (by `id`) and expression (by name), the weights by morph target index
     """
 
     axes: Axes = DEFAULT_AXES
@@ -42,10 +60,12 @@ class Avatar:
     def with_expressions(
         self, mesh: Tree, names: Sequence[str], targets: dict[str, VertexDisplacements]
     ) -> dict[str, VertexDisplacements]:
-        """Return the morph targets of a primitive and its expressions; targets keep their names.
+        """Return the morph targets of a primitive, with its expressions added as further morph targets.
 
-        names : of the morph targets of the mesh
-        targets : of the primitive, by name
+        names : names of the morph targets of the mesh
+        targets : targets of the primitive, by name
+
+        An expression with the name of a morph target is omitted.
 
         Raises ValueError if the expressions displace too many vertices.
         """
@@ -64,24 +84,24 @@ class Avatar:
 def read_avatar(document: Document) -> Avatar:
     """Return the VRM properties of a file."""
     extensions: Tree = document.tree.get("extensions") or {}
-    old = OLD in extensions and NEW not in extensions
-    version: Tree | None = extensions.get(OLD if old else NEW)
-    if version is None:
+    is_vrm_0 = VRM_0 in extensions and VRM_1 not in extensions
+    avatar: Tree | None = extensions.get(VRM_0 if is_vrm_0 else VRM_1)
+    if avatar is None:
         return Avatar()
     expressions: dict[int, dict[str, dict[int, float]]] = {}
     names = set()
-    for name, mesh, target, weight in (_old_binds if old else _new_binds)(document, version):
+    for name, mesh, target, weight in (_vrm_0_binds if is_vrm_0 else _vrm_1_binds)(document, avatar):
         expressions.setdefault(id(mesh), {}).setdefault(name, {})[target] = weight
         names.add(name)
         check_limit(document.path, len(names), MAX_TARGETS, "expressions", "Export it with fewer")
-    axes = Axes(front="-z") if old else DEFAULT_AXES
-    return Avatar(axes, expressions, tuple(_notes(extensions, version, old)))
+    axes = Axes(front="-z" if is_vrm_0 else "z")
+    return Avatar(axes, expressions, tuple(_notes(extensions, avatar, is_vrm_0)))
 
 
 class _Bind(NamedTuple):
-    """Morph target of an expression.
+    """Morph target that an expression moves.
 
-    name : of the expression
+    name : name of the expression
     target : index of the target in the mesh
     """
 
@@ -91,19 +111,25 @@ class _Bind(NamedTuple):
     weight: float
 
 
-def _old_binds(document: Document, version: Tree) -> Iterator[_Bind]:
-    """Yield the binds of VRM 0.x, whose weights are percentages."""
-    for group in _groups(version):
+def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
+    """Yield the morph targets of all expressions in VRM 0.x, whose weights are percentages.
+
+    avatar : VRM extension of the file
+    """
+    for group in _expression_groups(avatar):
         preset = str(group.get("presetName", "")).casefold()
-        name = str(group.get("name", "")) if preset in _UNNAMED else preset
+        name = str(group.get("name", "")) if preset in _CUSTOM_PRESETS else preset
         for bind in group.get("binds") or () if name else ():
             mesh = document.item("meshes", bind["mesh"])
             yield _Bind(name, mesh, int(bind["index"]), _PERCENT * _weight(bind))
 
 
-def _new_binds(document: Document, version: Tree) -> Iterator[_Bind]:
-    """Yield the binds of VRM 1.0."""
-    for name, expression in _expressions(version).items():
+def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
+    """Yield the morph targets of all expressions in VRM 1.0.
+
+    avatar : VRM extension of the file
+    """
+    for name, expression in _expressions(avatar).items():
         for bind in expression.get("morphTargetBinds") or ():
             node = document.item("nodes", bind["node"])
             if "mesh" in node:
@@ -118,25 +144,25 @@ def _weight(bind: Tree) -> float:
     return weight
 
 
-def _groups(version: Tree) -> list[Tree]:
-    groups: list[Tree] = (version.get("blendShapeMaster") or {}).get("blendShapeGroups") or []
+def _expression_groups(avatar: Tree) -> list[Tree]:
+    groups: list[Tree] = (avatar.get("blendShapeMaster") or {}).get("blendShapeGroups") or []
     return groups
 
 
-def _expressions(version: Tree) -> Tree:
-    expressions: Tree = version.get("expressions") or {}
+def _expressions(avatar: Tree) -> Tree:
+    expressions: Tree = avatar.get("expressions") or {}
     return {**(expressions.get("preset") or {}), **(expressions.get("custom") or {})}
 
 
-def _notes(extensions: Tree, version: Tree, old: bool) -> Iterator[str]:
-    expressions = _groups(version) if old else list(_expressions(version).values())
+def _notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
+    expressions = _expression_groups(avatar) if is_vrm_0 else list(_expressions(avatar).values())
     if any(one.get(key) for one in expressions for key in _MATERIAL_BINDS):
         yield "changes of materials by expressions are left out"
-    present = {*version, *extensions}
+    present = {*avatar, *extensions}
     not_read = [text for text, keys in _NOT_READ.items() if present.intersection(keys)]
     if not_read:
         yield f"these properties of the avatar are left out: {', '.join(not_read)}"
-    materials = version.get("materialProperties") or ()
+    materials = avatar.get("materialProperties") or ()
     toon = [str(one.get("name")) for one in materials if "MToon" in str(one.get("shader"))]
     if toon:
         yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {listed(toon)}"

@@ -17,10 +17,13 @@ from dermis.formats.gltf.materials import (
     eye_material,
     eye_pictures,
     hair_material,
+    part_material,
+    part_pictures,
     skin_pictures,
     surface_material,
 )
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
+from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
@@ -48,7 +51,7 @@ def encode_head(
 
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override those of the rest pose
-    slopes : (n, n, 2) of the relief, written as normal map for programs that read no height map
+    slopes : (n, n, 2) slopes of the relief, written as normal map for programs that read no height map
     notes : extras of the file's asset
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     additions : properties to add to the material of skin
@@ -96,19 +99,27 @@ def _primitive_sources(
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
     """Return the geometry of each glTF primitive and the material of each, in the same order.
 
-    pictures : PNG files by name; those of eyes and hairs are added
+    pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     roles : entries of the extras of skin, see `skin_pictures`
     """
     head = points.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
         pictures |= eye_pictures(eyes)
+    part_maps = PartPictures.of(head)
+    if part_maps is not None:
+        pictures |= part_pictures(part_maps)
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
         parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == index), eye))
         own = head.mesh.materials[index]
-        materials.append(surface_material(own, pictures, roles, roughness) if eye < 0 else eye_material(own))
+        if eye >= 0:
+            materials.append(eye_material(own))
+        elif part_maps is not None and own.has_maps:
+            materials.append(part_material(own, part_maps))
+        else:
+            materials.append(surface_material(own, pictures, roles, roughness))
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
@@ -146,15 +157,15 @@ def _gltf_mesh(
 
 
 def _mesh_name(head: Head) -> str:
-    """Return the name of the exported mesh, which no bone may have."""
+    """Return a name for the exported mesh that differs from the names of all bones."""
     name = Path(head.name).stem or "head"
     return f"{name} mesh" if name in head.bones else name
 
 
 def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """Return the glTF nodes, the indices of root nodes, and a list with the skin.
+    """Return the glTF nodes, the indices of the root nodes, and the list of skins.
 
-    Bones come first and the mesh last; the list is empty without bones.
+    The nodes are the bones, then the mesh. There is one skin, or none if the head has no bones.
     """
     skeleton = head.control.skeleton
     if skeleton is None:

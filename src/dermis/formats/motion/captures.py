@@ -19,7 +19,7 @@ from dermis.mesh.skeleton import Skeleton
 MAX_CLIP_BYTES = 48 << 20
 """Largest capture file."""
 MAX_FRAMES, MAX_NAMES = 200_000, 500
-"""Largest number of frames of a capture, almost an hour at 60 per second, and of its columns."""
+"""Largest numbers of frames (almost an hour at 60 per second) and of columns in a capture."""
 TIME_UNITS: Mapping[str, float | None] = {
     "time": 1.0,
     "times": 1.0,
@@ -31,17 +31,17 @@ TIME_UNITS: Mapping[str, float | None] = {
     "timestampus": 1e-6,
     "timestamp": None,
 }
-"""Unit of the time of a frame by its plain key [s]; None for a key that does not state it."""
+"""Unit [s] of a frame's time, by the plain key under which it is stored; None if the key states no unit."""
 FRAME_KEYS = ("frame", "frameindex", "framenumber", "frameid")
-"""Plain keys of the number of a frame."""
+"""Plain keys under which the number of a frame is stored."""
 NEUTRAL_SCORE = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
 MAX_TIME = 1e19
 """Largest time of a frame in any unit: nanoseconds of three centuries."""
-_MAX_STEP_S = 2.0  # largest plausible median step between frames of a capture
+_MAX_STEP_S = 2.0  # largest plausible median interval between frames of a capture
 _TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
-_PERCENT_RANGE = (10.0, 200.0)  # largest weight of a capture in percent: more than any pose as a fraction
-_LARGE_WEIGHT = 2.0  # more than exaggerated poses have
+_PERCENT_RANGE = (10.0, 200.0)  # range of the largest weight of a capture in percent; fractions are smaller
+_LARGE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
 _COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
@@ -49,7 +49,7 @@ _PREFIX_WORDS = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|ske
 """Words that programs add to the names of bones."""
 _SIDE_OF_WORD = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NECK_WORDS, _EYE_WORDS = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
-_HEAD_FRACTION = 0.5  # of a head rotation; the neck bones rotate by the rest
+_HEAD_FRACTION = 0.5  # part of a head rotation that the head bone performs; neck bones perform the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
     """Return a facial capture as a clip for a head, linearly interpolated between frames.
 
     culprit : the capture's file, for errors
-    name : of the clip
+    name : name of the clip
 
     Raises DermisError when no name matches the head.
     """
@@ -102,7 +102,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
-    """Raise the error for a motion without any name that is a morph target or bone of the head."""
+    """Raise the error for a motion of which no name is that of a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
@@ -125,7 +125,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None for the largest one in which frames are at most 2 s apart, with a note
+    unit : unit of the times [s]; None to assume, with a note, the largest in which frames are at most 2 s
+        apart
     """
     if unit is None:
         steps = np.diff(times)
@@ -136,7 +137,7 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
 
 
 def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
-    """Return the frame rate of a capture without times: the given one, or the default, with a note."""
+    """Return the frame rate of a capture without times: `fps` if given, else `default`, with a note."""
     if fps is None:
         assumed = f"{default:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
@@ -150,7 +151,7 @@ def note_lost_frames(culprit: object, count: int, total: int) -> None:
 
 
 def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
-    """Replace NaN in values (k, n) by linear interpolation over time; the first and last numbers are held.
+    """Replace NaN in values (k, n) by linear interpolation over time, and by constants at both ends.
 
     times_s : (k,) times of the rows [s]
     """
@@ -172,7 +173,7 @@ def to_fractions(culprit: object, weights: Doubles) -> Doubles:
 
 
 def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doubles) -> None:
-    """Refuse blend shape weights (k, n) that are implausibly large; NaN for missing ones are accepted.
+    """Refuse implausibly large blend shape weights (k, n); NaN marks missing weights and is accepted.
 
     culprits, names : (k,) frames and (n,) blend shapes, for errors
     """
@@ -242,7 +243,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
     Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
     ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    necks the other half; a skeleton with only one of them applies all of it there.
+    necks the other half; without neck bones or without a head bone, the other gets all of it.
     """
     if skeleton is None:
         return RotationBones({}, {})
@@ -264,9 +265,9 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
 
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
-    """Return Euler angles (k, 3) [degrees] of head and neck bones that rotate the head.
+    """Return the Euler angles (k, 3) [degrees] of the head and neck bones, by bone name.
 
-    The bones together perform the rotations, quaternions (k, 4), of a capture.
+    rotations : (k, 4) quaternions of the head's rotation in a capture, which the bones perform together
     """
     parts = bones.head.items()
     return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}
@@ -304,7 +305,7 @@ def _ancestors(skeleton: Skeleton, bone: int) -> set[int]:
 
 
 def _bone_words(name: str) -> tuple[list[str], str]:
-    """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
+    """Return the words of a bone's name without numbers and prefixes, and the side "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
     sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]

@@ -30,8 +30,8 @@ class _UsedTrack(NamedTuple):
     """Animation curve, restricted to the bones or morph targets that the head has.
 
     path : "translation", "rotation", "scale" or "weights"
-    columns : indices of the used channels of the curve
-    indices : index of the animated bone or morph target of each of these channels
+    columns : indices in the track of the bones or morph targets that the head has
+    indices : for each of them, its index among all animated bones or morph targets of the head
     """
 
     path: str
@@ -41,11 +41,11 @@ class _UsedTrack(NamedTuple):
 
 
 def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
-    """Load a clip of a .glb or .gltf file for a head whose bones or morph targets have the names of the clip.
+    """Load a clip of a .glb or .gltf file; bones and morph targets are matched with the head's by name.
 
     Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 
-    name : of the clip; required if the file has several
+    name : name of the clip; required if the file has several
 
     Raises DermisError for a damaged clip, and if no name matches the head.
     """

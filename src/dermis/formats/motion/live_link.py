@@ -51,8 +51,8 @@ _TIMECODE = re.compile(
 )
 _TIMECODE_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
 _APP_RATE = 60.0
-_DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
-_MAX_ANGLE = 2 * np.pi  # of a head in radians; larger angles are degrees
+_DAY_S, _MIDNIGHT_S = 86400.0, 82800.0  # a timecode that falls by more than the latter has passed midnight
+_MAX_ANGLE = 2 * np.pi  # largest angle of a head in radians; larger angles are taken as degrees
 
 
 class _Timecode(NamedTuple):
@@ -74,14 +74,14 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
     Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise LeftEye... and RightEye....
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye.
     They rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or tabs.
     Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
     converted, each with a note.
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
 
-    Raises DermisError for a file with other columns or invalid lines, which it names.
+    Raises DermisError for a file with other columns and for invalid lines; the message names the line.
     """
     table = _read_table(path, fps)
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in table.names])
@@ -126,12 +126,16 @@ def _has_text(row: Sequence[str]) -> bool:
     return any(map(str.strip, row))
 
 
-def _check_row(culprit: str, header: Sequence[str], row: list[str], count: int | None) -> None:
-    """Refuse a row with too many or too few cells; one that counts no blend shapes is completed.
+def _check_row(culprit: str, header: Sequence[str], row: list[str], count_column: int | None) -> None:
+    """Refuse a row with too many or too few cells; complete a row that has no blend shapes.
 
-    count : column of the number of blend shapes
+    count_column : index of the column that states the number of blend shapes; None if there is none
     """
-    if count is not None and count < len(row) < len(header) and row[count].strip() == "0":
+    if (
+        count_column is not None
+        and count_column < len(row) < len(header)
+        and row[count_column].strip() == "0"
+    ):
         row += [""] * (len(header) - len(row))
     if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
         refuse(culprit, f"{len(header)} cells", f"got {len(row)}", "Correct or remove the line")
@@ -163,7 +167,7 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted:
     """Return a table without gaps, with weights as fractions and angles in radians.
 
     lines : name of each row, for errors
-    counted : (k,) whether each row counts its blend shapes
+    counted : (k,) mask of rows that state a number of blend shapes above 0
     """
     values, names = table.values, table.names
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
@@ -188,9 +192,10 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted:
 
 
 def _rows_without_face(values: Doubles, is_angle: Mask, counted: Mask) -> Mask:
-    """Return which rows (k,) show no face: those that are empty, or zero where a face is never zero.
+    """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
 
-    Faces are never zero if most other rows have a turned head, or if others count their blend shapes.
+    Rows of zeros show no face if most other rows have a rotated head, or if these rows state no number of
+    blend shapes and others do.
     """
     numbers = np.nan_to_num(values)
     zero = np.asarray(~numbers.any(axis=1))
@@ -204,7 +209,7 @@ def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, 
 
     lines : name of each row, for errors
     cells : time of each row: a timecode or a number, as text
-    key : plain name of the column of times or frame numbers; None for none
+    key : plain name of the column of times or frame numbers; None if there is no such column
     fps : frame rate of the timecode; None to estimate it
     """
     if key is None:

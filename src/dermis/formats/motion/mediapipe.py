@@ -46,7 +46,7 @@ _MATRIX_KEYS = (
     "facialtransformationmatrices",
 )
 _FACE_KEYS = ("faces", "landmarks", "facelandmarks")
-"""Plain keys of lists with one entry for each face, of which those of landmarks are not used."""
+"""Plain keys of lists with one entry for each face; landmarks are not used."""
 _LIST_KEYS = ("categories", "classification")
 _DATA_KEYS = ("data", "packeddata", "value")
 _NAME_KEYS = ("categoryname", "label", "name", "displayname")
@@ -64,7 +64,8 @@ class _CapturedFrame(NamedTuple):
 
     culprit : file with line or number of the frame, for errors
     number : number of the frame
-    time : time of the frame in units of `unit` [s], or in an unknown unit if that is None; NaN if it has none
+    time : time of the frame, in the unit `unit`; NaN if the frame has none
+    unit : unit of the time [s]; None if it is not stated
     columns, weights : (n,) indices of the blend shapes of the frame, and their weights; empty without a face
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces
@@ -87,11 +88,11 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     API, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or a list of names and
     scores for each face; facial transformations (4, 4) are nested or flat lists or objects with data, and
     rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
-    first face is used. Frames without a face are interpolated. Notes say what was assumed.
+    first face is used. Frames without a face are interpolated. Assumptions are noted.
 
-    fps : frame rate if the frames have no time; by default that of the file, or 30
+    fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
-    Raises DermisError for a file without a face, and for invalid frames, which it names.
+    Raises DermisError for a file without a face, and for invalid frames; the message names the frame.
     """
     rate, records = _read_records(path)
     columns: dict[str, int] = {}
@@ -133,7 +134,7 @@ def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]
     except DermisError:
         if second is None:
             raise
-        document = parse_json(text, path, _EXPECTED)  # written over several lines
+        document = parse_json(text, path, _EXPECTED)  # an object over several lines
     else:
         if second is not None:
             rest = ((name, parse_json(line, name, _EXPECTED)) for name, line in chain([second], lines))
@@ -169,7 +170,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
     if not isinstance(record, dict | None):
         refuse(culprit, "an object in JSON", f"got {format_value(record)}", _LINE_ADVICE)
     fields = _plain_fields(record)
-    for value in tuple(fields.values()):  # a result in the record
+    for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
             fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
     shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
@@ -195,7 +196,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
 def _first_face(value: object) -> tuple[object, int]:
     """Return the blend shapes of the first face, None for no face, and the number of faces.
 
-    value : blend shapes of a face, an object with a list of them, or a list of either
+    value : blend shapes of one face, an object around their list, or a list of such values, one for each face
     """
     faces = 1
     while True:
@@ -208,7 +209,7 @@ def _first_face(value: object) -> tuple[object, int]:
 
 
 def _is_list_object(value: object) -> bool:
-    """Return whether a value is an object that holds a list: one of categories, or an Optional of Java."""
+    """Return whether a value is an object around the blend shapes: MediaPipe's lists, or a Java Optional."""
     return isinstance(value, dict) and (bool(value.keys() & _LIST_KEYS) or value.keys() == {"value"})
 
 
@@ -235,8 +236,8 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
 def _facial_transformation(culprit: str, value: object) -> Doubles | None:
     """Return the facial transformation (4, 4) of the first face, None if there is none.
 
-    The column with the translation is the last one of the result. Without a translation, flat lists of an API
-    are taken by columns, as they are there.
+    The translation is in the last column of the result. A flat list without a translation is taken to be in
+    column-major order, as MediaPipe's APIs return it.
 
     value : matrix as a nested or flat list, an object with it, or a list of either
     """
@@ -263,7 +264,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
 
 
 def _is_row(value: object) -> bool:
-    """Return whether the first entry of a list belongs to a matrix, and is not a matrix itself."""
+    """Return whether the first entry of a list is a row or a number of a matrix, not a whole matrix."""
     is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
     return not is_nested and not isinstance(value, dict)
 
@@ -292,7 +293,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and what the head has no bone for."""
+    """Return angles (k, 3) by bone name [degrees], and the names of rotations without a bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

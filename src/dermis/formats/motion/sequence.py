@@ -16,7 +16,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.errors import notify, refuse
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing
-from dermis.formats.axes import Axes, Axis, Front, to_y_up
+from dermis.formats.axes import DEFAULT_AXES, Axes, Axis, Front, to_y_up
 from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import parse_obj, read_obj_text
 from dermis.formats.parts import default_unit_mm
@@ -24,6 +24,7 @@ from dermis.formats.read import join_parts, read_mesh_file
 from dermis.formats.rig_from_file import SPLIT_TOLERANCE_MM
 from dermis.formats.units import UNITS_MM
 from dermis.mesh.clip import Clip
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, triangle_keys
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -72,7 +73,7 @@ def frame_files(path: Path) -> list[Path]:
             actual,
             "Use a pattern for one of them, such as face_%05d.obj",
         )
-    return sorted(files, key=_by_number)
+    return sorted(files, key=_frame_sort_key)
 
 
 def load_sequence(
@@ -80,7 +81,7 @@ def load_sequence(
     head: Head,
     fps: float | None = None,
     unit_mm: float | None = None,
-    up: Axis = "y",
+    up: Axis | None = None,
     front: Front = "auto",
 ) -> Clip:
     """Load a sequence of mesh files, one per frame, as a clip for a head with the same topology.
@@ -88,16 +89,18 @@ def load_sequence(
     The vertices of the files must have the order of the head's file.
 
     fps : frame rate, by default 30
-    unit_mm : unit of the files [mm]; None for one that makes the first about as large as the head
-    up, front : axes of the files, see `load_head`
+    unit_mm : unit of the files [mm]; by default one for which the first mesh is about as large as the head
+    up, front : axes of the files, see `load_head`; by default the axes of the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
     read immediately, the others on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
-    reader = FrameReader(unit_mm, up, front)
+    axes, source = Axes(up, front), head.file_vertices
+    to_head = to_y_up(np.eye(3), axes).T if source is None or axes != DEFAULT_AXES else source.to_head
+    reader = FrameReader(unit_mm, to_head)
     if unit_mm is None and (unit := _unit_of_head(files[0], head, reader)) != default_unit_mm(files[0]):
-        reader = FrameReader(unit, up, front)
+        reader = FrameReader(unit, to_head)
     frames = _FrameCache(tuple(files), head, reader)
     for index in {0, len(files) // 2, len(files) - 1}:
         frames.positions(index)
@@ -127,6 +130,9 @@ class _FrameCache:
     def __post_init__(self) -> None:
         """Create `positions`, the cached version of `_read_positions`."""
         self.positions = lru_cache(maxsize=3)(self._read_positions)
+        mesh, vertex = self.head.mesh, np.arange(len(self.head.mesh.point), dtype=np.int32)
+        own = FileVertices(len(vertex), vertex, mesh.point, mesh.triangles, np.eye(3))
+        self._source = self.head.file_vertices or own
 
     def _read_positions(self, index: int) -> Floats:
         """Return the positions of the head's control points in a frame, (n, 3) [mm]."""
@@ -134,11 +140,10 @@ class _FrameCache:
         vertices = self.reader.read(file)
         self._first = self._first or vertices
         self._check_topology(file, vertices)
-        control = self.head.control
-        point = self.head.mesh.point if control.vertex_point is None else control.vertex_point
-        positions = np.empty_like(self.head.positions_mm)
-        positions[point] = vertices.positions_mm
-        difference = np.abs(positions[point] - vertices.positions_mm).max(axis=1)
+        positions, point = np.empty_like(self.head.positions_mm), self._source.point
+        at_points = vertices.positions_mm[self._source.vertex]
+        positions[point] = at_points
+        difference = np.abs(positions[point] - at_points).max(axis=1)
         if difference.max() > SPLIT_TOLERANCE_MM:
             count = np.count_nonzero(difference > SPLIT_TOLERANCE_MM)
             actual = f"{count} separate by up to {difference.max():.3g} mm"
@@ -149,12 +154,11 @@ class _FrameCache:
 
     def _check_topology(self, file: Path, vertices: FrameVertices) -> None:
         assert self._first is not None
-        control, mesh = self.head.control, self.head.mesh
-        count = len(mesh.point if control.vertex_point is None else control.vertex_point)
+        source, count = self._source, self._source.count
         same_triangles = np.array_equal(vertices.triangles, self._first.triangles)
-        of_head, of_frame = (triangle_keys(one.triangles, count) for one in (mesh, vertices))
         # the head lacks the triangles that were left out when it was read
-        matches_head = control.vertex_point is not None or np.isin(of_head, of_frame).all()
+        of_head = triangle_keys(source.vertex[source.triangles], count)
+        matches_head = np.isin(of_head, triangle_keys(vertices.triangles, count)).all()
         if len(vertices.positions_mm) != count or not matches_head:
             actual = f"it has {len(vertices.positions_mm)} and {len(vertices.triangles)} triangles"
             expected = f"the topology of the head, {count} vertices connected as in its file"
@@ -173,7 +177,7 @@ class _FrameCache:
 def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as a head [mm].
 
-    It is that of the file's format if this fits; otherwise a note says which unit was found.
+    It is the unit of the file's format if this fits; otherwise a note states the unit.
     """
     read_mm, head_mm = (
         np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
@@ -198,18 +202,18 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _by_number(file: Path) -> tuple[int, str]:
-    """Return the sort key of a file: the last number in its name, then the name."""
+def _frame_sort_key(file: Path) -> tuple[int, str]:
+    """Return the sort key of a file: the last number in its name, then the whole name."""
     numbers = re.findall(r"\d+", file.stem)
     return int(numbers[-1]) if numbers else -1, file.name
 
 
 class FrameVertices(NamedTuple):
-    """Vertices of one mesh file, without those that no triangle uses.
+    """Vertices of one mesh file that its triangles use.
 
-    positions_mm : (v, 3)
+    positions_mm : (v, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
-    uv : (v, 2) with the v direction of the file
+    uv : (v, 2) uv with the v direction of the file
     """
 
     positions_mm: Floats
@@ -218,32 +222,31 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """Everything but the positions of an OBJ file, to recognise files that differ only in positions.
+    """All of an OBJ file except its positions, to recognise files that differ only in positions.
 
     digest : hash of all lines except `v` and `vn`
-    lines : number of `v` lines
-    line : (v,) index of the `v` line of each vertex
+    line_count : number of `v` lines
+    line_of_vertex : (v,) index of the `v` line of each vertex
     """
 
     digest: bytes
-    lines: int
-    line: Index
+    line_count: int
+    line_of_vertex: Index
 
 
 @dataclass
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    If an OBJ file differs from the first one only in positions, only these are parsed, which is 20 times as
-    fast.
+    If an OBJ file differs from the first one only in positions, only its positions are parsed, which is 20
+    times as fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
-    up, front : axes of the files that point upwards and along which the face looks
+    to_head : (3, 3) rotation from the axes of the files to those of the head
     """
 
     unit_mm: float | None = None
-    up: Axis = "y"
-    front: Front = "auto"
+    to_head: Doubles = field(default_factory=lambda: np.eye(3))
     _first: FrameVertices | None = field(default=None, init=False)
     _pattern: _ObjPattern | None = field(default=None, init=False)
 
@@ -275,7 +278,7 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the pattern of the first file; None if its positions are not the numbers of its lines."""
+        """Return the pattern of the first file; None if its positions are not those in its `v` lines."""
         assert self._first is not None
         data = read_obj_text(path).encode()
         pattern = _find_pattern(path, data)
@@ -287,7 +290,7 @@ class FrameReader:
 
     def _to_head_axes(self, positions: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # infinite positions are refused later
-            return to_y_up(positions, Axes(self.up, self.front)).astype(np.float32)
+            return (positions @ self.to_head.T).astype(np.float32)
 
 
 def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
@@ -299,9 +302,10 @@ def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], 
 def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
     """Return the pattern of an OBJ file.
 
-    data : its text in UTF-8
+    data : text of the file in UTF-8
 
-    The file is parsed with the index of each `v` line as x coordinate, which shows the line of each vertex.
+    The file is parsed with the index of each `v` line as its x coordinate, so that the x of a parsed vertex
+    is the index of its line.
     """
     positions, digest = _split_vertex_lines(data)
     count = iter(range(len(positions)))
@@ -318,10 +322,10 @@ def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
     data : bytes of the file
     """
     rows, digest = _split_vertex_lines(data)
-    if len(rows) != pattern.lines or digest != pattern.digest:
+    if len(rows) != pattern.line_count or digest != pattern.digest:
         return None
     try:
-        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line]
+        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line_of_vertex]
     except ValueError:  # the parser raises a better error
         return None
     return positions if np.isfinite(positions).all() else None

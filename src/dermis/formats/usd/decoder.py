@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 _MM = 1000.0
 _UV_NAMES = ("st", "UVMap", "map1", "st0", "st_0", "uv")
-_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
-_HIDDEN = ("guide", "proxy")  # purposes
-_OWN_MATERIAL_ONLY = "faces of one mesh read different texture coordinates: those of the first are used"
+_TYPES_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
+_HIDDEN_PURPOSES = ("guide", "proxy")
+_SEVERAL_UV_NOTE = "faces of one mesh read different texture coordinates: those of the first are used"
 
 
 class _Primvar(NamedTuple):
-    """Values (n, k), and the index of the value of each corner (c,)."""
+    """Primitive variable: values (n, k), and the index of each corner's value (c,)."""
 
     values: Doubles
     corner_index: Index
@@ -49,7 +49,7 @@ class _Faces(NamedTuple):
     vertex: Index
 
     def corner_elements(self, interpolation: str) -> Index | None:
-        """Return the element of a primvar for each corner, (c,); None for an unknown interpolation."""
+        """Return the index of the primvar element for each corner (c,); None for an unknown interpolation."""
         corners = len(self.vertex)
         return {
             "constant": np.zeros(corners, np.int64),
@@ -75,7 +75,7 @@ class _SceneReader:
         )
         self.path, self.stage = path, stage
         self.time = self.usd.TimeCode.EarliestTime()
-        self.places = self.geom.XformCache(self.time)
+        self.transform_cache = self.geom.XformCache(self.time)
         self.material_reader = MaterialReader(path, folder, self.time)
         self.material_index: dict[str, int] = {}
         self.materials: list[Tree] = []
@@ -83,7 +83,7 @@ class _SceneReader:
         self.vertices = self.triangles = 0
 
     def read(self) -> Arrays:
-        """Return the arrays of all meshes, named by their number, and "scene", a JSON text."""
+        """Return the arrays of all meshes, whose names begin with the mesh's number, and the JSON "scene"."""
         meshes, unread = list[Tree](), Counter[str]()
         for count, prim in enumerate(self._prims()):
             limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
@@ -91,7 +91,7 @@ class _SceneReader:
                 if self._is_visible(prim):
                     limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
                     meshes.append(self._mesh(self.geom.Mesh(prim), str(len(meshes))))
-            elif prim.GetTypeName() not in _WITHOUT_NOTE:
+            elif prim.GetTypeName() not in _TYPES_WITHOUT_NOTE:
                 unread[str(prim.GetTypeName())] += 1
         if unread:
             names = ", ".join(f"{name} ({count})" for name, count in unread.most_common(8))
@@ -119,12 +119,13 @@ class _SceneReader:
         return unit_mm
 
     def _is_visible(self, prim: Usd.Prim) -> bool:
-        own = self.geom.Imageable(prim)
-        return own.ComputePurpose() not in _HIDDEN and own.ComputeVisibility(self.time) != "invisible"
+        shown = self.geom.Imageable(prim)
+        is_hidden = shown.ComputePurpose() in _HIDDEN_PURPOSES
+        return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
-    def _mesh(self, mesh: UsdGeom.Mesh, number: str) -> Tree:
-        """Add the arrays of a mesh, and return its names and materials."""
-        prim, matrix = mesh.GetPrim(), np.array(self.places.GetLocalToWorldTransform(mesh.GetPrim()))
+    def _mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
+        """Add the arrays of a mesh to the answer, and return its names and materials."""
+        prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._geometry(mesh)
         materials, group = self._material_groups(prim, len(faces.counts))
         uv = self._uv(prim, faces, materials)
@@ -138,10 +139,12 @@ class _SceneReader:
             if primvar is not None:
                 arrays |= {name: primvar.values, f"{name} index": primvar.corner_index[order]}
         if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
-            arrays["normals"] = _unit(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
+            arrays["normals"] = _normalised(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
             arrays["colours"] = colours
-        self.arrays |= {f"{number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()}
+        self.arrays |= {
+            f"{mesh_number} {name}": np.ascontiguousarray(array) for name, array in arrays.items()
+        }
         return {"name": prim.GetName(), "materials": materials, "colour": colour}
 
     def _geometry(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
@@ -162,14 +165,14 @@ class _SceneReader:
         return points, _Faces(counts, np.cumsum(counts) - counts, vertex)
 
     def _corner_order(self, mesh: UsdGeom.Mesh, faces: _Faces, matrix: Doubles) -> Index:
-        """Return the order of corners (c,) in which polygons are anticlockwise from outside."""
+        """Return the order of corners (c,) in which polygons are anticlockwise when seen from outside."""
         is_left = mesh.GetOrientationAttr().Get(self.time) == "leftHanded"
         if is_left != bool(np.linalg.det(matrix[:3, :3]) < 0):
             return faces.reversed_corners()
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
-        """Return the materials of a mesh, -1 for none, and the index in them of each of `count` faces.
+        """Return the list of a mesh's materials, -1 for none, and each face's index in this list (count,).
 
         Faces that are holes have the index -1.
         """
@@ -185,10 +188,10 @@ class _SceneReader:
         group[holes] = -1
         return materials, group
 
-    def _check_face_indices(self, faces: Index, count: int, name: object) -> None:
-        if len(faces) and (faces.min() < 0 or faces.max() >= count):
-            actual = f"{name} has some from {faces.min()} to {faces.max()}"
-            refuse(self.path, f"indices of faces from 0 to {count - 1}", actual, limits.DAMAGED_ADVICE)
+    def _check_face_indices(self, faces: Index, face_count: int, prim_path: object) -> None:
+        if len(faces) and (faces.min() < 0 or faces.max() >= face_count):
+            actual = f"{prim_path} has some from {faces.min()} to {faces.max()}"
+            refuse(self.path, f"indices of faces from 0 to {face_count - 1}", actual, limits.DAMAGED_ADVICE)
 
     def _material(self, binding: UsdShade.MaterialBindingAPI) -> int:
         material = binding.ComputeBoundMaterial()[0]
@@ -201,10 +204,10 @@ class _SceneReader:
         return self.material_index[key]
 
     def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv coordinates of a mesh that its materials use, else those of a usual name."""
+        """Return the uv that the mesh's materials name, else uv with a usual name; None without any."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
-            self.notes[_OWN_MATERIAL_ONLY] = None
+            self.notes[_SEVERAL_UV_NOTE] = None
         primvars = self.geom.PrimvarsAPI(prim)
         typed = [one for one in primvars.GetPrimvars() if "texCoord2" in str(one.GetTypeName())]
         names = (*named, *_UV_NAMES, *(str(one.GetPrimvarName()) for one in typed))
@@ -212,7 +215,7 @@ class _SceneReader:
         return next((one for one in found if one is not None), None)
 
     def _primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
-        """Return a primvar of `width` numbers; None if there is none of that width."""
+        """Return a primvar if its elements have `width` numbers, else None."""
         if not primvar or not primvar.HasValue():
             return None
         values = np.array(primvar.Get(self.time), np.float64)
@@ -223,14 +226,14 @@ class _SceneReader:
             element = np.array(primvar.GetIndices(self.time), np.int64)[element]
         return self._checked_primvar(values.reshape(-1, width), element, primvar.GetAttr().GetPath())
 
-    def _checked_primvar(self, values: Doubles, element: Index | None, name: object) -> _Primvar:
+    def _checked_primvar(self, values: Doubles, element: Index | None, attribute_path: object) -> _Primvar:
         if element is None or (len(element) and (element.min() < 0 or element.max() >= len(values))):
-            actual = f"{name} has other numbers of values"
+            actual = f"{attribute_path} has other numbers of values"
             refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
         return _Primvar(values, element)
 
     def _normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
-        """Return the normals of a mesh; None if it has none, or is subdivided in other programs."""
+        """Return the normals of a mesh; None if it has none, or is a subdivision surface."""
         if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
             return None
         primvars = self.geom.PrimvarsAPI(mesh.GetPrim())
@@ -244,7 +247,7 @@ class _SceneReader:
     def _colours(
         self, prim: Usd.Prim, faces: _Faces, materials: list[int], count: int
     ) -> tuple[list[float] | None, Doubles | None]:
-        """Return the colour of a whole mesh, or the linear colours (count, 3) of its vertices."""
+        """Return one colour for a whole mesh, or linear colours (count, 3) of its vertices, or neither."""
         named = [one for k in materials if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
         if not named and any(k >= 0 for k in materials):
             return None, None
@@ -260,7 +263,7 @@ class _SceneReader:
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 
-def _unit(vectors: Doubles) -> Doubles:
+def _normalised(vectors: Doubles) -> Doubles:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
@@ -268,7 +271,7 @@ def _unit(vectors: Doubles) -> Doubles:
 def decode(request: Arrays) -> Arrays:
     """Return the meshes of a file, see `_SceneReader.read`.
 
-    request : "file", its absolute path, and "path", as users name it
+    request : absolute path of the file under "file", and the path that the user typed under "path"
     """
     file, path = (Path(as_text(request[name])) for name in ("file", "path"))
     stage, folder = open_stage(file, path, Path.cwd())

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
 _LOCATED_FAULT = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
-"""Position of a fault in a text layer, and the rest of the line."""
+"""Pattern of an error message with the position of the error in a text layer."""
 _MAX_LAYERS, _MAX_ENTRIES = 256, 4096
 _ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
 class OpenedStage(NamedTuple):
-    """Stage of a file, and the folder of its layers: that of the file, or a copy of a package's."""
+    """Stage of a USD file, and the folder of its layers; the layers of a package were copied there."""
 
     stage: Usd.Stage
     folder: Path
@@ -32,9 +32,9 @@ class OpenedStage(NamedTuple):
 def open_stage(file: Path, path: Path, copies: Path) -> OpenedStage:
     """Open the stage of a USD file.
 
-    file : the file, by its absolute path
-    path : the same as users name it, for errors
-    copies : empty folder for layers of a package
+    file : absolute path of the file
+    path : path that the user typed, for error messages
+    copies : empty folder to which the layers of a package are copied
 
     Raises DermisError when a layer is missing, damaged, or not in the folder of the file or below it.
     """
@@ -67,7 +67,7 @@ def _check_layers(path: Path, root: Path, folder: Path) -> None:
     """Refuse a file with layers outside its folder, before they are opened.
 
     root : root layer
-    folder : that must contain all layers
+    folder : folder that must contain all layers
     """
     sdf: Any = import_extra("pxr.Sdf", f"{path}: USD scenes")
     pending, known, size = [root], {root}, 0
@@ -93,7 +93,7 @@ def _check_layers(path: Path, root: Path, folder: Path) -> None:
 
 
 def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
-    """Yield the names of the layers that a layer refers to.
+    """Yield the names of the layers that a layer references.
 
     Raises DermisError for value clips, which name layers by patterns.
     """
@@ -111,8 +111,8 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
 
 
 def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
-    """Return the file of a layer that another layer names; None if it is not a layer in the folder."""
-    if any(mark in name for mark in ":[`\0"):  # schemes, packages, expressions
+    """Return the file of a layer that another layer references; None if it is not a layer in the folder."""
+    if any(mark in name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
     file = (layer.parent / name).resolve()
     is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(folder) and file.is_file()

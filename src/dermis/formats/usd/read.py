@@ -13,13 +13,14 @@ import numpy as np
 from dermis.base.arrays import Index, Mask
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
+from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
 from dermis.base.native_decoding import as_text, from_text, run_decoder
 from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
 from dermis.formats.maps import PathLike
 from dermis.formats.materials import FileMaterial, Role, Texture, check_pictures
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, parse_colour
-from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small
+from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small_polygons
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES
 from dermis.images.io import EmbeddedPicture
@@ -29,12 +30,40 @@ USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _DECODER = "dermis.formats.usd.decoder"
 _PACKAGE = ".usdz"
 Tree = dict[str, Any]
+USD_PROPERTIES = (
+    drawn("`metersPerUnit`", "unless `--unit-mm` is given"),
+    drawn_with_note("a file without `metersPerUnit`", "its unit is USD's default, 10 mm"),
+    drawn("`upAxis`", "unless an `--up` other than `y` is given"),
+    drawn("meshes, with transforms, instances, `orientation`, holes"),
+    no_effect("meshes that are invisible or of purpose `guide` or `proxy`", "hidden in all programs"),
+    drawn("time samples", "the state at the first time"),
+    drawn("`subdivisionScheme`", "normals are used if it is `none`; `--subdivide` subdivides"),
+    drawn(
+        "primvars of each interpolation, with indices",
+        "uv (`st`, `UVMap` or the name in the material), normals, colours",
+    ),
+    drawn_with_note("several sets of uv in one mesh", "that of the first material is used"),
+    drawn(
+        "`displayColor` of a mesh without material, or read by its material",
+        "linear colours of vertices; those of faces are averaged at vertices",
+    ),
+    drawn("materials of meshes and of subsets of faces"),
+    drawn(
+        "pictures",
+        "in the package, or in the folder of the file and below; of other paths only the last part is used",
+    ),
+    drawn("sublayers, references, payloads", "from the folder of the file and below, or from the package"),
+    refused("layers in other places, value clips", "before any of them is opened"),
+    noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
+)
+"""Properties of USD files, except those of materials."""
 
 
 def read_usd(path: Path) -> MeshFile:
     """Read the meshes of a USD file at its first time, with their materials.
 
-    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder.
+    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder of
+    the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
@@ -45,9 +74,9 @@ def read_usd(path: Path) -> MeshFile:
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
     for number, mesh in enumerate(scene["meshes"]):
-        own, own_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
-        parts += own
-        notes |= dict.fromkeys(own_notes)
+        mesh_parts, mesh_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
+        parts += mesh_parts
+        notes |= dict.fromkeys(mesh_notes)
     axes = Axes(cast(Axis, scene["up"]))
     return MeshFile(parts, materials=materials, notes=tuple(notes), unit_mm=scene["unit_mm"], axes=axes)
 
@@ -67,7 +96,8 @@ def _parts(
 ) -> tuple[list[MeshPart], list[str]]:
     """Return the parts of a mesh, one for each group, and notes.
 
-    prefix : of the names of its arrays
+    answer : arrays of all meshes, see `_SceneReader.read`
+    prefix : prefix of the names of this mesh's arrays
     """
     mesh = {name.removeprefix(prefix): own for name, own in answer.items() if name.startswith(prefix)}
     check_polygon_sizes(path, mesh["counts"])
@@ -75,8 +105,8 @@ def _parts(
     missing = np.full(len(vertex), -1)
     columns = [vertex, mesh.get("uv index", missing), mesh.get("normals index", missing)]
     kept: Mask = np.asarray(mesh["group"] >= 0)
-    counts, corners = _selected(mesh["counts"], np.column_stack(columns).astype(np.int64), kept)
-    counts, corners, polygons, notes = without_small(counts, corners)
+    counts, corners = _select_polygons(mesh["counts"], np.column_stack(columns).astype(np.int64), kept)
+    counts, corners, polygons, notes = without_small_polygons(counts, corners)
     if not len(counts):
         return [], notes
     geometry = Polygons(
@@ -90,14 +120,14 @@ def _parts(
     return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
 
 
-def _selected(counts: Index, corners: Index, kept: Mask) -> tuple[Index, Index]:
-    """Return the polygons of which `kept` (n,) is true: their numbers of corners, and their corners."""
-    corner = expand_runs((np.cumsum(counts) - counts)[kept], counts[kept])[1]
-    return counts[kept], corners[corner]
+def _select_polygons(counts: Index, corners: Index, mask: Mask) -> tuple[Index, Index]:
+    """Return the polygons that a mask (n,) selects: their numbers of corners, and their corners."""
+    corner = expand_runs((np.cumsum(counts) - counts)[mask], counts[mask])[1]
+    return counts[mask], corners[corner]
 
 
 class _Pictures:
-    """Pictures of a USD file: in its package, or in its folder and below.
+    """Pictures of a USD file, from its package or from its folder and subfolders.
 
     data : bytes of the file
     """
@@ -111,13 +141,13 @@ class _Pictures:
     def material(self, tree: Tree) -> FileMaterial:
         """Return a material; pictures that are missing are left out, with a note.
 
-        tree : as `MaterialReader.read` returns it
+        tree : material as returned by `MaterialReader.read`
         """
         textures, missing = dict[Role, Texture](), dict[str, str]()
         for role, one in tree["textures"].items():
-            picture = self._find(one["file"])
+            picture = self._find_picture(one["file"])
             if picture is None:
-                missing[role] = f"its picture {one['file']!r} is not in the {self._place()}"
+                missing[role] = f"its picture {one['file']!r} is not in the {self._picture_location()}"
             else:
                 textures[role] = Texture(
                     picture, 0, tuple(one["transform"]), tuple(one["wrap"]), one["channel"]
@@ -128,10 +158,10 @@ class _Pictures:
             values[name] = tuple(values.get(name, ())) or getattr(FileMaterial(), name)
         return FileMaterial(textures=textures, missing=missing, unused=tuple(tree["unused"]), **values)
 
-    def _place(self) -> str:
+    def _picture_location(self) -> str:
         return "folder of the file" if self.package is None else "package"
 
-    def _find(self, name: str) -> PathLike | None:
+    def _find_picture(self, name: str) -> PathLike | None:
         """Return the picture with a name relative to the layers, or None."""
         if self.package is None:
             return find_referenced_file(self.path, name) if name else None

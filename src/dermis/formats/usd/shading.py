@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.base.file_properties import drawn, drawn_with_note, in_code, noted
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdShade
@@ -36,13 +37,30 @@ _WITHOUT_EFFECT = {
     "occlusion": ("picture of occlusion, which is computed from the shape", 1.0),
     "specularColor": ("specular colour", (0.0, 0.0, 0.0)),
 }
+USD_MATERIALS = (
+    drawn("`diffuseColor`, `normal`", "values and pictures"),
+    drawn("picture of the `roughness`", "squared for skin"),
+    noted("value of the `roughness`", "skin has a measured roughness", other_parts="drawn"),
+    noted("`metallic`, `emissiveColor`", "values and pictures", other_parts="drawn"),
+    noted(
+        "`opacity`, `opacityThreshold`", "values, or the alpha of the colour's picture", other_parts="drawn"
+    ),
+    noted("another picture of the `opacity`"),
+    drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
+    noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
+    noted(in_code(_WITHOUT_EFFECT), "no note for values that change nothing"),
+    drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
+    noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
+    noted("a picture that is missing"),
+)
+"""Inputs of UsdPreviewSurface and of its textures."""
 _WRAPS = {"repeat": "repeat", "mirror": "mirror"}
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 _BLACK = (0.0, 0.0, 0.0)
 
 
 class _Source(NamedTuple):
-    """Output of a shader that an input is connected to."""
+    """Output of a shader to which an input is connected."""
 
     shader: UsdShade.Shader
     output: str
@@ -51,7 +69,7 @@ class _Source(NamedTuple):
 class MaterialReader:
     """Reader of the materials of a stage.
 
-    folder : of the layers, to which names of pictures are relative
+    folder : folder of the layers, to which the names of pictures are relative
     """
 
     def __init__(self, path: Path, folder: Path, time: Usd.TimeCode) -> None:
@@ -61,7 +79,7 @@ class MaterialReader:
     def read(self, material: UsdShade.Material) -> Tree:
         """Return a material as keyword arguments of `FileMaterial`, with its textures as trees.
 
-        "uv" and "vertex_colours" name the primvars of its texture coordinates and vertex colours.
+        The entries "uv" and "vertex_colours" are names of primvars.
         """
         tree: Tree = {"name": material.GetPrim().GetName(), "textures": {}, "unused": []}
         surface = material.ComputeSurfaceSource()[0]
@@ -76,16 +94,16 @@ class MaterialReader:
             if (source := self._source(surface, name)) is not None:
                 self._add_source(tree, name, role, source)
         self._add_opacity(tree, surface, values)
-        self._add_unused(tree, surface)
-        return _as_unlit(tree)
+        self._list_unused_inputs(tree, surface)
+        return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, name: str, role: str, source: _Source) -> None:
-        """Add what an input is connected to: a texture, or colours of vertices."""
+    def _add_source(self, tree: Tree, input_name: str, role: str, source: _Source) -> None:
+        """Add the texture or the vertex colours to which an input is connected."""
         kind = str(source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             tree |= {"vertex_colours": self._text(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
         elif kind != "UsdUVTexture":
-            tree["unused"].append(f"{name} from {kind}")
+            tree["unused"].append(f"{input_name} from {kind}")
         else:
             texture = self._texture(source, tree)
             tree["textures"][role] = texture
@@ -93,7 +111,7 @@ class MaterialReader:
             if role == "normal":
                 tree["normal_scale"] = 0.5 * factor[0] if bias[0] else 1.0
             elif any(bias[: len(factor)]):
-                tree["unused"].append(f"bias of the picture of {name}")
+                tree["unused"].append(f"bias of the picture of {input_name}")
             if role in ("colour", "emission"):
                 tree[role] = factor[:3]
             elif role != "normal":
@@ -123,7 +141,7 @@ class MaterialReader:
         }
 
     def _transform(self, shader: UsdShade.Shader) -> list[float]:
-        """Return the transform of uv with v down, see `Texture`; that of the shader has v up."""
+        """Convert the shader's transform, which has v up, to a transform of uv with v down, see `Texture`."""
         angle = math.radians(self._value(shader, "rotation", 0.0))
         (x, y), (scale_x, scale_y) = (
             self._value(shader, name, default)
@@ -134,7 +152,7 @@ class MaterialReader:
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
     def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
-        """Add the opacity; a picture of it must be the alpha of the picture of the colour."""
+        """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
         source, cutoff = self._source(surface, "opacity"), values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
@@ -147,14 +165,14 @@ class MaterialReader:
         tree |= {"alpha": 1.0 if source is not None else values["opacity"]}
         tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
-    def _add_unused(self, tree: Tree, surface: UsdShade.Shader) -> None:
+    def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
         for name, (text, neutral) in _WITHOUT_EFFECT.items():
             value = self._value(surface, name, neutral)
             if value != neutral or self._source(surface, name) is not None:
                 tree["unused"].append(text)
 
     def _file(self, texture: UsdShade.Shader) -> str:
-        """Return the name of a picture relative to the folder of the layers; if it is outside, as written."""
+        """Return a picture's name relative to the folder of the layers, or unchanged if it is outside."""
         for attribute in self._attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
@@ -162,38 +180,38 @@ class MaterialReader:
             return file.relative_to(self.folder).as_posix() if file.is_relative_to(self.folder) else name
         return ""
 
-    def _attributes(self, shader: UsdShade.Shader, name: str) -> list[Usd.Attribute]:
-        """Return the attributes that provide the value of an input, through interfaces of materials."""
-        entry = shader.GetInput(name)
+    def _attributes(self, shader: UsdShade.Shader, input_name: str) -> list[Usd.Attribute]:
+        """Return the attributes from which an input gets its value, found through its connections."""
+        entry = shader.GetInput(input_name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
-    def _source(self, shader: UsdShade.Shader, name: str) -> _Source | None:
-        """Return the output of a shader that an input is connected to, or None."""
-        for attribute in self._attributes(shader, name):
+    def _source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
+        """Return the output to which an input of a shader is connected, or None."""
+        for attribute in self._attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
                 return _Source(self.shade.Shader(attribute.GetPrim()), output)
         return None
 
-    def _value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
-        """Return the constant value of an input as numbers; the default if it has none."""
-        for attribute in self._attributes(shader, name):
+    def _value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
+        """Return the constant value of an input as numbers, or the default."""
+        for attribute in self._attributes(shader, input_name):
             if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
                 numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
                 if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
-                    actual = f"{name} of {shader.GetPath()} is not"
+                    actual = f"{input_name} of {shader.GetPath()} is not"
                     refuse(self.path, "finite numbers in materials", actual, "Correct it, or export again")
                 return numbers
         return default
 
-    def _text(self, shader: UsdShade.Shader, name: str) -> str:
-        values = [attribute.Get(self.time) for attribute in self._attributes(shader, name)]
+    def _text(self, shader: UsdShade.Shader, input_name: str) -> str:
+        values = [attribute.Get(self.time) for attribute in self._attributes(shader, input_name)]
         return str(next((value for value in values if value is not None), ""))
 
 
-def _as_unlit(tree: Tree) -> Tree:
-    """Return a material in which the emission of an unlit scan is the colour of the surface."""
+def _emission_to_colour(tree: Tree) -> Tree:
+    """Return a material; a picture of emission over a black colour, as in unlit scans, becomes the colour."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]

@@ -98,12 +98,12 @@ def environment_record(
     environment: Environment | None,
     skin: Skin,
     albedo: NDArray[np.float64],
-    occluded: bool,
+    has_occlusion: bool,
 ) -> UniformRecord:
     """Return the uniform record of the environment: rotation, exposure and lobes of reflections.
 
-    albedo : (3,) albedo of the profile as the frame uses it [-]
-    occluded : whether the head hides part of the environment from its skin
+    albedo : (3,) albedo of skin where its colour map is white [-]
+    has_occlusion : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
         return program.record("Environment")
@@ -113,6 +113,6 @@ def environment_record(
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,
         albedo=np.minimum(albedo, 1.0),
-        occluded=int(occluded),
+        occluded=int(has_occlusion),
         mirrors=isotropic_lobe_table(lobe_name(skin)).reshape(-1, 4),
     )

@@ -150,7 +150,7 @@ def light_sample_points() -> Floats:
 
 
 def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
-    """Return the members of the shader struct `Light` that are not 0.
+    """Return the members of the shader struct `Light`; those that are left out are 0.
 
     siblings : number of parts into which the light is divided, this part included
     """

@@ -10,7 +10,7 @@ from dermis.frame.lights.kind import Kind, Members, area_light_members
 from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
-_MAX_PART_RATIO = 0.35  # side of a part over its distance
+_MAX_PART_RATIO = 0.35  # largest ratio of a part's side to the light's distance from its target
 _MAX_PARTS = 3  # along each side
 
 

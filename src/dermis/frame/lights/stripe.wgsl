@@ -2,7 +2,7 @@
 
 const STRIPE_VARIANCE: f32 = 0.25; // relative to the square of the half width
 
-// Irradiance relative to the centre at a distance in half widths, convolved with a Gaussian of the added variance.
+// Irradiance at a distance from the centre [half widths] relative to the centre, blurred by a Gaussian of variance `added`.
 fn stripe_across(distance: f32, added: f32) -> f32 {
     let variance = STRIPE_VARIANCE + added;
     return sqrt(STRIPE_VARIANCE / variance) * exp(-0.5 * distance * distance / variance);

@@ -60,7 +60,7 @@ class GpuGems3(AtlasTechnique):
         return float(FORMAT_BYTES[HALF_FORMAT] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return 0 for each level, as all levels have the full resolution."""
+        """Return how often the resolution of each level is halved: 0, as all have the full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
@@ -96,7 +96,7 @@ class GpuGems3(AtlasTechnique):
     def blur_program(self, device: Device, constants: Constants) -> ComputeProgram | RenderProgram:
         """Return the program that blurs light and the stretch map along one axis.
 
-        constants : pipeline constants of the axis and of the treatment of empty texels
+        constants : pipeline constants that select the axis, and whether empty texels are skipped
         """
         return program(device, Path(__file__).with_name("gpu_gems_3.wgsl"), constants)
 
@@ -110,7 +110,7 @@ class GpuGems3(AtlasTechnique):
     ) -> None:
         """Declare one blur pass, which writes a texture of light and one of the stretch map.
 
-        bound : resources of the shader that it reads
+        bound : resources that the shader reads
         into : textures for blurred light and for the blurred stretch map
         side : side of the atlas [texels]
         """

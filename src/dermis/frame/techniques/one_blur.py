@@ -22,15 +22,15 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Return the single Gaussian as blurred, without corrections for light that varies within a texel."""
+        """Split a profile into one Gaussian that blurs, without corrections for light within a texel."""
         return AtlasTechnique.split(self, profile, normalise)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return False: all light is blurred."""
+        """Return whether unblurred light replaces the narrowest Gaussian: False, as all light is blurred."""
         return False
 
     def stretch(self, settings: Settings) -> str:
-        """Return "none": blurs assume the same texel density over the whole map."""
+        """Return the stretch correction, "none": blurs assume the same texel density over the whole map."""
         return "none"
 
 

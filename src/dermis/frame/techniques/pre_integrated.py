@@ -70,10 +70,10 @@ class PreIntegratedSkin(Technique):
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Declare the passes that compute curvature, and return the tables instead of light on an atlas."""
-        resources, own = inputs.resources, inputs.resources.technique
-        assert resources.shape.curvature is not None and isinstance(own, PreIntegratedTables)
+        resources, tables = inputs.resources, inputs.resources.technique
+        assert resources.shape.curvature is not None and isinstance(tables, PreIntegratedTables)
         graph.repeat(curvature.draw, resources.head, resources.shape.curvature)
-        return own.table
+        return tables.table
 
 
 TECHNIQUE = PreIntegratedSkin()
@@ -111,7 +111,7 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     """Return max(N.L, 0) convolved on the sphere with exp(k cos a), normalised; a is the central angle [-].
 
     cosines : values of N.L at which the result is evaluated [-]
-    concentration : k, the squared radius of the sphere over the variance of the Gaussian [-]
+    concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]
     """
     from scipy.special import i0e
 

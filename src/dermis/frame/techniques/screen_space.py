@@ -30,9 +30,8 @@ from dermis.scene.camera import Window
 from dermis.scene.settings import Settings
 
 TECHNIQUES_FOLDER = Path(__file__).parent
-_MAX_TAIL = (
-    5e-4  # largest fraction of the light of a channel that may lie beyond the kernel's reach on one side
-)
+# Largest fraction of the light of a channel that may lie beyond the kernel's reach on one side.
+_MAX_TAIL = 5e-4
 _MIN_REACH_MM, _MAX_REACH_MM = 0.01, 400.0
 _ENTRY_COUNT = 256
 
@@ -45,7 +44,7 @@ class SubsurfaceLayers(TechniqueResources):
     subsurface, transmittance : views of these two layers
     scratch : light that is diffused along rows but not yet along columns
     result : finished picture, None for outputs, which need only the light below the skin
-    kernel : kernel of the profile, None for outputs, which use that of the picture
+    kernel : kernel of the profile, None for outputs, which use the kernel of the picture
     """
 
     layers: Texture
@@ -90,9 +89,9 @@ class ScreenSpace(Technique):
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
         """Declare the passes that diffuse the light below the skin, and return the finished picture."""
-        own = inputs.resources.technique
-        assert isinstance(own, SubsurfaceLayers) and own.kernel is not None
-        return draw(graph, own, own.kernel, inputs.window, radiance)
+        layers = inputs.resources.technique
+        assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
+        return draw(graph, layers, layers.kernel, inputs.window, radiance)
 
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
@@ -102,13 +101,10 @@ class ScreenSpace(Technique):
         The result is texture views of the diffused light, and of the fraction of it that leaves towards the
         camera.
         """
-        layers, own = inputs.resources.output_layers, inputs.resources.technique
-        assert (
-            isinstance(layers, SubsurfaceLayers)
-            and isinstance(own, SubsurfaceLayers)
-            and own.kernel is not None
-        )
-        draw_blur(graph, layers, own.kernel, inputs.window)
+        layers, picture_layers = inputs.resources.output_layers, inputs.resources.technique
+        assert isinstance(layers, SubsurfaceLayers) and isinstance(picture_layers, SubsurfaceLayers)
+        assert picture_layers.kernel is not None
+        draw_blur(graph, layers, picture_layers.kernel, inputs.window)
         return layers.subsurface, layers.transmittance
 
 

@@ -3,7 +3,7 @@
 override AXIS: u32 = 0u; // 0 along rows, 1 along columns
 
 const TAPS: u32 = 16u; // on each side; consecutive pixels if these cover the reach, else at increasing distances
-const MAX_SLOPE: f32 = 4.0; // change of depth over width within one surface
+const MAX_SLOPE: f32 = 4.0; // largest ratio of a change of depth to the width within one surface
 
 struct Blur {
     half: vec2f, // half size of the picture on a plane at distance 1
@@ -13,7 +13,7 @@ struct Blur {
 
 @group(0) @binding(0) var<uniform> blur: Blur;
 @group(0) @binding(1) var source: texture_2d<f32>; // light below the skin; alpha is depth [mm], 0 without skin
-@group(0) @binding(2) var kernel: texture_2d<f32>; // fraction of the light on one side up to a distance, over its square root
+@group(0) @binding(2) var kernel: texture_2d<f32>; // fraction of the light on one side up to a distance, tabulated by the square root of the distance
 @group(0) @binding(3) var blurred: texture_storage_2d<rgba32float, write>;
 
 // Position of a pixel's surface in camera space [mm].

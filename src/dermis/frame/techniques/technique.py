@@ -63,7 +63,7 @@ class Technique(TechniqueTraits):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper, here none; return the split and their levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper (here none); return the split and new levels.
 
         edge : filter mode at the edges of charts
         """
@@ -140,7 +140,7 @@ class AtlasTechnique(Technique):
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return whether the narrowest Gaussian is relit in the picture instead of blurred."""
+        """Return whether unblurred light, evaluated per pixel, replaces the narrowest Gaussian."""
         return bool(profile.variance_mm2[0] <= _RELIT_MM2)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
@@ -178,7 +178,7 @@ class AtlasTechnique(Technique):
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
             return resources.scattered
-        for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
+        for index, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
             into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_FILTER_SIGMA
             graph.repeat(draw_stretch, layout.head, layout.atlas)
             if layout.gutter_update:
@@ -197,9 +197,9 @@ class AtlasTechnique(Technique):
             target = mixture.sum_layer(0) if mixture else layout.scattered
             graph.repeat(self.sum_exitance, levels, blur, layout.translucency, target)
             if mixture:
-                mix.draw_blend_weights(graph, layout, mixture, number)
+                mix.draw_blend_weights(graph, layout, mixture, index)
                 graph.repeat(
-                    self.add_other_profiles, levels, blur, layout.atlas, mixture, number, layout.scattered
+                    self.add_other_profiles, levels, blur, layout.atlas, mixture, index, layout.scattered
                 )
         if len(layouts) > 1:
             draw_blend(graph, layouts[0], layouts[1], resources.scattered)

@@ -25,7 +25,7 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Split a profile into relit and blurred Gaussians; `fine` describes light that varies in a texel.
+        """Split a profile into relit and blurred Gaussians; `fine` serves light that varies within a texel.
 
         normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
         """
@@ -36,7 +36,7 @@ class TextureSpace(AtlasTechnique):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and the inserted levels.
 
         edge : filter mode at the edges of charts
         """

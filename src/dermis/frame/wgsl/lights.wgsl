@@ -20,7 +20,7 @@ struct Light {
     half_u: vec3f, // half sides [mm]; of a stripe the axes divided by its half sides [1/mm]
     cos_outer: f32,
     half_v: vec3f,
-    texel: f32, // side of a shadow texel [mm]; of a map with perspective at 1 mm from the light
+    texel: f32, // side of a shadow texel [mm]; in maps with perspective, of one at a distance of 1 mm from the light
     map_right: vec3f, // axes of the shadow map
     map_near: f32, // depth at which the map stores 1 [mm]
     map_up: vec3f,
@@ -74,7 +74,7 @@ fn towards_light(light: Light, p: vec3f) -> vec3f {
     return normalize(light.position - p);
 }
 
-// Number of directions that a light is sampled from.
+// Number of directions in which a light is sampled.
 fn parts_of(light: Light) -> u32 {
     return select(1u, light.side * light.side, SHAPES);
 }

@@ -6,7 +6,7 @@ override TEAM: u32 = 1u; // invocations per group: a power of two up to EACH
 var<workgroup> part: array<vec4f, EACH>;
 
 // Sum over a group, valid in its first invocation; all invocations of the workgroup must call it.
-fn of_team(value: vec4f, lane: u32) -> vec4f {
+fn team_sum(value: vec4f, lane: u32) -> vec4f {
     if (TEAM == 1u) {
         return value;
     }

@@ -71,7 +71,7 @@ class RootFrames:
 class GrowthSurface:
     """Surface that hair grows on: the subdivided head with its control mesh.
 
-    head, control_mesh : subdivided head, and its mesh before subdivision, on whose quads roots are given
+    head, control_mesh : subdivided head, and its mesh before subdivision, on whose quads roots are defined
     skin : smooth surface over which hairs lie
     hair_fraction : fraction of hairs to generate; the hairs are widened by its inverse to keep coverage
     """

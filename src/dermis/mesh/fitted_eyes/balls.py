@@ -15,24 +15,24 @@ RADIUS_RANGE_MM = 8.0, 20.0
 """Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
 MAX_DEVIATION = 0.06
 """Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
-_MIN_POINTS = 20  # points
-_MIN_COVERED = 0.25  # fraction of the sphere
+_MIN_POINTS = 20
+_MIN_COVERED = 0.25  # fraction of the sphere that an eyeball covers
 _MAX_PART_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
 _FOCUS_MM = 1000.0  # distance of the point that eyes without a cornea look at
 _FIT_ITERATIONS = 12
 _MIN_BULGE, _MIN_CORNEA = 0.025, 0.045
-"""Heights above the sphere, in radii: that of points which may be a cornea, and least height of a cornea."""
+"""Least height above the sphere of points that may belong to a cornea, and of a cornea's apex, in radii."""
 _MIN_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
 _DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere than its `deviation`
 
 
 @dataclass(frozen=True, eq=False)
 class DetectedEyeball:
-    """Eyeball found in a file.
+    """Eyeball detected in a file.
 
     sphere : sphere fitted to the sclera
     gaze : (3,) unit vector of the direction of gaze
-    cornea : whether `gaze` is that of a bulging cornea; else the eye is assumed to look straight ahead
+    cornea : whether a bulging cornea determines `gaze`; otherwise the eye is assumed to look straight ahead
     points : (n,) indices of the mesh points that belong to the eyeball
     """
 
@@ -44,6 +44,8 @@ class DetectedEyeball:
 
 @dataclass(frozen=True, eq=False)
 class _EyePiece:
+    """Connected component of the triangles that a file declares to be eyes, with a fitted sphere."""
+
     points: Index
     area: Doubles  # around each point [mm2]
     sphere: Sphere
@@ -54,7 +56,7 @@ class _EyePiece:
 
     @property
     def fault(self) -> str:
-        """Return why this connected piece is not an eyeball, as a verb phrase; empty if it is one."""
+        """Return why this component is not an eyeball, as a phrase such as "is a ..."; empty if it is one."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
@@ -94,11 +96,11 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
     eye_triangles : (n,) indices of the triangles whose material is declared to be an eye
     """
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
-    points, own = np.unique(corners, return_inverse=True)
-    own = own.reshape(-1, 3)
-    label = components(len(points), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
+    points, triangles = np.unique(corners, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    label = components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
     thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[eye_triangles]]) / 3, 3)
-    area = np.bincount(own.ravel(), thirds, minlength=len(points))
+    area = np.bincount(triangles.ravel(), thirds, minlength=len(points))
     positions = mesh.points_mm[points]
     pieces = []
     for piece in range(int(label.max()) + 1):
@@ -118,8 +120,8 @@ def _add_gaze(
 ) -> tuple[DetectedEyeball, DetectedEyeball]:
     """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
 
-    left, right : pieces that are the scleras
-    pieces : all pieces; those inside a sclera belong to its eyeball
+    left, right : connected components that are the scleras
+    pieces : all connected components of the eyes; those inside a sclera belong to its eyeball
     """
     positions = mesh.points_mm
     centre = (left.sphere.centre + right.sphere.centre) / 2
@@ -139,8 +141,7 @@ def _add_gaze(
 class Sphere(NamedTuple):
     """Sphere fitted to points.
 
-    centre : (3,) [mm]
-    radius : [mm]
+    centre, radius : (3,) centre and radius of the sphere [mm]
     deviation : 85th percentile by area of the points' distance from the sphere, divided by the radius [-]
     """
 

@@ -14,21 +14,21 @@ from dermis.mesh.rotations import matrix_angles, rigid_motion
 
 _ROOT_NAME, _BONE_NAMES = "scene", ("eye.L", "eye.R")
 _MAX_OTHER_FOLLOWERS = 0.05
-"""Of the points that follow a bone: with more beside the eye's, it is the head's and not the eye's."""
-_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02
+"""Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
+_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
 
 class FittedEyeball(NamedTuple):
     """Fitted eyeball that replaces an eyeball of a file.
 
-    centre : (3,) [mm]
+    centre : (3,) centre of the ball [mm]
     points : (n, 3) control points of the fitted eyeball [mm]
-    replaced : (m,) indices of the control points of the file's eyeball
+    replaced_points : (m,) indices of the control points of the file's eyeball
     """
 
     centre: Doubles
     points: Doubles
-    replaced: Index
+    replaced_points: Index
 
 
 def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
@@ -45,7 +45,7 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
         rotations += own
         points = begin + np.arange(len(eyeball.points))
         targets = _with_shifts(targets, shifts, points)
-        followers.append(RigidFollowers(eyeball.replaced.astype(np.int32), points.astype(np.int32)))
+        followers.append(RigidFollowers(eyeball.replaced_points.astype(np.int32), points.astype(np.int32)))
     positions = np.concatenate([rig.positions_mm, *(one.points for one in eyeballs)]).astype(np.float32)
     return replace(
         rig,
@@ -109,7 +109,7 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
 
 def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
     """Return the number of points of the file's eyeball that follow each bone, weighted, (b,)."""
-    bone, weight = skeleton.bone[eyeball.replaced], skeleton.weight[eyeball.replaced]
+    bone, weight = skeleton.bone[eyeball.replaced_points], skeleton.weight[eyeball.replaced_points]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
@@ -141,8 +141,8 @@ def _rigid_targets(
     bone : name of the eyeball's bone
     origin_mm : (3,) position of its joint [mm]
     """
-    rest = rig.positions_mm[eyeball.replaced].astype(np.float64)
-    deltas = rig.targets.dense(eyeball.replaced, len(rig.positions_mm)).astype(np.float64)
+    rest = rig.positions_mm[eyeball.replaced_points].astype(np.float64)
+    deltas = rig.targets.dense(eyeball.replaced_points, len(rig.positions_mm)).astype(np.float64)
     rotations, shifts = list[BoneRotation](), dict[int, Doubles]()
     for index, delta in enumerate(deltas):
         if np.abs(delta).max(initial=0.0) < _MIN_SHIFT_MM:

@@ -28,7 +28,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_GRID_SIDE = 2 * eyeball.SIDE  # as fine as the human model's after a level of subdivision
+_GRID_SIDE = 2 * eyeball.SIDE  # quads along a cube edge, as many as the human has after one subdivision
 _MATERIAL_NAMES = "left eye", "right eye"
 _INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
@@ -54,9 +54,9 @@ class _EyeShape(NamedTuple):
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
-    The fitted eyeballs have the radius and position of those of the file, look along the axis of their
-    corneas or straight ahead, and follow their bones and morph targets rigidly. If the file has no two
-    eyeballs, the head is returned unchanged, with the reason in its `note`.
+    The fitted eyeballs have the radius and position of the file's eyeballs, look along the axis of the file's
+    corneas or else straight ahead, and move rigidly by the bones and morph targets of the file's eyeballs. If
+    two eyeballs are not found in the file, the head is returned unchanged, with the reason in its `note`.
 
     coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
     look : appearance of the eyes
@@ -65,19 +65,20 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     balls, reason = find_eyeballs(coarse or mesh)
     if balls is None:
         return replace(head, note=reason)
-    replaced = _ball_triangles(mesh, control.stencils, balls)
-    shapes = _eye_shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(replaced), axis=0), balls)
+    ball_triangles = _ball_triangles(mesh, control.stencils, balls)
+    shapes = _eye_shapes(
+        np.delete(mesh.positions[mesh.triangles], np.concatenate(ball_triangles), axis=0), balls
+    )
     points, quads = build_eyeball(_GRID_SIDE)
     pairs = list(zip(balls, shapes, strict=True))
     eyeballs = [
         FittedEyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs
     ]
-    vertex_point = mesh.point if control.vertex_point is None else control.vertex_point
-    rig = with_eyeballs(replace(control, vertex_point=vertex_point), eyeballs)
+    rig = with_eyeballs(control, eyeballs)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
         rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
-    new_mesh = _replace_eyeballs(mesh, replaced, [one.points for one in eyeballs], quads)
+    new_mesh = _replace_eyeballs(mesh, ball_triangles, [one.points for one in eyeballs], quads)
     starts = np.array([begin, begin + count], np.int32)
     apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_GRID_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
@@ -92,7 +93,7 @@ def _ball_triangles(
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
-    stencils : of a subdivided mesh; None if it is not subdivided
+    stencils : stencils of a subdivided mesh; None if it is not subdivided
     """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
@@ -158,18 +159,18 @@ def _extend_stencils(stencils: Stencils, begin: int, count: int) -> Stencils:
 
 
 def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index) -> Mesh:
-    """Return a mesh with fitted eyeballs instead of those of the file; other points keep their indices.
+    """Return a mesh with fitted eyeballs in place of the file's eyeballs; other points keep their indices.
 
     balls : indices of the triangles of each eyeball of the file
     positions : (n, 3) points of each fitted eyeball [mm]
-    quads : (q, 4) of a fitted eyeball
+    quads : (q, 4) quads of a fitted eyeball
     """
     remains = np.ones(len(mesh.triangles), bool)
     remains[np.concatenate(balls)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
-    replaced = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
-    pairs = zip(_MATERIAL_NAMES, replaced, strict=True)
+    old_materials = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
+    pairs = zip(_MATERIAL_NAMES, old_materials, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
     new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
@@ -192,7 +193,7 @@ def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Mat
     """Return one mesh of both fitted eyeballs, each with its own material.
 
     positions : (n, 3) points of each eyeball [mm]
-    quads : (q, 4) of an eyeball
+    quads : (q, 4) quads of an eyeball
     """
     count, faces = len(positions[0]), len(quads)
     return build_mesh(

@@ -14,9 +14,9 @@ from dermis.mesh.geometry import cross_2d, expand_runs
 
 _RAYS_PER_SIDE, _HALF_SIDE_RADII = 49, 0.9
 """Rays along each side of the square before the eye, and half its side in radii of the ball."""
-_IRIS_HALF_WIDTH = 0.25  # in radii
-_IRIS_ABOVE_CENTRE = 0.08  # of the opening's height: the upper lid covers the iris, the lower one touches it
-_MAX_OPEN_ENDS = 0.3  # fraction of the rays at an end of the opening; with more there is no lid
+_IRIS_HALF_WIDTH = 0.25  # half the width of the iris in radii of the ball
+_IRIS_ABOVE_CENTRE = 0.08  # fraction of the opening's height; the upper lid covers part of the iris
+_MAX_OPEN_ENDS = 0.3  # largest fraction of rays at an end of the opening that meet no lid
 _MAX_ANGLE = np.radians(15.0)
 _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
 """Largest height of a cornea above a lid that touches the ball, and least height above the ball."""
@@ -44,12 +44,12 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return how far in front of the ball's centre rays meet it (n,) [mm]; 0 for rays that miss it."""
+        """Return how far in front of the ball's centre rays hit the ball (n,) [mm]; 0 for misses."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return how far in front of the ball's centre each ray meets the frontmost lid or skin (n,) [mm].
+        """Return how far in front of the ball's centre rays first meet lids or other skin (n,) [mm].
 
         The distance is -inf for rays that meet none.
         """

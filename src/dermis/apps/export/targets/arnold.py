@@ -36,7 +36,7 @@ class Arnold(JsonTarget):
         return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the width of a fitted Burley profile as the radius, which is a mean free path in Arnold."""
+        """Return the width of a fitted Burley profile as the radius; Arnold expects a mean free path."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

@@ -38,9 +38,9 @@ MAP_SIDES = tuple(1 << k for k in range(8, 14))
 _MAX_PNG_LEVEL, _WHITE_PERCENTILE = 65535, 99.9
 _LOGGER = logging.getLogger("dermis")
 PngEncoding = Literal["colour", "light", "normal", "fraction", "range", "root", "none"]
-"""Encoding of a map as PNG: 8-bit sRGB; 8-bit sRGB of light divided by its 99.9th percentile; a normal n as
-(n + 1) / 2 in 16 bits; a fraction in 16 bits; the range from minimum to maximum in 16 bits; the square root
-in 16 bits; no PNG."""
+"""Encoding of a map as PNG. "colour": 8-bit sRGB; "light": 8-bit sRGB of light divided by its 99.9th
+percentile; "normal": a normal n as (n + 1) / 2 in 16 bits; "fraction": a value from 0 to 1 in 16 bits;
+"range": the interval from minimum to maximum in 16 bits; "root": the square root in 16 bits; "none": none."""
 _SCATTERED_NAME = "scattered"
 _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
@@ -96,7 +96,9 @@ class MapFolder(Target):
         """Return the size of the maps, the direction of green, and whether to display the diffused light."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
-            Parameter("normal_green", self._green, "-", "direction of green: towards row 0, or away from it"),
+            Parameter(
+                "normal_green", self._normal_y, "-", "direction of green: towards row 0, or away from it"
+            ),
             Parameter(_SCATTERED_NAME, True, "-", "the light to display is the diffused one, scattered.exr"),
         )
 
@@ -120,10 +122,10 @@ class MapFolder(Target):
         scene, side = subject.scene, check_side(self.side)
         settings = Settings(atlas=min(max(side, MAP_SIDES[0]), _MAX_ATLAS_SIDE))
         baked = bake_maps(Renderer(self.adapter), scene, settings, side)
-        return write_files(output, map_files(baked, scene, self._green))
+        return write_files(output, map_files(baked, scene, self._normal_y))
 
     @property
-    def _green(self) -> NormalY:
+    def _normal_y(self) -> NormalY:
         return "down" if self.variant == "directx" else "up"
 
 
@@ -185,7 +187,7 @@ def check_side(side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
-    """Return the skin's maps in the scene's light, with the height map if the head has one.
+    """Return the skin's maps with the scene's light baked, including the height map if the head has one.
 
     side : side of the maps [texel]
     """
@@ -202,7 +204,7 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -
 
 
 def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each map's OpenEXR and PNG files, then of the JSON that describes them."""
+    """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them."""
     described: dict[str, Ranges] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked.maps:
@@ -250,7 +252,7 @@ def _maps_description(
 
 
 def resample(values: Floats, side: int) -> Floats:
-    """Return a square map resampled from (h, w) by averaging, or by linear interpolation where enlarged.
+    """Return a map (h, w) resampled to a square: halved by averaging if possible, then interpolated linearly.
 
     side : side of the returned map [texel]
     """

@@ -93,7 +93,7 @@ def solve_normal_equations(gram: Floats, right: Floats) -> Floats:
 
 
 def mixing_matrix(suns: int) -> Floats:
-    """Return the matrix (9 + k, n + k) from the strengths of distributed lobes to those of ambient lobes.
+    """Return the matrix (9 + k, n + k) that converts strengths of distributed lobes to ambient lobes.
 
     The n distributed lobes are those of `lobe_mixtures`, and the 9 ambient lobes those of `lobe_directions`;
     the strengths of k suns follow in both and do not change. Non-negative strengths of the distributed lobes

@@ -24,25 +24,25 @@ COAT_INDEX = SKIN_ETA
 GRID_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
-"""Half the side of the albedo grid, over the height of the picture, and its lower limit."""
+"""Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
 _COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
-_SAMPLES_PER_VOXEL = 3.0  # samples per area of a voxel's side
+_SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
-_MIN_ROOT = 0.01
+_MIN_ROOT = 0.01  # smallest tabulated square root of 1 - albedo
 _PHOTONS = 40_000
 
 
 @cache
 def _albedo_table() -> tuple[Doubles, Doubles]:
-    """Return diffuse albedos of half-spaces, and the square root of 1 minus their scattering albedo."""
+    """Return tabulated diffuse albedos of half-spaces, and sqrt(1 - single-scattering albedo) of each."""
     absorption_root = np.linspace(1.0, _MIN_ROOT, 32)
     return np.array([diffuse_albedo(float(1.0 - one**2)) for one in absorption_root]), absorption_root
 
 
 def single_scattering_albedo(colour: ArrayLike) -> Doubles:
-    """Return the single-scattering albedo of half-spaces with a given diffuse albedo [-].
+    """Return the single-scattering albedo of half-spaces that have a given diffuse albedo under the coat [-].
 
-    colour : diffuse albedo below the coat
+    colour : diffuse albedo of the medium as seen through the coat, which transmits `COAT_TRANSMITTANCE`
     """
     diffuse_albedos, absorption_root = _albedo_table()
     clipped = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
@@ -54,7 +54,7 @@ def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
 
     The mean distances in media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
 
-    colour : (3,) diffuse albedo of the medium
+    colour : (3,) diffuse albedo of the medium as seen through the coat
     distance_mm : (3,) mean lateral offset of exit points [mm]
     """
     pairs = zip(single_scattering_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
@@ -96,9 +96,9 @@ def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: 
 
 
 def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Return the low and high corner (3,) of the visible part of the head, in which albedos vary [mm].
+    """Return the low and high corner (3,) of a box around the visible part of the head [mm].
 
-    Outside this box the albedo is constant.
+    Albedos vary inside this box, and are constant outside.
     """
     half_side = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
@@ -116,9 +116,9 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
-    """Return the skin colour (z, y, x, 3) in each cell of a box, by the nearest skin.
+    """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
 
-    Cells deeper inside have the mean colour.
+    Cells farther from the skin than the colour reaches have the mean colour.
 
     low, high : (3,) corners of the box [mm]
     voxels : number of cells along the longest side

@@ -132,13 +132,13 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return shapes of the head without hair whose skin emits radiance 1, for the image of the coverage."""
+    """Return the shape of the head without hair, which emits radiance 1, for the image of the coverage."""
     emitter, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
 def person_key(scene: Scene, person: Person, mean_free_path_mm: Doubles, trace_settings: str) -> str:
-    """Return a hash of all inputs of a path-traced person, which names the cached passes.
+    """Return a hash of all inputs of a path-traced person, used as the name of the cached passes.
 
     trace_settings : versions and settings of the path tracer
     """

@@ -24,8 +24,8 @@ class SkinTextures:
     height_mm : (n, n) relief of the skin [mm]
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
     reach_mm : half the side of the iris texture [mm]
-    white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: half a turn from the axis
-        is 0.49 of the side from the middle
+    white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: the distance from the
+        middle is proportional to the angle from the axis, and 180 degrees are 0.49 of the side
     teeth : (k, k, 3) textures of the upper and of the lower teeth by their uv
     """
 
@@ -60,8 +60,8 @@ class HairFibres:
 class Person:
     """Posed head with its textures; positions are relative to the head's centre [mm].
 
-    eyes : (m, 4, 4) transforms from head space to the space of each eye, in mm of an average eye, with z
-        along its axis
+    eyes : (m, 4, 4) transforms from head space to the space of each eye, in which every eye has
+        the size of an average eye [mm] and z is along its axis
     eye_materials : (m,) material indices of the eyes, whose triangles are replaced by refracting eyeballs
     """
 

@@ -26,8 +26,9 @@ def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     """Return the BSDF of skin that reflects like a rough dielectric and transmits without refraction.
 
-    No path to a point light crosses a refracting surface. So light passes this surface straight on, except
-    for a small fraction of it that meets a rough dielectric, whose reflectance is scaled up by that fraction.
+    Paths cannot connect to a point light through a refracting surface. Therefore most light passes this
+    surface undeflected. A small fraction meets a rough dielectric, whose reflectance is divided by this
+    fraction.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
     mirror = {
@@ -82,13 +83,13 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CORNEA_INDEX = 1.336
-"""Index of refraction behind the cornea's front surface: that of the aqueous humour [-]."""
+"""Index of refraction of the aqueous humour, used behind the cornea's front surface [-]."""
 TEAR_ROUGHNESS = 0.06
 """Roughness of the tear film over the white of the eye [-]."""
 LIMBUS_BLUR_MM = 0.55
 """Half the width of the transition from white to cornea [mm]."""
 EYE_UV_RADIUS = 0.49
-"""Distance in uv from the middle that corresponds to half a turn from the axis."""
+"""Distance in uv from the middle of the texture that corresponds to 180 degrees from the eye's axis."""
 _STEPS_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
 """Steps of the eyeball mesh around the axis, and from the apex over cornea and sclera."""
 _TEXTURE_SIDE = 1024

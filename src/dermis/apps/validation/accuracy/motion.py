@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -15,6 +15,7 @@ from dermis.apps.validation.pages import DOCS, add_tests_to_path, data_file, fil
 from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
+from dermis.frame.features.translucency.pair_shape import StrainGauge
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Texture, download
 from dermis.human.expressions import expression
@@ -46,6 +47,14 @@ EXPRESSIONS: dict[str, dict[str, float]] = {
     "jaw aside": expression("jaw-aside"),
     "wink": expression("wink"),
 }
+DEFORMATIONS: dict[str, Callable[[Points], Points]] = {
+    "10 % narrower": lambda points: (points * [0.9, 1.0, 1.0]).astype(np.float32),
+    "15 % larger": lambda points: (points * 1.15).astype(np.float32),
+    "waves of 1.6 mm": lambda points: (points + 1.6 * np.sin(points[:, [1, 2, 0]] / 8)).astype(np.float32),
+    "ears 20 % thinner": lambda points: _with_thinner_ears(points, 0.2),
+    "ears 40 % thinner": lambda points: _with_thinner_ears(points, 0.4),
+}
+"""Positions (p, 3) of a mesh sequence from those of the head at rest."""
 LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 OCCLUSION_ATLAS_SIDE = 512
@@ -63,13 +72,15 @@ def motion(adapter: str = "auto") -> None:
     in_checkout(PAGE)
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    head = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
+    person = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
+    head = replace(person, hair=None, strands=None, eyes=None)
     persons = {name: person.positions_mm for name, person in PEOPLE.items()}
     fill_page(
         PAGE,
         expressions="\n".join(expression_rows(renderer, head, persons)),
         seams="\n".join(seam_rows(renderer, head, persons)),
         occlusions="\n".join(occlusion_table(renderer, head)),
+        deformations="\n".join(deformation_rows(renderer, dermis.load_head("lee_perry_smith", subdivide=0))),
         adapter=renderer.device.adapter.name,
     )
 
@@ -106,12 +117,18 @@ def picture_error(
     rebuilt = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = LIGHT_AND_CAMERA[view]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
-    posed_head = replace(head)
-    vars(posed_head)["centre_mm"] = rebuilt.centre_mm  # lights and cameras are relative to it
+    posed_head = _with_centre(replace(head), rebuilt)
     pose = Pose(weights, positions_mm=person)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
+
+
+def _with_centre(head: Head, shape: Head) -> Head:
+    """Return a head after setting its centre to that of a shape; lights and cameras are relative to it."""
+    for one in (head, head.bare):
+        vars(one)["centre_mm"] = shape.centre_mm
+    return head
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -128,6 +145,21 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
         worst = {view: max(worst[view], errors[view]) for view in LIGHT_AND_CAMERA}
         yield f"| {name} | {100 * errors['front']:.2f} | {100 * errors['back']:.2f} |"
     yield f"| **worst** | **{100 * worst['front']:.2f}** | **{100 * worst['back']:.2f}** |"
+
+
+def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
+    """Yield Markdown rows, one per deformation: strain, and picture errors from front and back."""
+    gauge = StrainGauge(head)
+    for name, deform in DEFORMATIONS.items():
+        points = deform(head.positions_mm)
+        front, back = (picture_error(renderer, head, points, {}, view) for view in LIGHT_AND_CAMERA)
+        yield f"| {name} | {100 * gauge.strain(points):.0f} | {100 * front:.2f} | {100 * back:.2f} |"
+
+
+def _with_thinner_ears(points: Points, fraction: float) -> Points:
+    """Return points (p, 3) of which those beside the scan's head are scaled along z about its origin."""
+    ear = np.clip((np.abs(points[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
+    return (points * (1.0 - ear * [0.0, 0.0, fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -155,7 +187,7 @@ def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose
     for where in (blur.neck_points, blur.back_points):
         sides = blur.seam_side_points(shape, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        vars(scene.head)["centre_mm"] = shape.centre_mm  # the stripes of light are relative to it
+        _with_centre(scene.head, shape)
         errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"

@@ -171,7 +171,7 @@ def forward_rows() -> str:
             cells = []
             for g in (0.0, FORWARD_G):
                 slab = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
-                run = trace_slab([slab], PHOTONS).per_entering
+                run = trace_slab([slab], PHOTONS).relative_to_entering
                 cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
                 cells.append(f"{run.total_reflectance:.3f}")
             rows.append(f"| {eta:g} | {thickness:g} mm | {' | '.join(cells)} |")

@@ -43,7 +43,7 @@ class FrameCounts:
     sequence: int = 100
 
     def within(self, seconds: float, frame_ms: float) -> FrameCounts:
-        """Return the numbers reduced so that a case takes at most `seconds`, at `frame_ms` per frame."""
+        """Return frame counts reduced so that a case takes at most `seconds`, at `frame_ms` per frame."""
         frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
         fraction = min(1.0, 1e3 * seconds / (frame_ms * frames))
         counts = asdict(self).items()

@@ -102,7 +102,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Yield `comparison_scene` with a medium's profile, a temporary file deleted when the context ends."""
+    """Yield `comparison_scene` with a medium's profile in a temporary file, deleted after the context."""
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"

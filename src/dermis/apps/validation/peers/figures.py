@@ -175,7 +175,7 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
 
 
 def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow, mask: Mask) -> JsonObject:
-    """Return the paths and time that a random walk needs for dermis's error, and for little noise.
+    """Return the paths and the time with which a random walk reaches dermis's error, and low noise.
 
     ours : row of dermis, whose error against the reference is the goal
     """

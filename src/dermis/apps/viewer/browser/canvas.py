@@ -29,10 +29,10 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
-        self._encoding_count = 0  # lossy frames being encoded
+        self._encoding_count = 0  # number of JPEG frames being encoded
         self._drawn_number = self._sent_number = 0  # numbers of the last drawn and of the last sent frame
         self._lossless_number = 0  # number of the current lossless frame, 0 after a newer frame
-        self._ticket_holder = 0
+        self._ticket_holder = 0  # id of the page that received the ticket
         self.ticket = ""  # upload ticket of the page that has control
         self.on_file: Callable[[Path, str], None] | None = None  # handler of uploads, set by the viewer
         self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
@@ -42,7 +42,8 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         """Send the progress of the preparation to all pages, which display it until the first picture.
 
         text : name of the stage, such as "compiling shaders"
-        number, total : number of the stage, starting at 1, and of all stages
+        number : position of the stage in the order of stages, from 1
+        total : number of all stages
         """
         self._broadcast({"type": "stage", "text": text, "number": number, "total": total})
 

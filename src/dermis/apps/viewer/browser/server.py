@@ -178,7 +178,7 @@ def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.s
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-        listener.listen()  # pages that connect already wait for the server
+        listener.listen()  # connections are queued until the server runs
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen on", f"{error.strerror}", "Choose another --port")

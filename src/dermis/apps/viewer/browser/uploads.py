@@ -18,13 +18,13 @@ MAX_FILE_BYTES = 1 << 28
 """Maximum size of one file [byte]."""
 
 MAX_TOTAL_BYTES = 1 << 30
-"""Maximum total size of all files of a server [byte]."""
+"""Maximum total size of all files uploaded to a server [byte]."""
 
 MAX_FILES = 200
-"""Maximum number of files of a server."""
+"""Maximum number of files uploaded to a server."""
 
 IDLE_TIMEOUT_S = 20.0
-"""Maximum time between two received pieces of a file [s]."""
+"""Maximum time between two received chunks of a file [s]."""
 
 TICKET_HEADER = b"x-dermis-ticket"
 _UPLOAD_PATH = "upload"
@@ -54,8 +54,8 @@ class Uploads:
         status, answer = 200, ""
         response_headers = [(b"content-type", b"text/plain; charset=utf-8")]
         try:
-            kind, on_file = self._accept(name, headers)
-            on_file(await self._store(name, kind, receive), name)
+            suffix, on_file = self._accept(name, headers)
+            on_file(await self._store(name, suffix, receive), name)
         except DermisError as error:
             status, answer = 400, str(error)
             response_headers.append((b"connection", b"close"))  # reject the rest of the file
@@ -70,10 +70,10 @@ class Uploads:
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another page sent it", "Close that page")
-        kind = next((one for one in HEAD_FILE_SUFFIXES if name.lower().endswith(one)), None)
-        if kind is None:
-            kinds = ", ".join(HEAD_FILE_SUFFIXES)
-            refuse(name, f"a mesh, a person or a scene ({kinds})", "it has another suffix", "Convert it")
+        suffix = next((one for one in HEAD_FILE_SUFFIXES if name.lower().endswith(one)), None)
+        if suffix is None:
+            suffixes = ", ".join(HEAD_FILE_SUFFIXES)
+            refuse(name, f"a mesh, a person or a scene ({suffixes})", "it has another suffix", "Convert it")
         if (on_file := self._canvas.on_file) is None:
             refuse(name, "a viewer that is ready", "it is still being prepared", "Send the file again later")
         if self._is_busy:
@@ -82,7 +82,7 @@ class Uploads:
             refuse(name, f"at most {MAX_FILES} files", "this is one more", "Restart the viewer")
         length = headers.get(b"content-length", b"0")
         self._check_size(name, int(length) if length.isdigit() and len(length) < 16 else 0)
-        return kind, on_file
+        return suffix, on_file
 
     def _check_size(self, name: str, size: int) -> None:
         if size > MAX_FILE_BYTES:
@@ -91,15 +91,15 @@ class Uploads:
             limit = f"at most {MAX_TOTAL_BYTES >> 20} MB of files in total"
             refuse(name, limit, "this file would exceed it", "Restart the viewer")
 
-    async def _store(self, name: str, kind: str, receive: Receive) -> Path:
+    async def _store(self, name: str, suffix: str, receive: Receive) -> Path:
         """Receive a file and return its path; a rejected file is deleted.
 
         name : name given by the page, for messages
-        kind : suffix of the file
+        suffix : suffix of the file
         """
         self._count += 1
-        folder = self._folder / str(self._count)  # its own, because a scene may refer to files beside it
-        path = folder / f"upload{kind}"
+        folder = self._folder / str(self._count)  # separate folders: a scene may refer to files beside it
+        path = folder / f"upload{suffix}"
         with self._upload_in_progress(name):
             folder.mkdir(mode=0o700)
             try:

@@ -216,7 +216,7 @@ def clamp(value: float, value_range: SliderRange) -> float:
 
 
 def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ToState) -> None:
-    """Change the state to the new value of a control; changes while it is held are undone together.
+    """Change the state to the new value of a control; all changes of one drag are undone together.
 
     result : whether the control has changed, and its value
     with_value : function that returns a state, given the new value

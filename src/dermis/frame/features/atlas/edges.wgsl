@@ -1,4 +1,4 @@
-// Distance to the nearest seam.
+// Distance to the nearest seam [mm].
 
 // texels : distance to the edge of the chart [texels]
 fn edge_mm(texels: f32, per_mm: vec2f) -> f32 {

@@ -23,7 +23,7 @@ struct GutterTexel {
     texel: vec2u,
 }
 
-// A triangle in its own plane, first corner at 0 and second to its right [mm].
+// A triangle in its own plane: the first corner is at 0, the second to the right of it [mm].
 struct Flat {
     b: vec2f,
     c: vec2f,
@@ -68,7 +68,7 @@ fn project_to_plane(flat: Flat, direction: vec3f) -> vec2f {
     return along * length(direction) / max(length(along), EPSILON);
 }
 
-// Steps for u and for v at a corner [mm per unit of uv]; those of the triangle where the corner's are degenerate.
+// Steps for u and for v at a corner [mm per unit of uv]; the steps of the triangle, `own`, where these are degenerate.
 fn steps_at(flat: Flat, corner: Corner, own: mat2x2f, mirrored: f32) -> mat2x2f {
     let steps = mat2x2f(project_to_plane(flat, corner.dpdu), project_to_plane(flat, corner.dpdv));
     let least = MIN_SINE * length(corner.dpdu) * length(corner.dpdv);
@@ -103,7 +103,7 @@ fn weights_at(a: vec2f, b: vec2f, c: vec2f, t: vec2f) -> vec2f {
     return w / max(w.x + w.y, 1.0);
 }
 
-// Weights of the second and third corner, given those of the corners j + 1 and j + 2.
+// Weights of the second and third corner, from the weights w of the corners j + 1 and j + 2.
 fn in_order(j: u32, w: vec2f) -> vec2f {
     let first = 1.0 - w.x - w.y;
     return select(select(vec2f(w.y, first), vec2f(first, w.x), j == 1u), w, j == 0u);

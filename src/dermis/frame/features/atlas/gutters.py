@@ -1,4 +1,7 @@
-"""Gutters of a stitched atlas, whose sources are traced over the surface of each person at rest."""
+"""Gutters of a stitched atlas: texels beside the charts that copy light from sources across the seams.
+
+The sources are traced over the surface of each person at rest.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,8 @@ class GutterTracing:
 
     starts : buffer of the start of each path, for gutter_trace.wgsl
     sides : buffer of the triangle across each edge of each triangle, for gutter_trace.wgsl
-    halvings : for each coarser atlas, buffers by their names in gutter_halve.wgsl: the finer gutter texels
-        that each of its gutter texels averages
+    halvings : for each coarser resolution of the atlas, the buffers of gutter_halve.wgsl by name: they list
+        the finer gutter texels that each coarser one averages
     """
 
     starts: Buffer
@@ -44,7 +47,7 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
     return GutterTracing(starts, sides, halvings)
 
 
-def with_own_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
+def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
     """Return a copy of the atlas with separate, empty gutter buffers, which `draw` fills for a person."""
 
     def with_list(level: AtlasTextures) -> AtlasTextures:
@@ -102,7 +105,7 @@ def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTexture
 def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, head: HeadGeometry) -> None:
     """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
 
-    atlas : result of `with_own_gutters`, whose gutter buffers are filled
+    atlas : result of `with_separate_gutters`, whose gutter buffers are filled
     head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)

@@ -12,7 +12,7 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class GutterUpdate:
-    """Inputs of the passes that trace the gutters of an atlas for a person.
+    """Inputs of the passes that trace the gutters of an atlas over the surface of a person.
 
     tracing : constant inputs of the passes
     head : surface of the person at rest
@@ -31,7 +31,7 @@ class LitAtlas:
     bindings : geometry, maps, lights, shadows and environment by their names in the shaders
     surfaces : texture of the surface at each texel, packed by surface_texels.wgsl
     scattered : texture of the exitance of light that scattered below the surface
-    gutter_update : inputs that trace the gutters for a person, None where gutters are constant
+    gutter_update : inputs of the passes that trace gutters for each person, None for constant gutters
     """
 
     atlas: AtlasTextures

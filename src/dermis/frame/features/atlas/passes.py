@@ -17,8 +17,8 @@ def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> N
     """Declare the passes that fill the stretch maps of an atlas at all its resolutions."""
     device, bound, constants = graph.device, {**head.resources, **atlas.resources}, atlas.stretch_constants
     bound.setdefault("edge_map", _placeholder_edge_map(device))
-    own = program(device, "atlas/stretch.wgsl", constants)
-    graph.compute("stretch", own, bound, atlas.resources["atlas"].size[:2])
+    inside = program(device, "atlas/stretch.wgsl", constants)
+    graph.compute("stretch", inside, bound, atlas.resources["atlas"].size[:2])
     if atlas.stretch_sources is not None:
         beyond = program(device, "atlas/stretch_beyond.wgsl", constants)
         listed = bound | {"stretch_sources": atlas.stretch_sources}
@@ -43,9 +43,9 @@ def _placeholder_edge_map(device: Device) -> Texture:
 
 
 def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
-    """Declare the passes that fill the gutters of a texture with its light from across the seams.
+    """Declare the passes that copy light of a texture from across the seams to its gutters.
 
-    A buffer holds the light in between, because a pass cannot read and write the same texture.
+    The light is first copied to a buffer, because a pass cannot read and write the same texture.
 
     stage : name of the stage in timings
     light : texture of light over the atlas
@@ -63,18 +63,18 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
     graph.compute(stage, place, {**lists, "stored": light}, size, TILE_SIDE, in_place="stored")
 
 
-def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, into: Texture) -> None:
+def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, target: Texture) -> None:
     """Declare the pass that fades from the light of the first layout to that of the second near seams.
 
     first, second : layouts with different seams; the second is shown only near the seams of the first
-    into : texture for the result, as large as the atlas of the first layout
+    target : texture for the result, as large as the atlas of the first layout
     """
     bound = {
         **second.bindings,  # with the atlas coordinates of the second layout
         **first.atlas.resources,
         "first": first.scattered,
         "second": second.scattered,
-        "blended": into,
+        "blended": target,
     }
     shader = program(graph.device, "atlas/blend.wgsl", (("FADE_MM", FEATHER_MM),))
-    graph.compute("blend", shader, bound, into.size[:2])
+    graph.compute("blend", shader, bound, target.size[:2])

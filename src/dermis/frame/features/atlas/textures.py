@@ -24,7 +24,7 @@ _TEXTURE_NAME = "map of the atlas"
 _LIGHT_BYTES = 16  # size of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
 SAME_SOURCE_TEXELS = 4.0
-"""Largest distance between the sources of four gutter neighbours that are averaged [texels]."""
+"""Largest distance between sources of gutter texels that are averaged at half the resolution [texels]."""
 
 
 def atlas_constants() -> dict[str, int | float]:
@@ -43,11 +43,13 @@ def atlas_constants() -> dict[str, int | float]:
 class AtlasTextures:
     """Textures and buffers of an atlas.
 
-    resources : textures by their shader names: atlas, stretch_map (filled by its pass), reach_map, and
-        edge_map for two layouts and for feathered stretch; coarser resolutions have stretch_map and reach_map
+    resources : textures by their names in shaders: atlas, stretch_map (filled by `draw_stretch`), reach_map,
+        and edge_map for two layouts or feathered seams; coarser resolutions only have stretch_map and
+        reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, or None
+    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, None without
+        gutters
     gutter, gutter_light : buffers of the gutter texels and of their light, None without gutters
     gutter_texels : (a, 2) gutter texels, x and y
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
@@ -79,7 +81,7 @@ def upload_atlas(
 
     stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes the same
         texel density everywhere
-    seams : treatment of seams, which decides on the edge map and on feathering
+    seams : how seams are treated; determines whether an edge map is uploaded, and whether seams are feathered
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
@@ -107,16 +109,16 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
     return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
 
 
-def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
+def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    own : mask of the texels to count: those inside charts, gutters excluded
+    inside : mask of the texels to count: those inside charts, gutters excluded
 
     Non-negative half floats are ordered like their 16-bit patterns, so a histogram of these is faster than
     sorting.
     """
     words = stretch.view(np.uint16)
-    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[own], minlength=1 << 16)
+    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside], minlength=1 << 16)
     total = int(counts.sum())
     if total == 0:
         return 0.0
@@ -124,7 +126,9 @@ def _median_density(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> flo
     return float(middle.astype(np.uint16).view(np.float16).astype(np.float64).mean())
 
 
-def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **more: Any) -> AtlasTextures:
+def _upload_mip(
+    device: Device, mip: AtlasMip, resources: dict[str, Texture], **members: Any
+) -> AtlasTextures:
     reach = mip.reach.copy()
     reach[..., 0] |= np.where(mip.covered & ~mip.lit, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
@@ -134,12 +138,12 @@ def _upload_mip(device: Device, mip: AtlasMip, resources: dict[str, Texture], **
         ),
     }
     if not len(mip.gutter):
-        return AtlasTextures(resources, **more)
+        return AtlasTextures(resources, **members)
     entries = np.concatenate([mip.source.view(np.uint32), mip.gutter.astype(np.uint32)], axis=1)
     gutter_light = mark_scratch(device, device.storage_buffer(_LIGHT_BYTES * len(entries)))
     gutter = device.buffer(entries, "STORAGE")
     return AtlasTextures(
-        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **more
+        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **members
     )
 
 
@@ -226,7 +230,7 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
 
 
 def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), with their corners in row order."""
+    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), the first axis over the texels of a square."""
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.kernels import (
-    MAX_SUMMED_DEVIATION,
+    CHAINED_TRUNCATION_SIGMAS,
+    MAX_CHAINED_DEVIATION,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    SUMMED_TRUNCATION_SIGMAS,
     TRUNCATION_SIGMAS,
     kernel_table,
 )
@@ -33,7 +33,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
     variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
-    full_first = len(variance_mm2) == 1 or first_deviation > MAX_SUMMED_DEVIATION
+    full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_DEVIATION
     for k, members in enumerate(_spread_members(variance_mm2, blur.halvings), start=1):
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
         draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
@@ -41,7 +41,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
             source = _halve(graph, levels, source, k - 1, halvings)
         # The level after an intermediate one gains most of its width in one blur.
         wide = k > 1 and k - 1 in blur.intermediate_levels and k not in blur.intermediate_levels
-        truncation = TRUNCATION_SIGMAS if wide or (full_first and k == 1) else SUMMED_TRUNCATION_SIGMAS
+        truncation = TRUNCATION_SIGMAS if wide or (full_first and k == 1) else CHAINED_TRUNCATION_SIGMAS
         clear = blur.scale * np.asarray(blur.clear)
         for axis, blurred in enumerate((levels.scratch_view(halvings), levels.layer(k, halvings))):
             shader = _axis_program(graph.device, levels.texel, axis, atlas.sheared, blur.edge)

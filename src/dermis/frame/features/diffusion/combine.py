@@ -26,8 +26,8 @@ def draw(
     """Declare the passes that sum all blurred levels by their weights, from coarse to fine resolution.
 
     target : texture for the sum
-    transmitted : texture of light through thin parts to be added, None for none
-    lost : texture of the fraction of blurred light that thin parts do not return, None for none
+    transmitted : texture of light through thin parts, which is added; None without such light
+    lost : texture of the fraction of blurred light that thin parts do not return; None without thin parts
     """
     device, halvings = graph.device, blur.halvings[1 : len(blur.weight) + 1]
     coarsest = max(halvings)

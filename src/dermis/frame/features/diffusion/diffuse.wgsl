@@ -14,7 +14,7 @@ const REPEATED: u32 = 0u; // the edge texel is repeated
 const CLEARED: u32 = 1u; // texels of other charts are read, and the clear colour instead of empty texels
 const SKIPPED: u32 = 2u; // texels of other charts are read, and empty texels are skipped
 const WIDE_TRUNCATION: f32 = 4.0; // in standard deviations, for variances beyond the table, which need no correction
-const MAX_STEP: f32 = 1.6; // largest step over the standard deviation of the source: the ripple stays below 0.1 %
+const MAX_STEP: f32 = 1.6; // largest ratio of the step to the standard deviation of the source: the ripple stays below 0.1 %
 
 struct Spread {
     variance_mm2: f32, // added by this blur
@@ -22,7 +22,7 @@ struct Spread {
     resampling: f32, // part of variance_mm2 that resampling to this resolution and back adds [texel^2]
     pending: f32, // part of source_mm2 that interpolation of the final sum will add [texel^2]
     previous_resampling: f32, // variance that resampling added to the previous level [texel^2]
-    previous_mm2: f32, // variance that the previous blur added; what resampling exceeded it by is subtracted now
+    previous_mm2: f32, // variance that the previous blur added; if resampling added more, the excess is subtracted now
     truncation: f32, // half-width of the kernel in standard deviations
     clear: vec3f, // light of empty texels, scaled as in the levels
 }
@@ -37,7 +37,7 @@ struct Axis {
 struct Kernel {
     taps: i32, // on each side
     step: i32, // texels between taps
-    q: f32, // weight of the first tap over that of the centre
+    q: f32, // ratio of the weight of the first tap to that of the centre
 }
 
 @group(0) @binding(0) var<uniform> spread: Spread;
@@ -52,8 +52,8 @@ fn resampling_variance(density2: f32) -> f32 {
     return spread.resampling + max(spread.previous_resampling - spread.previous_mm2 * density2, 0.0);
 }
 
-// Every covariance matrix is that of a blur along u and one along a sheared v [Geusebroek2003]: the latter has its lower
-// right element, and the former the rest of the upper left element.
+// A blur along u and one along a sheared v can give any covariance matrix [Geusebroek2003]: the blur along v gives its lower
+// right element, and the blur along u what the upper left element then lacks.
 fn along_v(stretch: vec4f) -> Axis {
     let density2 = stretch.xy * stretch.xy / (1.0 - stretch.z * stretch.z);
     var variance = spread.variance_mm2 * density2.y;
@@ -86,7 +86,7 @@ fn kernel_of(variance: f32, step: f32) -> Kernel {
     return Kernel(taps, i32(step), first_ratio(taps, scaled));
 }
 
-// Weight of the first tap over that of the centre, such that a kernel of `taps` has the variance.
+// Ratio of the weight of the first tap to that of the centre at which a kernel of `taps` taps has the given variance.
 fn first_ratio(taps: i32, variance: f32) -> f32 {
     if (variance > MAX_TABLE_VARIANCE) {
         return exp(-0.5 / variance);

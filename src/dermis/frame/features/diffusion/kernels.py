@@ -18,14 +18,14 @@ MAX_TABLE_VARIANCE = 9
 """Variance of the last row of the kernel table [step^2]."""
 TRUNCATION_SIGMAS = 3.3
 """Half-width of a kernel in standard deviations."""
-SUMMED_TRUNCATION_SIGMAS = 2.4
+CHAINED_TRUNCATION_SIGMAS = 2.4
 """Half-width of a kernel whose source is already blurred, in standard deviations.
 
 The kernel still has the exact variance, and the next blur smooths its truncated shape: the error is at
 most 0.014 % of an image.
 """
-MAX_SUMMED_DEVIATION = 1.5
-"""Largest standard deviation at which `SUMMED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
+MAX_CHAINED_DEVIATION = 1.5
+"""Largest standard deviation at which `CHAINED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
 _MAX_TAPS = math.ceil(TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
 _BISECTIONS = 60
 _WIDE_TRUNCATION, _MAX_STEP = 4.0, 1.6  # as in diffuse.wgsl
@@ -128,7 +128,7 @@ def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: in
         step = max(1.0, math.floor(math.sqrt(min(_MAX_STEP**2 * before, after - before) * per_mm2)))
         scaled = (after - before) * per_mm2 / step**2
         reach = tap_count(
-            scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else SUMMED_TRUNCATION_SIGMAS
+            scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else CHAINED_TRUNCATION_SIGMAS
         )
         cost += 2.0 * (2.0 * reach + 1.0 + _READS_PER_PASS) / 4.0**halved + _READS_PER_LEVEL
     return cost

@@ -25,10 +25,10 @@ _CACHE_SIZE = 4
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Textures for skin whose profile is blended by a map from a first profile and one or two others.
+    """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture of the blend weights of the other profiles over uv
-    entering : one pyramid for each other profile: the light that enters, times its blend weight
+    entering : one pyramid for each other profile: the light that enters, times the profile's blend weight
     atlas_weights : textures of these blend weights over the atlas, one for each layout
     sums : texture array of exitance: layer 0 for the first profile alone, then two layers for each other
         profile with its difference from the first: of all light, and of the light in its `entering` pyramid
@@ -65,12 +65,12 @@ def make_mixture(
     return Mixture(uv_weights, entering, atlas_weights, sums)
 
 
-def sum_layer_count(others: int) -> int:
+def sum_layer_count(other_count: int) -> int:
     """Return the number of layers of `Mixture.sums`.
 
-    others : number of profiles besides the first
+    other_count : number of profiles besides the first
     """
-    return 1 + 2 * others
+    return 1 + 2 * other_count
 
 
 def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Texture:
@@ -121,15 +121,17 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, inde
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
 
-def draw_entering(graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, other: int) -> None:
-    """Declare the pass that fills level 0 of another profile: the entering light times its blend weight.
+def draw_entering(
+    graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, profile_index: int
+) -> None:
+    """Declare the pass that fills level 0 of another profile with the entering light times its blend weight.
 
     levels : pyramid whose level 0 holds all light that enters
     index : index of the atlas layout
-    other : index of the profile among those besides the first
+    profile_index : index of the profile among those besides the first
     """
-    entering, device, texel = mixture.entering[other], graph.device, levels.texel
-    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", other),), texel, texel)
+    entering, device, texel = mixture.entering[profile_index], graph.device, levels.texel
+    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", profile_index),), texel, texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     light = {"source": levels.layer(0), "stored": entering.layer(0)}
     bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[index]}

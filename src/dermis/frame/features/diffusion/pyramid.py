@@ -17,7 +17,9 @@ _MAX_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale 
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
-MIN_SMOOTHNESS = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
+MIN_SMOOTHNESS = 0.45
+"""Factor of the squared texel side [mm^2]: larger texels only store light whose standard deviation [mm] is at
+least the product."""
 MIN_WEIGHT_SUM = 1e-12
 """Least divisor of a sum of weights, for channels without any weight."""
 
@@ -104,7 +106,8 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Py
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of levels that each resolution stores, finest first.
 
-    A coarser resolution also stores a reduced copy of the last finer level. A range covers all layouts.
+    A coarser resolution also stores a reduced copy of the last finer level. Each range covers the levels of
+    all layouts.
     """
     coarsest = max(map(max, halvings))
     return tuple(

@@ -19,7 +19,7 @@ from dermis.specular.hair import hair_constants
 
 TILE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
-_GPU_CHAINS = 64  # chains of a tile on GPUs: one for each invocation of the tile's workgroup
+_GPU_CHAINS = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
@@ -33,12 +33,11 @@ _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
-_WIDTH_PER_COVER_PX = 0.2  # further width per cover: where hair hides hair, fewer strands are enough
+_WIDTH_PER_COVER_PX = 0.2  # added width per unit of cover: where hair hides hair, fewer strands suffice
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
-_STRAND_DTYPE = np.dtype(
-    [("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)]
-)  # row of the table in strands_pose.wgsl
+# Row of the table of strands in strands_pose.wgsl.
+_STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
@@ -94,7 +93,7 @@ class StrandPicture:
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
-    """Return the number of strands and of the knots of each strand; no strands for None."""
+    """Return the number of strands, which is 0 for None, and the number of knots of each strand."""
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
@@ -166,7 +165,7 @@ class StrandTables:
     shadow_casters : number of coarse strands that cast the shadows of all coarse strands
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : mean over the coarse roots of the projected hair area around a root, per area of skin [-]
+    mean_cover : projected area of hair per area of skin around the root of a coarse strand, on average [-]
     """
 
     strands: Buffer

@@ -1,5 +1,5 @@
 // Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
-// come first, then the coarse ones of head and beard, of which the first ones may represent all.
+// come first, then the coarse ones of head and beard; some passes draw only the first coarse strands, in place of all.
 
 const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
 
@@ -14,7 +14,7 @@ struct Hairs {
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;
 
-// Strand of a knot or a segment, by the numbers of knots or segments of a fine and of a coarse strand.
+// Index of the strand that has a knot or segment; of_fine, of_coarse: number of knots or segments of a fine or coarse strand.
 fn hair_of(index: u32, of_fine: u32, of_coarse: u32) -> u32 {
     let fines = hairs.fine * of_fine;
     if (index < fines) {
@@ -44,7 +44,7 @@ fn first_knot(hair: u32) -> u32 {
     return select(hair * hairs.fine_knots, of_coarse, is_coarse(hair));
 }
 
-// Segments of all fine strands and some of the coarse ones.
+// Number of segments of all fine strands and of the first `coarse` coarse ones.
 fn segment_count(coarse: u32) -> u32 {
     return hairs.fine * (hairs.fine_knots - 1u) + coarse * (hairs.coarse_knots - 1u);
 }

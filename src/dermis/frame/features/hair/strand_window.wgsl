@@ -11,7 +11,7 @@ const COVER_SCALE: f32 = 4096.0; // integer of a cover of 1
 const DEPTH_SCALE: f32 = 256.0; // integer steps of depth per millimetre
 const NO_HAIR: u32 = 0xffffffffu; // depth of the nearest strand where there is none
 
-const NARROWEST: f32 = 0.2; // least width of a window over its length
+const NARROWEST: f32 = 0.2; // least ratio of the width of a window to its length
 const BORDER: f32 = 3.0; // empty texels around all strands
 const SIGN: u32 = 0x80000000u;
 
@@ -46,7 +46,7 @@ fn make_window(low: vec3u, high: vec3u) -> Window {
     return Window(0.5 * (farthest.xy + nearest.xy - wide), wide, nearest.z);
 }
 
-// First word of a light.
+// Index of the first word of a light's map.
 fn first_word(layer: i32) -> u32 {
     return u32(layer) * (WINDOW_HEAD + TEXEL_WORDS * STRAND_WINDOW * STRAND_WINDOW / 2u);
 }

@@ -7,7 +7,7 @@
 
 const LANES: u32 = 256u;
 
-// Initial value of a word of a light.
+// Initial value of a word of a light's map.
 fn empty_word(word: u32) -> u32 {
     if (word >= WINDOW_HEAD) {
         return select(0u, NO_HAIR, (word - WINDOW_HEAD) % TEXEL_WORDS == 0u);

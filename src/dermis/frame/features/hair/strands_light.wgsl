@@ -8,7 +8,7 @@
 
 const SURFACE_OFFSET_MM: f32 = 0.4; // offset of shadow rays from the skin
 const HORIZON_WIDTH: f32 = 0.2; // half-width of the soft horizon of the skin, as a cosine
-const HORIZON_DROP: f32 = 0.3; // by which the horizon is lower per millimetre above the skin
+const HORIZON_DROP: f32 = 0.3; // amount by which the horizon sinks per millimetre of height above the skin, as a cosine
 const REFLECTION_ROUGHNESS: f32 = 0.7; // roughness of the reflection of the environment by strands
 const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at the horizon, as a cosine
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
@@ -27,7 +27,7 @@ struct Knot {
     along: vec3f, // tangent towards the tip
     eye: vec3f, // unit
     depth: vec3f, // optical depth of a radius
-    height: f32, // over the skin at the root [mm]
+    height: f32, // above the skin at the root [mm]
     above: f32, // cover by hair farther from the skin
     below: f32, // cover by hair nearer to the skin
 }

@@ -34,8 +34,8 @@ class InterreflectionBuffers:
     sample_points : buffer of the surface points at which patches are lit, and the number of points
     patch_links : buffers of the form factors between patches, by their names in shaders
     cell_links : buffers of the form factors from atlas cells to patches, by their names in shaders
-    stores_means : whether cells store the mean exitance of the patches they see, instead of its sum by form
-        factors
+    stores_means : whether cells store the mean exitance of the patches they see, instead of the sum of
+        exitance times form factor
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
     uniform_exitance : buffer of the exitance of the patches in uniform irradiance 1
@@ -63,7 +63,7 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Buffers of interreflection, and the (3,) albedo of the profile, which is the sum of its weights [-]."""
+    """Buffers of interreflection, and the (3,) albedo of the profile, that is, the sum of its weights [-]."""
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
@@ -84,7 +84,7 @@ def make_interreflection(
     albedo : (3,) albedo of the profile
     has_occlusion : whether there is a map of the visible fraction of the sky
     light_key : cache key of the light, for callers that draw several scenes in turn
-    owner : name of the atlas layout in the memo
+    owner : name of the atlas layout in the cache
     """
     form_factors = memo.get(_form_factors, head, atlas, owner=owner)
     if not len(form_factors.cell_factor):
@@ -114,8 +114,8 @@ def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
     cell_links = _upload_rows(
         device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor
     )
-    own = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
-    cell_links["cells"] = device.buffer(own, "STORAGE")
+    cells = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
+    cell_links["cells"] = device.buffer(cells, "STORAGE")
     return (device.buffer(points, "STORAGE"), len(points)), patch_links, cell_links
 
 

@@ -21,8 +21,8 @@ fn main(
         direct += sample_exitance[2u * (index * SAMPLES + k)];
         uniform_light += sample_exitance[2u * (index * SAMPLES + k) + 1u];
     }
-    direct = of_team(direct, lane) / f32(SAMPLES);
-    uniform_light = of_team(uniform_light, lane) / f32(SAMPLES);
+    direct = team_sum(direct, lane) / f32(SAMPLES);
+    uniform_light = team_sum(uniform_light, lane) / f32(SAMPLES);
     if (lane % TEAM == 0u && samples > 0u) {
         direct_exitance[index] = vec4f(direct.rgb, uniform_light.a);
         uniform_exitance[index] = vec4f(uniform_light.rgb, 0.0);

@@ -7,7 +7,7 @@ const AREA_DEVIATION: f32 = 0.5; // standard deviation of the area over which fi
 
 struct Samples {
     count: u32,
-    footprint: f32, // side of the area that a sample represents, over the side of the uv square
+    footprint: f32, // side of the area that a sample represents, relative to the side of the uv square
     albedo: vec3f, // of the profile
 }
 

@@ -16,5 +16,5 @@ fn gathered(index: u32, exists: bool, lane: u32) -> vec4f {
             sum += bitcast<f32>(link.y) * vec4f(exitance[link.x].rgb, 1.0);
         }
     }
-    return of_team(sum, lane);
+    return team_sum(sum, lane);
 }

@@ -11,7 +11,7 @@ from dermis.frame.programs import FLOAT_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 FINE_LEVELS = 8
-"""Number of the narrowest Gaussians whose light is corrected within texels when the picture is shaded."""
+"""Largest number of Gaussians, narrowest first, whose light is corrected within texels in the picture."""
 TEXEL_FILTER_SIGMA = 0.5
 """Standard deviation of the filter that keeps light on the atlas from aliasing [texels]."""
 
@@ -39,7 +39,7 @@ def draw(
     graph: Recorder,
     layout: LitAtlas,
     constants: Constants,
-    into: TextureOrView,
+    target: TextureOrView,
     side: int,
     texel: str = FLOAT_FORMAT,
     scale: float = 1.0,
@@ -49,16 +49,16 @@ def draw(
 
     layout : atlas with the resources that light its texels
     constants : pipeline constants of the lights
-    into : texture of `side` x `side` texels
+    target : texture of `side` x `side` texels to write to
     side : side of the atlas [texels]
     texel : format of the texture
-    scale : factor from irradiance to the texels of `into`
+    scale : factor from irradiance to the texels of `target`
     filter_sigma : standard deviation of the filter of light finer than texels [texels]; 0 samples texel
-        centres, for texels whose neighbours in the texture are no neighbours on the surface
+        centres, for textures whose adjacent texels are not adjacent on the surface
     """
     if filter_sigma:  # neighbouring texels are neighbours on the surface
         constants = oblique_constants(constants)
     shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel)
     entering = shader.record("Entering", scale=scale, area=filter_sigma)
-    bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": into}
+    bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering, "stored": target}
     graph.compute("irradiance", shader, bound, (side, side))

@@ -1,4 +1,4 @@
-"""Ambient occlusion of a moving head: the baked map, corrected by the difference at the vertices."""
+"""Ambient occlusion of a moving head: the baked map, corrected by the change at the vertices since rest."""
 
 from __future__ import annotations
 
@@ -239,7 +239,7 @@ def _draw_vertices(
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
     record : uniform record of the views, from `sky_record`
-    resting : whether the result is stored as that of the rest shape, not of the current shape
+    resting : whether the shape is at rest, and the fractions are stored as those of the rest shape
     """
     draw_layers(graph, "occlusion", sky.layers, views.views, sky.occluders.with_vertices_of(head))
     bindings: Bindings = {

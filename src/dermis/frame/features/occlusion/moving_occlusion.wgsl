@@ -9,7 +9,7 @@ const MAX_GAIN: f32 = 2.0; // largest ratio of the change at a texel to that at 
 
 // Visibility after a change at the vertices: an increase restores the same fraction of what was hidden, a decrease removes the
 // same fraction of what was visible.
-fn update(open: f32, vertex_visibility: vec2f) -> f32 {
+fn updated_visibility(open: f32, vertex_visibility: vec2f) -> f32 {
     let is_closing = vertex_visibility.y < vertex_visibility.x;
     let gain = select((1.0 - open) / max(1.0 - vertex_visibility.x, 1e-6), open / max(vertex_visibility.x, 1e-6), is_closing);
     return clamp(open + (vertex_visibility.y - vertex_visibility.x) * min(gain, MAX_GAIN), 0.0, 1.0);
@@ -33,5 +33,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             vertex_visibility = (1.0 - w.x - w.y) * visibility[corner.x] + w.x * visibility[corner.y] + w.y * visibility[corner.z];
         }
     }
-    textureStore(moving_map, id.xy, vec4f(update(open, vertex_visibility)));
+    textureStore(moving_map, id.xy, vec4f(updated_visibility(open, vertex_visibility)));
 }

@@ -4,7 +4,7 @@
 
 override RESTING: bool = false; // whether the head is at rest
 
-const NORMAL_OFFSET: f32 = 0.7; // lift of a vertex along its normal, over the rise of its tangent plane within a texel
+const NORMAL_OFFSET: f32 = 0.7; // lift of a vertex along its normal, relative to the rise of its tangent plane within a texel
 const SKY_OFFSET: f32 = 0.15; // lift towards the sky [texel]
 
 struct View {

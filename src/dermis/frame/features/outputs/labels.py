@@ -16,7 +16,7 @@ from dermis.human.labels.fields import MeshLabels, hair_classes, mesh_labels
 from dermis.mesh.head import Head
 
 LABEL_STAGE = "label"
-"""Name of the stage that writes labels, with which the names of label outputs begin."""
+"""Name of the stage that writes labels, and prefix of the names of label outputs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +24,13 @@ class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
     tables : label tables of the mesh by their names in label.wgsl
-    fields : number of distance fields, which bound classes within triangles
+    field_count : number of distance fields, whose zeros bound classes within triangles
     hair_classes : class of each strand, None without hair
     hair_labels : class of the hair in each pixel, written by the hair pass
     """
 
     tables: MutableBindings
-    fields: int
+    field_count: int
     hair_classes: Buffer | None
     hair_labels: Buffer
 
@@ -68,7 +68,7 @@ def shader_constants() -> dict[str, int]:
 
 def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
     """Declare the pass that writes the class of each pixel."""
-    constants = ("FIELDS", buffers.fields), ("HAIRS", buffers.hair_classes is not None)
+    constants = ("FIELDS", buffers.field_count), ("HAIRS", buffers.hair_classes is not None)
     shader = stage_program(graph.device, planes, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
     draw_planes(graph, planes, shader, bindings)

@@ -19,9 +19,8 @@ LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
 LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible."""
-_LANDMARK_DTYPE = np.dtype(
-    [("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)]
-)  # as in landmarks.wgsl
+# Struct Landmark of landmarks.wgsl.
+_LANDMARK_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])
 _RESULT_FLOATS = 4  # x, y, z and visibility
 
 

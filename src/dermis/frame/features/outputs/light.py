@@ -90,11 +90,11 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
     draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
     if diffusion is not None and "diffuse" in planes.channels:
         below, leaving = diffusion.diffuse()
-        add = program(device, "outputs/spread.wgsl", planes.first_channel("diffuse"))
+        add = program(device, "outputs/spread.wgsl", planes.first_channel_constant("diffuse"))
         draw_planes(graph, planes, add, {"below": below, "leaving": leaving})
     if "translucent" in planes.channels:
         transmitted = inputs.sum_transmitted(resources.transmitted)
-        multiply = program(device, "outputs/transmitted.wgsl", planes.first_channel("translucent"))
+        multiply = program(device, "outputs/transmitted.wgsl", planes.first_channel_constant("translucent"))
         bindings = inputs.bindings(multiply) | {"transmitted": transmitted}
         draw_planes(graph, planes, multiply, bindings)
 

@@ -22,7 +22,7 @@ fn shade_centre(pixel: vec2u, size: vec2u) -> ShadedPixel {
     return ShadedPixel(shading_point, lit, shaded(shading_point, lit));
 }
 
-// The transmittance of the lids is moved from the colour of an eye to its irradiance.
+// Albedo; for eyes without the transmittance of the lids, which counts as part of the irradiance.
 fn albedo_output(shaded_pixel: ShadedPixel) -> vec3f {
     return select(shade.total, vec3f(1.0), is_opaque(shaded_pixel.shading_point.point)) * shaded_pixel.shading_point.surface.colour / shaded_pixel.shading_point.lids;
 }
@@ -31,7 +31,7 @@ fn irradiance_output(shaded_pixel: ShadedPixel) -> vec3f {
     return shaded_pixel.lit.entered * shaded_pixel.shading_point.lids;
 }
 
-// Light that is diffused over the picture is added afterwards.
+// Diffuse light; what is diffused over the picture is added afterwards, by spread.wgsl.
 fn diffuse_output(shaded_pixel: ShadedPixel) -> vec3f {
     let one = shaded_pixel.shaded;
     return select(one.below * one.leaving, vec3f(0.0), SPLIT) + one.local;
@@ -41,7 +41,7 @@ fn specular_output(shaded_pixel: ShadedPixel) -> vec3f {
     return shaded_pixel.shaded.reflected;
 }
 
-// Fraction that leaves towards the eye; the light through thin parts multiplies it afterwards.
+// Fraction that leaves towards the eye; transmitted.wgsl multiplies it by the light through thin parts.
 fn translucent_output(shaded_pixel: ShadedPixel) -> vec3f {
     return shaded_pixel.shaded.leaving;
 }

@@ -5,7 +5,7 @@ const ROW: u32 = 1024u; // invocations of a row
 
 struct Straight {
     tone: u32,
-    encoded: u32, // 0 leaves the sRGB encoding out, which is a fault to compare with
+    encoded: u32, // 0 omits the sRGB encoding, an intentional error for comparisons
 }
 
 @group(0) @binding(0) var<uniform> settings: Straight;

@@ -13,7 +13,7 @@ struct Pigments {
 
 @group(0) @binding(53) var<uniform> pigments: Pigments;
 
-// Zero in eyes, teeth and tongue.
+// Melanin and blood fractions, zero in eyes, teeth and tongue.
 fn pigments_at(hit: SurfaceHit) -> vec2f {
     let mip = mip_for(roughness_map, footprint_at(hit));
     let painted = textureSampleLevel(roughness_map, map_sampler, hit.point.uv, mip).zw;

@@ -1,4 +1,4 @@
-"""Planes: buffer of the outputs of a stage, one channel after the other, and the pass that fills it."""
+"""Planar buffer for the outputs of a stage, with one plane per channel, and the pass that fills it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder
 from dermis.scene.outputs import OUTPUTS
 
-_WORD_BYTES = 4  # bytes
+_WORD_BYTES = 4  # size of a word [bytes]
 PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 """Array of an output: float32, int32 or uint8, see `OUTPUTS`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer of the outputs of a stage, a plane of pixels for each channel.
+    """Planar buffer for the outputs of a stage: one plane of pixels per channel.
 
     stage : name of the shader that fills the planes
     channels : number of channels of each output, in the order of the planes
@@ -39,7 +39,7 @@ class Planes:
         """Return the pipeline constants that tell the shader the index of the first plane of each output."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
-    def first_channel(self, name: str) -> Constants:
+    def first_channel_constant(self, name: str) -> Constants:
         """Return the pipeline constant that tells the shader the index of the first plane of an output."""
         return ((f"{name.upper()}_FIRST", self._first_channels()[name]),)
 

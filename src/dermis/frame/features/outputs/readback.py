@@ -21,7 +21,7 @@ from dermis.scene.settings import Settings
 PictureArray = NDArray[Any]  # callers choose the dtype
 """(h, w, 3) or (h, w, 4) array of sRGB bytes or linear floats."""
 _INVOCATIONS_PER_ROW = 1024  # as in the shaders
-_WORD_BYTES = 4  # bytes
+_WORD_BYTES = 4  # size of a word [bytes]
 _PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack.wgsl
 
 
@@ -67,8 +67,8 @@ class Readback:
     def _image(self, raw: NDArray[np.uint8]) -> PictureArray:
         width, height = self.size
         count = self.channels * width * height
-        numbers = raw[: count * np.dtype(self.kind).itemsize].view(self.kind)
-        return numbers.reshape(height, width, self.channels)
+        values = raw[: count * np.dtype(self.kind).itemsize].view(self.kind)
+        return values.reshape(height, width, self.channels)
 
 
 def start_readback(
@@ -113,10 +113,10 @@ def start_readback(
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
-def _check_size(device: Device, size: int, limit: int, pixels: int, what: str = "") -> None:
+def _check_size(device: Device, size: int, limit: int, pixels: int, contents: str = "") -> None:
     if size > limit:
-        expected = f"{what}at most {limit * pixels // size} pixels at once from {device.adapter.name}"
-        advice = "Ask for fewer outputs, or a smaller size" if what else "Choose a smaller one"
+        expected = f"{contents}at most {limit * pixels // size} pixels at once from {device.adapter.name}"
+        advice = "Ask for fewer outputs, or a smaller size" if contents else "Choose a smaller one"
         refuse("size", expected, f"there are {pixels}", advice)
 
 

@@ -67,8 +67,8 @@ class StageInputs:
     previous : pose and camera of the previous scene, None without motion vectors
     translucency : resources of light through thin parts for the first layout, None without such light
     picture_diffusion : diffusion over the picture, None for techniques without it
-    sum_transmitted : function that sums the light through thin parts in textures of the atlas, and returns
-        the one that combines all layouts
+    sum_transmitted : function that sums the light through thin parts in the given textures of the atlas, and
+        returns the texture that combines all layouts
     """
 
     lighting: Bindings

@@ -12,7 +12,7 @@ struct LightParts {
 
 @group(0) @binding(53) var<uniform> light_parts: LightParts;
 
-// 0 where the surface with relief faces away from all of the light.
+// Visibility of a part of a light, 0 where the surface with relief faces away from all of the light.
 fn part_visibility(light: Light, shading_point: ShadingPoint) -> f32 {
     for (var part = 0u; part < parts_of(light); part++) {
         let l = incident(light, shading_point.point.position, part).direction;

@@ -11,7 +11,7 @@ const GRADIENT: u32 = 1u;
 const BACKDROP_MIDDLE: vec2f = vec2f(0.5, 0.42); // brightest point of the backdrop, relative to the picture
 const BACKDROP_BRIGHT: f32 = 0.16;
 const BACKDROP_DARK: f32 = 0.012;
-const BACKDROP_WIDTH: f32 = 0.42; // standard deviation over the longer side of the picture
+const BACKDROP_WIDTH: f32 = 0.42; // standard deviation relative to the longer side of the picture
 
 struct Background {
     rays: Rays,

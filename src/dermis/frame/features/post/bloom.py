@@ -39,8 +39,8 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: 
     for halved in textures.halved:
         _draw_step(graph, 0, source, source, halved, 0.0, 0.0)
         source = halved
-    for own, total in zip(reversed(textures.halved[:-1]), reversed(textures.sums), strict=True):
-        _draw_step(graph, 1, own, source, total, 1.0, 1.0)
+    for halved, total in zip(reversed(textures.halved[:-1]), reversed(textures.sums), strict=True):
+        _draw_step(graph, 1, halved, source, total, 1.0, 1.0)
         source = total
     weight = scattered / len(textures.halved)
     _draw_step(graph, 1, picture, source, textures.result, 1.0 - scattered, weight)
@@ -48,9 +48,9 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: 
 
 
 def _draw_step(
-    graph: Recorder, widen: int, own: Texture, smaller: Texture, target: Texture, *factors: float
+    graph: Recorder, widen: int, picture: Texture, smaller: Texture, target: Texture, *factors: float
 ) -> None:
     shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widen),))
     record = shader.record("Bloom", own=factors[0], wider=factors[1])
-    bindings: Bindings = {"bloom": record, "picture": own, "smaller": smaller, "result": target}
+    bindings: Bindings = {"bloom": record, "picture": picture, "smaller": smaller, "result": target}
     graph.compute("bloom", shader, bindings, target.size[:2])

@@ -49,7 +49,7 @@ def draw(
     visibility: Texture,
     image: Texture,
 ) -> None:
-    """Declare the passes that measure the irradiance of the visible skin, and set the exposure by it.
+    """Declare the passes that measure the irradiance of the visible skin, and derive the exposure from it.
 
     shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
         lights

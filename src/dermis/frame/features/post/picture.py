@@ -39,7 +39,7 @@ def make_picture(device: Device, size: tuple[int, int]) -> Picture:
 def draw(
     graph: Recorder, radiance: Texture, picture: Picture, settings: Settings, meter: Meter | None = None
 ) -> None:
-    """Declare the pass of exposure, tone curve and encoding, which fills `exposed` and `bytes`.
+    """Declare the pass of exposure, tone curve and encoding, which fills `exposed` and `bytes` of a picture.
 
     meter : exposure meter, None for a fixed exposure
     """

@@ -4,7 +4,7 @@
 
 struct Baking {
     count: u32, // number of points
-    footprint: f32, // side of a texel over the side of the maps
+    footprint: f32, // side of a texel relative to the side of the maps
     painted: u32, // 1 if the painted map of roughness also holds the pigments
     uniform_pigments: vec2f, // melanin and blood of uniform skin
 }

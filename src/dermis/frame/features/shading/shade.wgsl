@@ -103,7 +103,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let one = shaded(shading_point, lit_at(shading_point));
         pixel.sum += group.coverage * vec4f(one.below * one.leaving + (one.reflected + one.local), 1.0);
         if (SPLIT && one.depth > 0.0) {
-            pixel.skin = keep(pixel.skin, one, group.coverage, 2.0 * length(shade.up) / f32(size.y));
+            pixel.skin = add_samples(pixel.skin, one, group.coverage, 2.0 * length(shade.up) / f32(size.y));
         }
         group = find_group(&pixel, end);
         if (group.coverage == 0.0) {

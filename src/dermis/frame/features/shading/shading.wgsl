@@ -44,7 +44,7 @@ struct ShadingPoint {
     film: Film,
     lids: vec3f, // fraction of the light that the lids let pass; it is part of the colour of an eye
     v: vec3f, // towards the viewer
-    footprint: f32, // side of the filter over the side of the maps
+    footprint: f32, // side of the filter relative to the side of the maps
     open: f32, // visible fraction of the sky
     texel: TexelAxes, // if there is light that is finer than texels
     metalness: f32, // of parts that are not skin

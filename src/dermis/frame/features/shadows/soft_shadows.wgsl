@@ -6,7 +6,7 @@ const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
 //#fill const MIN_RAYS: u32 = {min_rays}u; // least number of rays per light
 const MIN_PROBES: u32 = 8u; // number of rays after which the others are skipped if all agree
-override RAY_STRIDE: u32 = 1u; // one in so many rays is traced, for passes that do not show edges of shadows
+override RAY_STRIDE: u32 = 1u; // number of rays of which one is traced, above 1 in passes that do not show edges of shadows
 
 const MIN_EDGE_TEXELS: f32 = 1.5; // half width of the sharpest edge of a soft shadow
 
@@ -50,7 +50,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     var hidden = 0u;
     for (var i = 0u; i < rays; i += 4u) {
         let points = four_points(light, i);
-        let rising = bits(rise(light, at, points)) & ((1u << min(rays - i, 4u)) - 1u);
+        let rising = bits(are_above_plane(light, at, points)) & ((1u << min(rays - i, 4u)) - 1u);
         if (rising == 0u) {
             continue; // below the tangent plane
         }
@@ -94,7 +94,7 @@ fn bits(which: vec4<bool>) -> u32 {
 }
 
 // Whether points of the light are above the tangent plane.
-fn rise(light: Light, at: Receiver, points: FourPoints) -> vec4<bool> {
+fn are_above_plane(light: Light, at: Receiver, points: FourPoints) -> vec4<bool> {
     let x = points.x * light.extent.x;
     let y = points.y * light.extent.y;
     if (is_parallel(light)) {

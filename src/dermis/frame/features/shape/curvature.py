@@ -45,20 +45,20 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
     """Create the buffers with which the curvature of a mesh is computed."""
     corners, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.positions)
     pairs, _, _ = edges(corners)
-    both = np.concatenate([pairs, pairs[:, ::-1]])
-    both = both[np.argsort(both[:, 0], kind="stable")]
+    directed = np.concatenate([pairs, pairs[:, ::-1]])
+    directed = directed[np.argsort(directed[:, 0], kind="stable")]
     order = np.argsort(corners.ravel(), kind="stable")
-    spans = run_bounds(corners.ravel()[order], mesh.point), run_bounds(both[:, 0], mesh.point)
+    spans = run_bounds(corners.ravel()[order], mesh.point), run_bounds(directed[:, 0], mesh.point)
     vertex_of_point = np.zeros(int(mesh.point.max()) + 1, np.uint32)
     vertex_of_point[mesh.point] = np.arange(count)
     tables = {
         "around": np.concatenate(spans, axis=1),
         "triangles": (order // 3).astype(np.uint32),
-        "neighbours": vertex_of_point[both[:, 1]],
+        "neighbours": vertex_of_point[directed[:, 1]],
     }
     smoothed, scratch = (device.buffer(np.zeros(count, np.float32), "STORAGE") for _ in range(2))
     buffers = {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
-    return Curvature(smoothed, scratch, buffers, _smoothing_steps(mesh, pairs, both), count)
+    return Curvature(smoothed, scratch, buffers, _smoothing_steps(mesh, pairs, directed), count)
 
 
 def placeholder_curvature(device: Device) -> Buffer:
@@ -66,15 +66,15 @@ def placeholder_curvature(device: Device) -> Buffer:
     return device.cached("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
 
-def _smoothing_steps(mesh: Mesh, pairs: Index, both: Index) -> int:
+def _smoothing_steps(mesh: Mesh, pairs: Index, directed: Index) -> int:
     """Return the number of smoothing steps whose combined standard deviation is `SMOOTHING_SIGMA_MM`.
 
     pairs : (e, 2) points of the edges of the mesh
-    both : (2 e, 2) the edges in both directions, sorted by their first point
+    directed : (2 e, 2) the edges in both directions, sorted by their first point
     """
     points = mesh.points_mm
     square = ((points[pairs[:, 0]] - points[pairs[:, 1]]) ** 2).sum(axis=1)
-    degree = 1.0 + np.bincount(both[:, 0], minlength=len(points))
+    degree = 1.0 + np.bincount(directed[:, 0], minlength=len(points))
     # One step moves a value along an edge, or not at all. Its variance along each of the surface's two axes:
     step = 0.5 * float(np.median(square)) * (1.0 - 1.0 / float(np.median(degree)))
     return int(np.clip(np.ceil(SMOOTHING_SIGMA_MM**2 / max(step, 1e-12)), 1, _MAX_STEPS))

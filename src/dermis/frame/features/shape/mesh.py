@@ -55,29 +55,29 @@ def upload_geometry(
 ) -> HeadGeometry:
     """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
 
-    parts : maps of the parts that are not skin, whose opacity cuts them out; without them, such parts are
-        left out
+    parts : maps of the parts that are not skin, whose opacity cuts holes into some of them; without maps,
+        parts with holes are left out
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
     if parts is None or not cut_out.any():
         table[0, cut_out, :3] = 0
-        return _uploaded(device, table, shape.vertices)
+        return _upload_table(device, table, shape.vertices)
     table[0, cut_out, 3] |= _CUT_OUT
     opacity = texture_from_array(device, parts.colour[..., 3:].astype(np.float16), "r16float")
-    return replace(_uploaded(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True)
+    return replace(_upload_table(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True)
 
 
 def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:
     """Upload only the (t, 3) vertex indices of triangles, for depth passes of a simplified mesh."""
     table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
     table[0, :, :3] = triangles
-    return _uploaded(device, table, {})
+    return _upload_table(device, table, {})
 
 
-def _uploaded(
+def _upload_table(
     device: Device, table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
 ) -> HeadGeometry:
-    rows = np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
+    rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; an unread buffer must still be bound
     resources: dict[str, Texture | Buffer] = {
         "triangle_table": texture_from_array(device, rows, "rgba32uint"),
@@ -97,7 +97,7 @@ def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     return table
 
 
-def _rows(table: NDArray[np.uint32], per_row: int) -> NDArray[np.uint32]:
+def _arrange_in_rows(table: NDArray[np.uint32], per_row: int) -> NDArray[np.uint32]:
     rows = -(-len(table) // per_row)
     padded = np.zeros((rows * per_row, table.shape[1]), dtype=table.dtype)
     padded[: len(table)] = table
@@ -116,7 +116,7 @@ def rest_geometry(
     """Return the triangles of an atlas layout with the vertices of the head at rest.
 
     geometry : triangles of the layout, with the vertices of the posed head
-    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for those of the head
+    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for the head itself
     index : index of the atlas layout
     """
     positions, owner = rest_positions_mm, "person"

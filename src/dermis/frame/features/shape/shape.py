@@ -25,7 +25,7 @@ VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 _VERTEX_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
 _VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
 MIN_TANGENT = 1e-3
-"""Least length of dpdu orthogonal to the normal, over the length of dpdu; shorter tangents are replaced."""
+"""Least length of the part of dpdu orthogonal to the normal, relative to dpdu; shorter ones are replaced."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,8 @@ class ShapeTables:
     stencils : subdivision weights of control points by their names in shape_refine.wgsl, empty without
         subdivision
     surface : vertices and triangles by their names in shape_vertices.wgsl
-    control, points, vertices : number of control points, of points after subdivision, and of vertices
-    targets, bones : number of morph targets and of bones
+    control, points, vertices : numbers of control points, of points after subdivision, and of vertices
+    targets, bones : numbers of morph targets and of bones
     has_contacts : whether some points, such as those of the lids, are kept outside the eyeballs
     """
 
@@ -160,11 +160,11 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
 
     template : targets that displace the same points; their order is used for all people of a template
     """
-    number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
+    target_index = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template.point_order
     table = np.zeros((max(1, len(order)), 4), np.float32)
     table[: len(order), :3] = targets.delta_mm.take(order, axis=0)
-    table[: len(order), 3] = number.take(order).view(np.float32)
+    table[: len(order), 3] = target_index.take(order).view(np.float32)
     return table
 
 
@@ -187,10 +187,11 @@ def _contact_words(contact: LidContact | None, count: int) -> Words:
     """
     if contact is None:
         return np.zeros((1, 3), np.uint32)
-    found = np.zeros((count, 3), np.uint32)
-    clear = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
-    found[contact.point] = np.stack([contact.apex[contact.ball], contact.back[contact.ball], clear], axis=1)
-    return found
+    words = np.zeros((count, 3), np.uint32)
+    clearance = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
+    ends = contact.apex[contact.ball], contact.back[contact.ball]
+    words[contact.point] = np.stack([*ends, clearance], axis=1)
+    return words
 
 
 def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:

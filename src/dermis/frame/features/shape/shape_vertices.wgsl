@@ -48,7 +48,7 @@ fn smooth_normal(p: vec3f, span: vec2u) -> vec3f {
 }
 
 // A direction orthogonal to a normal.
-fn across(n: vec3f) -> vec3f {
+fn orthogonal_to(n: vec3f) -> vec3f {
     let a = abs(n);
     var axis = vec3f(0.0, 0.0, 1.0);
     if (a.x <= a.y && a.x <= a.z) {
@@ -82,18 +82,18 @@ fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
     if (total > 0.0 && min(length(mean.u), length(mean.v)) >= MIN_MM) {
         return mean;
     }
-    let u = across(n);
+    let u = orthogonal_to(n);
     return Tangents(u, cross(u, n));
 }
 
 // Normal of the vertex from its coordinates in the frame of the smooth normal.
-fn own_normal(own: vec3f, n: vec3f, dpdu: vec3f) -> vec3f {
+fn normal_from_frame(own: vec3f, n: vec3f, dpdu: vec3f) -> vec3f {
     var tangent = dpdu - dot(dpdu, n) * n;
     let size = length(tangent);
     if (size > MIN_TANGENT * length(dpdu)) {
         tangent /= size;
     } else {
-        tangent = across(n);
+        tangent = orthogonal_to(n);
     }
     return normalize(own.x * n + own.y * tangent + own.z * cross(n, tangent));
 }
@@ -118,7 +118,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let span = spans[index];
     let n = smooth_normal(p, span.xy);
     let along = tangents_of(index, p, n, span.zw);
-    let normal = own_normal(vertex.normal, n, along.u);
+    let normal = normal_from_frame(vertex.normal, n, along.u);
     store_row(index, 0u, vec4f(p, vertex.uv.x));
     store_row(index, 1u, vec4f(normal, vertex.uv.y));
     store_row(index, 2u, vec4f(along.u, 0.0));

@@ -96,7 +96,7 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
 }
 
-// Transparency of the surface at a point.
+// Transparency of the surface of the eye at a point: 1 in the cornea, 0 in the sclera.
 fn clearness(p: vec3f) -> f32 {
     return (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, length(p.xy))) * step(0.0, p.z);
 }

@@ -63,12 +63,12 @@ def upload_maps(
     return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded) | painted, expression_maps)
 
 
-def detail_bindings(device: Device, fine: bool) -> MutableBindings:
+def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
     """Return the tiled texture of relief finer than maps and its sampler, by their names in skin.wgsl.
 
-    fine : False gives a flat texture, for skin without such relief
+    has_fine_relief : False gives a flat texture, for skin without such relief
     """
-    slopes = detail_slopes() if fine else np.zeros((1, 1, 4), np.float32)
+    slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
     sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
     return {"detail_map": map_mips.upload_detail(device, slopes), "detail_sampler": sampler}

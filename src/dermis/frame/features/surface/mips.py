@@ -25,7 +25,7 @@ from dermis.images.filters import mip_chain
 
 Floats = NDArray[np.float32]
 _ROWS_PER_INVOCATION = 32  # rows per invocation of relief.wgsl
-_BAND_BYTES = 96 << 20  # size of the heights of a pass, which every device can bind
+_BAND_BYTES = 96 << 20  # largest size of the heights of a pass; every device can bind such a buffer
 
 
 class MippedTexture(NamedTuple):

@@ -26,7 +26,7 @@ DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map [-]."""
 _EYE_SEEDS = 1000  # number of different eyes
 _NO_BAND = -1.0
-_MAX_OFFSET_MM = 3.0  # limit, as the surface is flat only near a texel
+_MAX_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[ShaderListMember]:
@@ -99,7 +99,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return (3,) diffuse reflectance and index of refraction of a half-space of mean skin colour [-]."""
+    """Return the (3,) reflectance and the index of refraction of a half-space of mean skin colour [-]."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -112,7 +112,7 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members that direction.wgsl reads: reflectance and transmittance by the direction of light.
 
-    They are those of a half-space with the mean colour of the skin.
+    Both are computed for a half-space with the mean colour of the skin.
     """
     half_space = mean_half_space(skin, maps, profile)
     response = anisotropic_response(*half_space, skin.anisotropy)

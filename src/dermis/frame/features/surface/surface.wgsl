@@ -19,9 +19,9 @@ struct Skin {
     mean_single_scattering: f32, // mean of 1/(a + b) over both directions
     oblique_offset_mm: f32, // lateral offset of the mean exit point for grazing incidence [mm]
     single_scattering: vec3f, // strength of single scattering
-    uniform_reflectance: vec3f, // reflectance of uniform light over that at normal incidence
-    reflectance: array<vec4f, 32>, // reflectance of light from one direction over that at normal incidence, by evenly spaced roots of the cosine
-    transmittance: array<vec4f, 32>, // light from one direction that passes deep slabs, over that of uniform light with equal reflectance
+    uniform_reflectance: vec3f, // reflectance of uniform light relative to that at normal incidence
+    reflectance: array<vec4f, 32>, // reflectance of light from one direction relative to that at normal incidence, at evenly spaced roots of the cosine
+    transmittance: array<vec4f, 32>, // light from one direction that passes deep slabs, relative to that of uniform light with equal reflectance
 }
 
 @group(0) @binding(2) var<uniform> skin: Skin;

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache, partial
 from itertools import count
 
 import numpy as np
@@ -34,7 +36,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # range of the tables, in standard deviations
+_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # thickest part in the tables: in standard deviations, and in mm
 _STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
 _CACHE_SIZE = 4
 _UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
@@ -90,46 +92,47 @@ def make_translucency(
     shares_pairs: bool,
     owner: str,
 ) -> Translucency:
-    """Return the resources of the light through thin parts of a head.
+    """Return the resources for light that is transmitted through thin parts of a head.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface : the same resources for the shape in which pairs are searched
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
     tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
-    shares_pairs : whether skins with similar profiles use the same pairs, as for skins that change between
-        frames
-    owner : name of the atlas layout in the memo
+    shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
+        between frames
+    owner : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).pairs_for_width(widest_mm)
+    cells = memo.get(_cell_divisions, atlas, owner=owner)(widest_mm)
+    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).find(cells)
     buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
     return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
 
 
+def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
+    """Return a function that divides an atlas into cells for a width, and caches the last few divisions."""
+    return lru_cache(_CACHE_SIZE)(partial(divide_into_cells, atlas))
+
+
 class PairCache:
-    """Cache of the translucent pairs of a surface, for the last few widths of the widest Gaussian.
+    """Cache of the translucent pairs of a surface, for the last few divisions into cells.
 
     surface : resources of geometry.wgsl and of the atlas, for the search
     """
 
     def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
         self._device, self._surface, self._atlas = device, surface, atlas
-        self._cache: dict[float, PairBuffers] = {}
+        self._cache: dict[Cells, PairBuffers] = {}
 
-    def pairs_for_width(self, widest_mm: float) -> PairBuffers:
-        """Return the pairs that are near enough for the widest Gaussian.
-
-        widest_mm : standard deviation of that Gaussian [mm]
-        """
-        pairs = self._cache.pop(widest_mm, None)
+    def find(self, cells: Cells) -> PairBuffers:
+        """Return the pairs for a division into cells; they are searched unless they are in the cache."""
+        pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:
                 self._cache.pop(next(iter(self._cache)))
-            pairs = find_pairs(
-                self._device, self._surface, self._atlas, divide_into_cells(self._atlas, widest_mm)
-            )
-        self._cache[widest_mm] = pairs
+            pairs = find_pairs(self._device, self._surface, self._atlas, cells)
+        self._cache[cells] = pairs
         return pairs
 
 

@@ -19,20 +19,15 @@ RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
 
 _GPU_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
-_SOFTWARE_CONSTANTS: Constants = (
-    ("SIZE", 128),
-    ("TEAM", 1),
-    ("ROUND", 1),
-)  # barriers are slow on software adapters
+# On software adapters barriers are slow, so that each invocation works alone.
+_SOFTWARE_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))
 _SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 Floats = NDArray[np.float64]
-# Least variance of a Gaussian over the squared spacing of its samples, for a sum that is even to 1e-6.
+# Least ratio of a Gaussian's variance to the squared sample spacing, for a sum that is constant to 1e-6.
 _MIN_VARIANCE_RATIO = 0.72
-_PAIRS_PER_ROW, _PAIRS_PER_GROUP = (
-    1024,
-    64,
-)  # pairs of a row of workgroups, and of a workgroup in translucency_weights.wgsl
-_MIN_SMOOTHNESS = 0.45  # least standard deviation of the light that sources sample, over their spacing
+# Pairs per row of workgroups, and per workgroup, in translucency_weights.wgsl.
+_PAIRS_PER_ROW, _PAIRS_PER_GROUP = 1024, 64
+_MIN_SMOOTHNESS = 0.45  # least ratio of the deviation of the light that sources sample to their spacing
 
 
 def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
@@ -68,7 +63,7 @@ def draw_points(
 
 
 def draw(
-    graph: Recorder, levels: PyramidLevels, blur: Blur, thin: Translucency, constants: Constants = ()
+    graph: Recorder, levels: PyramidLevels, blur: Blur, thin_parts: Translucency, constants: Constants = ()
 ) -> Texture:
     """Declare the passes that sum the light from all sources at each receiver; return its texture.
 
@@ -77,7 +72,7 @@ def draw(
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
-    device, pairs, level = graph.device, thin.pairs, blur.profile_levels[1 + thin.source_level]
+    device, pairs, level = graph.device, thin_parts.pairs, blur.profile_levels[1 + thin_parts.source_level]
     halvings = blur.halvings[level]
     gather = program(device, "translucency/translucency_gather.wgsl")
     record = gather.record(
@@ -90,17 +85,19 @@ def draw(
     bindings: Bindings = {
         "entering": record,
         "levels": levels.stacks[halvings],
-        "source_points": thin.source_points,
-        "direction_factors": thin.direction_factors if thin.uses_tables else thin.unit_light,
-        "source_light": thin.source_light,
+        "source_points": thin_parts.source_points,
+        "direction_factors": thin_parts.direction_factors
+        if thin_parts.uses_tables
+        else thin_parts.unit_light,
+        "source_light": thin_parts.source_light,
     }
     graph.dispatch("translucency", gather, bindings, workgroup_grid(pairs.sources[1], _SOURCE_GROUP))
-    sum_pairs(graph, thin, thin.source_light, pairs.transmitted, constants)
+    sum_pairs(graph, thin_parts, thin_parts.source_light, pairs.transmitted, constants)
     return pairs.transmitted
 
 
 def draw_direction_factors(
-    graph: Recorder, layout: LitAtlas, thin: Translucency, constants: Constants
+    graph: Recorder, layout: LitAtlas, thin_parts: Translucency, constants: Constants
 ) -> None:
     """Declare the pass that computes how incident directions change the light that each source transmits.
 
@@ -109,20 +106,20 @@ def draw_direction_factors(
     constants : pipeline constants of the lights
     """
     shader = program(graph.device, "translucency/translucency_directions.wgsl", oblique_constants(constants))
-    count = thin.pairs.sources[1]
+    count = thin_parts.pairs.sources[1]
     bindings: Bindings = {
         **layout.bindings,
         "surfaces": layout.surfaces,
         "source_count": shader.record("SourceCount", sources=count),
-        "source_points": thin.source_points,
-        "direction_factors": thin.direction_factors,
+        "source_points": thin_parts.source_points,
+        "direction_factors": thin_parts.direction_factors,
     }
     graph.dispatch("translucency", shader, bindings, workgroup_grid(count, _SOURCE_GROUP))
 
 
 def sum_pairs(
     graph: Recorder,
-    thin: Translucency,
+    thin_parts: Translucency,
     source_light: Buffer,
     target: Texture,
     constants: Constants = (),
@@ -135,10 +132,10 @@ def sum_pairs(
     constants : pipeline constants that replace the defaults of translucency.wgsl
     stage : name of the stage in timings
     """
-    device, pairs = graph.device, thin.pairs
+    device, pairs = graph.device, thin_parts.pairs
     bindings: Bindings = {
         "receivers": pairs.receiver_ranges,
-        "weights": thin.weights,
+        "weights": thin_parts.weights,
         "source_light": source_light,
         "transmitted": target,
     }
@@ -148,25 +145,25 @@ def sum_pairs(
     graph.dispatch(stage, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
 
 
-def draw_weights(graph: Recorder, thin: Translucency) -> None:
+def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
     """Declare the passes that compute the weights of all pairs for the current shape.
 
     They also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
     """
-    pairs, cells = thin.pairs, thin.pairs.cells
-    draw_points(graph, "receiver", thin.surface, cells, pairs.receivers, thin.receiver_points)
-    draw_points(graph, "source", thin.surface, cells, pairs.sources, thin.source_points)
+    pairs, cells = thin_parts.pairs, thin_parts.pairs.cells
+    draw_points(graph, "receiver", thin_parts.surface, cells, pairs.receivers, thin_parts.receiver_points)
+    draw_points(graph, "source", thin_parts.surface, cells, pairs.sources, thin_parts.source_points)
     bindings: Bindings = {
         "pairs": pairs.pairs,
-        "receiver_points": thin.receiver_points,
-        "source_points": thin.source_points,
-        "weights": thin.weights,
+        "receiver_points": thin_parts.receiver_points,
+        "source_points": thin_parts.source_points,
+        "weights": thin_parts.weights,
     }
-    shader = _weights_program(graph.device, thin.gaussian_count, thin.uses_tables)
+    shader = _weights_program(graph.device, thin_parts.gaussian_count, thin_parts.uses_tables)
     groups = _PAIRS_PER_ROW // _PAIRS_PER_GROUP, max(1, -(-pairs.count // _PAIRS_PER_ROW)), 1
-    graph.dispatch("pairs", shader, {**bindings, **thin.loss_bindings}, groups)
-    sum_pairs(graph, thin, thin.unit_light, pairs.lost, stage="pairs")
-    graph.dispatch("pairs", shader, {**bindings, **thin.weight_bindings}, groups)
+    graph.dispatch("pairs", shader, {**bindings, **thin_parts.loss_bindings}, groups)
+    sum_pairs(graph, thin_parts, thin_parts.unit_light, pairs.lost, stage="pairs")
+    graph.dispatch("pairs", shader, {**bindings, **thin_parts.weight_bindings}, groups)
 
 
 def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:

@@ -43,7 +43,8 @@ class Translucency:
     weights : buffer of the fraction of light that passes between the cells of each pair
     source_light : buffer of the light that enters at each source
     unit_light : buffer of light 1 at all sources
-    direction_factors : buffer of the factor of each source's light in deep slabs, by its directions
+    direction_factors : buffer of factors by which the directions of each source's light change its
+        transmission through deep slabs
     weight_bindings : resources of the profile for translucency_weights.wgsl, for transmitted light
     loss_bindings : resources of the profile for translucency_weights.wgsl, for light that is not returned
     gaussian_count : number of Gaussians that blur light

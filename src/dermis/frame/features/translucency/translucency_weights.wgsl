@@ -11,7 +11,7 @@ struct PairProfile {
     radius_mm: f32, // largest distance of a pair
     source_mm2: f32, // variance of the blurred level that sources sample
     cell_mm2: f32, // usual area of a source
-    min_variance_ratio: f32, // least added variance over the area of the source, which hides the pattern of the sources
+    min_variance_ratio: f32, // least ratio of the added variance to the area of the source, which hides the pattern of the sources
     reach_mm: f32, // thickness of the last row of the table
     gaussian: array<vec4f, 24>, // weights of the blurred level in three channels, variance [mm^2]
 }

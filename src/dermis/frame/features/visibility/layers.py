@@ -112,9 +112,9 @@ def _word_buffer(device: Device, count: int) -> Buffer:
 def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
     name = "visibility buffer" if triangles else "shadow maps"
 
-    def layered(texel: str, number: int) -> tuple[Texture, list[TextureView]]:
-        texture = make_texture(device, size, texel, layers=max(2, number), use="raster", name=name)
-        return texture, [make_view(texture, layer=k) for k in range(number)]
+    def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
+        texture = make_texture(device, size, texel, layers=max(2, layer_count), use="raster", name=name)
+        return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not triangles:
         texture, depth = layered("depth32float", count)
@@ -233,7 +233,7 @@ def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, in
     """
     fewest, most = _GROUP_TRIANGLES
     per_group = min(most, max(fewest, 1 << (triangles * views // _TARGET_GROUPS).bit_length() >> 1))
-    many = per_group == most  # many triangles are small ones
+    many = per_group == most  # meshes of many triangles have small ones
     threads = 256 if many or samples > 1 else 128
     run, small = (_RUN_TRIANGLES, 32) if many else (1, 16)
     constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)

@@ -7,7 +7,7 @@ override SAMPLES: u32 = 1u; // samples of a pixel, a layer for each
 override BLOCK: u32 = select(8u, 4u, SAMPLES > 1u); // pixels along a side of a block
 
 const SLACK: f32 = 1e-5; // tolerance for rounding, so that no pixel falls between two triangles
-const MIN_DISTANCE_RATIO: f32 = 0.1; // lower bound of the distance of a corner over the largest one, so that the tolerance stays small close to the eye
+const MIN_DISTANCE_RATIO: f32 = 0.1; // lower bound of the distance of a corner, relative to the largest one, so that the tolerance stays small close to the eye
 
 // Corner in homogeneous pixels: (x w, y w, w), and its clip depth.
 struct ClipCorner {

@@ -181,14 +181,14 @@ fn draw_four(index: u32, triangle: ProjectedTriangle, x: vec4f, y: vec4f, tested
     let depth = triangle.at_low.w + x * triangle.along_x.w + y * triangle.along_y.w;
     var covered = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & tested;
     //#if CUTOUTS
-    covered &= solid(index, a * triangle.weight_scale.x, b * triangle.weight_scale.y, c * triangle.weight_scale.z);
+    covered &= outside_holes(index, a * triangle.weight_scale.x, b * triangle.weight_scale.y, c * triangle.weight_scale.z);
     //#end
     record_four(index, depth, covered, texels);
 }
 
 //#if CUTOUTS
 // Whether four positions with weights a, b, c of the corners are not in holes.
-fn solid(index: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4<bool> {
+fn outside_holes(index: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4<bool> {
     let t = triangle_at(index);
     if ((t.w & CUT_OUT) == 0u) {
         return vec4<bool>(true);

@@ -1,9 +1,9 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
-The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is a
-colour c. Sample positions follow Burley's profile of width max(c) on a spiral, and are weighted by Burley's
-profile with S = c, so that a channel's width is 1/c. The shader confuses half a pixel with a pixel, so all
-widths are twice as large as metersPerUnit specifies.
+The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is
+set as a colour c. The samples lie on a spiral, with radii distributed by a Burley profile of width max(c).
+They are weighted by Burley's profile with S = c, whose width is 1/c in each channel. The shader confuses half
+a pixel with a pixel, so all widths are twice as large as metersPerUnit specifies.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import Floats
 
 SAMPLE_COUNT = 40
-"""Samples of a pixel if the profile covers at least 160 pixels."""
+"""Number of samples that the shader takes for a pixel if the profile covers at least 160 pixels."""
 WIDTH_ERROR = 2.0
 """Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
 _GOLDEN_RATIO = 1.618033988749895
@@ -57,8 +57,9 @@ class Babylon(EnginePage):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return a colour proportional to 1/d, and a scale that fits the sample positions.
 
-        The width of channel c is 1/c, and the sample positions follow a profile of width max(c), both times
-        2/metersPerUnit mm. With k = sqrt(d_min d_max), the colour k/d and metersPerUnit 2/k satisfy both.
+        The width of a channel is 1/c, and the sample positions follow a profile of width max(c), both times
+        2/metersPerUnit mm. With k = sqrt(d_min d_max), the colour k/d and metersPerUnit 2/k give each channel
+        its width d, and the sample positions the largest width.
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
@@ -74,7 +75,7 @@ class Babylon(EnginePage):
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the script elements of the library, and their sources for the page's policy."""
+        """Return the library's script elements, and the sources that the page's policy must allow."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]

@@ -51,7 +51,7 @@ def parse_options(arguments: list[str]) -> argparse.Namespace:
 
 
 def check_version() -> None:
-    """Refuse a version of Blender in which the parameters have another meaning."""
+    """Stop if the parameters have another meaning in this version of Blender."""
     (first, end), version = EXPORT["versions"], bpy.app.version[:2]
     if version < tuple(first) or (end is not None and version >= tuple(end)):
         until = "" if end is None else f" and before {end[0]}.{end[1]}"
@@ -125,14 +125,14 @@ def set_skin(shader: Any) -> None:
         shader.subsurface_method = EXPORT["method"]
     for name, value in EXPORT["inputs"].items():
         shader.inputs[name].default_value = value
-    rough = shader.inputs["Roughness"]
-    rough.default_value *= EXPORT["smoother"]
-    if rough.links:
+    roughness = shader.inputs["Roughness"]
+    roughness.default_value *= EXPORT["smoother"]
+    if roughness.links:
         tree = shader.id_data
         factor = tree.nodes.new("ShaderNodeMath")
         factor.operation, factor.inputs[1].default_value = "MULTIPLY", EXPORT["smoother"]
-        tree.links.new(rough.links[0].from_socket, factor.inputs[0])
-        tree.links.new(factor.outputs[0], rough)
+        tree.links.new(roughness.links[0].from_socket, factor.inputs[0])
+        tree.links.new(factor.outputs[0], roughness)
 
 
 def set_render(scene: Any) -> None:

@@ -32,7 +32,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 VersionRange = tuple[list[int], list[int] | None]
-"""First version for which the parameters are valid, and the first for which they are not, or None."""
+"""First version for which the parameters are valid, and first later one for which they are not, or None."""
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
@@ -40,8 +40,8 @@ _UNIT_M = UNIT_MM * METRES_PER_MM
 _Y_UP_TO_Z_UP = np.array(
     [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
-_BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # camera in front of a ball
-_LENGTH_FIELDS = ("shadow_soft_size", "size", "size_y")
+_BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # camera distance from a ball; visible height
+_LAMP_LENGTH_FIELDS = ("shadow_soft_size", "size", "size_y")
 _BLENDER_TASK = BlenderTask(
     "Blender",
     "to create the scene",
@@ -49,8 +49,8 @@ _BLENDER_TASK = BlenderTask(
 )
 _TIMEOUT_S = 600.0
 _GGX_RATIO = 0.5
-"""GGX roughness over the renderer's Beckmann roughness, by least squares of the square roots of the lobes."""
-_MAX_NAME_LENGTH = 60  # characters; Blender keeps 63
+"""Ratio of GGX roughness to Beckmann roughness, from a least squares fit of the lobes' square roots [-]."""
+_MAX_NAME_LENGTH = 60  # characters; Blender truncates names to 63
 _DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
 _HELPER_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
 _TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
@@ -63,8 +63,7 @@ def write_scene(
     """Write a subject as a script or .blend, as `Target.write` does, and return the paths of all files.
 
     method : subsurface method of the Principled BSDF, or "EEVEE"
-    versions : first version of Blender in which the parameters are valid, and the first later version in
-        which they are not, or None
+    versions : versions of Blender for which the parameters are valid, see `VersionRange`
     """
     skin = _describe_skin(subject, parameters, method, versions)
     if output.suffix == ".blend":
@@ -137,7 +136,7 @@ def skin_slots(head: Head) -> list[int]:
 def script_text(export: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
-    As texts are written as literals, a name cannot become code.
+    Texts are written as literals, so that a name cannot inject code.
 
     export : numbers, texts, and nested lists and dictionaries of them
     """
@@ -147,7 +146,7 @@ def script_text(export: Mapping[str, object]) -> str:
     imported = _HELPER_IMPORT.search(text)
     assert imported is not None
     names = imported[1].split(", ")
-    for name in names:  # grows by the functions that are called
+    for name in names:  # the list grows by the functions that these functions call
         called = {node.id for node in ast.walk(functions[name]) if isinstance(node, ast.Name)}
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
@@ -191,7 +190,7 @@ def _convert_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
     """Convert the description of a lamp from Y up in mm to Blender's coordinates: Z up, in metres."""
     fields = dict(lamp["set"])
-    fields |= {name: fields[name] * _UNIT_M for name in _LENGTH_FIELDS if name in fields}
+    fields |= {name: fields[name] * _UNIT_M for name in _LAMP_LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":
         fields["energy"] *= _UNIT_M**2  # radiant power is irradiance times area
     converted = lamp | {"set": fields, "to_world": _convert_transform(lamp["to_world"], centre)}

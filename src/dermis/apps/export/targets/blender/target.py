@@ -140,7 +140,7 @@ def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Fl
 
 @cache
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return the tabulated random walks of Cycles by entry: sqrt(1 - albedo), radii, and fractions of light.
+    """Return Cycles' random walks by direction of entry: sqrt(1 - albedo), radii, and light fractions.
 
     Their shapes are (n,), (m,) [mean free paths] and (n, m) [-].
     """
@@ -190,6 +190,7 @@ class Blender(Target):
         " Burley's profile ignores thin parts. All methods use one layer, so the red of layered skin is lost."
         " EEVEE was not tested."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the subsurface radius for which the method's profile is closest to the reference."""
@@ -223,7 +224,7 @@ class Blender(Target):
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
 
     def _valid_versions(self, version: str) -> VersionRange:
-        """Return the first version with valid parameters, and the first later one without, or None."""
+        """Return the range of versions for which the parameters are valid, see `VersionRange`."""
         if self.variant != "random-walk":
             return list(_FIRST_VERSION), None
         return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
@@ -233,7 +234,7 @@ class Blender(Target):
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
-            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_meaning(version)),
+            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_description(version)),
             Parameter(_SCALE_NAME, _METRES_PER_MM, "m", "metres per millimetre"),
             Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]
@@ -243,7 +244,7 @@ class Blender(Target):
             parameters.append(Parameter("Subsurface IOR", SKIN_ETA, "-", "determines the mean free path"))
         return tuple(parameters)
 
-    def _radius_meaning(self, version: str) -> str:
+    def _radius_description(self, version: str) -> str:
         walk = "the mean free path" if _is_mfp(version) else "4 pi mean free paths"
         return {
             "random-walk": walk,
@@ -268,7 +269,7 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of r/d, or of r over the mean free path."""
+        """Return each channel's cumulative profile as a function of r/d or r/(mean free path)."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]

@@ -43,9 +43,9 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
 
 
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
-    """Return the skin material's extensions and uniform colour, and a map of multiscatter colours.
+    """Return the skin material's extensions and uniform colour, and a map of multiscatter colours if needed.
 
-    The map replaces the multiscatter factor in the draft extension if the head has a colour map.
+    The draft extension needs this map for a head with a colour map; it replaces the multiscatter factor.
     """
     if not draft:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}

@@ -25,7 +25,7 @@ _TRANSMISSION_FACTOR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmiss
 _TRANSMISSION_COLOUR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
 _BASE_COLOUR_NAME = "pbrMetallicRoughness.baseColorFactor"
 _IOR_PARAMETER = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
-_HEAD_THICKNESS_M = 0.1  # of a head; used as path length by programs that trace no rays
+_HEAD_THICKNESS_M = 0.1  # of a head; programs that trace no rays use it as path length
 _EAR_THICKNESS_MM = 4.0  # thickness at which the transmitted light is computed
 _NAIVE_TRANSMISSION = 0.5  # middle of the slider
 
@@ -45,9 +45,10 @@ class Gltf(Target):
         f" colour, so the skin is too light. The variant {TRANSMISSION_VARIANT} looks like skin in all"
         " programs, but light is not diffused: shadow edges stay sharp."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the volume whose random walk is closest to the reference, or the transmission of an ear."""
+        """Return the volume whose random walk is closest to the reference, or the transmittance of an ear."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
@@ -133,7 +134,7 @@ def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
 
     The fraction is relative to the light that leaves on both faces.
 
-    Source: [ChristensenBurley2015], integrated over a plane at a depth.
+    Source: [ChristensenBurley2015], integrated over a plane at the depth of the far face.
     """
     d = fit_burley_width(subject.curve)
     transmitted = (

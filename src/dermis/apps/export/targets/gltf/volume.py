@@ -79,7 +79,7 @@ def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume
     """Return the volume whose cumulative profile is closest to a reference profile.
 
     curve : reference profile
-    energy : (3,) light that the volume returns per incident light, by default that of `curve` [-]
+    energy : (3,) light that the volume returns per incident light, by default the energy of `curve` [-]
     """
     medium = fit_homogeneous_medium(curve, energy)
     return volume_from_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-_SUBDIVISIONS = 4  # pieces into which each edge is divided
+_SUBDIVISIONS = 4  # segments per edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
@@ -63,7 +64,7 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
     """Divide each triangle into n^2 smaller ones, without sharing vertices between original triangles.
 
     triangles : (t,) indices of the original triangles
-    n : number of pieces of each edge
+    n : number of segments per edge
     """
     grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
@@ -77,17 +78,15 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
     return SubdividedTriangles(np.repeat(triangles, len(grid)), weights, corners)
 
 
-def coloured_meshes(renderer: Renderer, scene: Scene) -> dict[int, bytes]:
-    """Return a PLY file for each material except skin, by material index, relative to the head's centre [mm].
+def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
+    """Return a PLY file for each given material by its index, relative to the head's centre [mm].
 
     Triangles are subdivided and have a colour per vertex instead of maps.
+
+    materials : material indices
     """
     mesh = scene.head.mesh
-    used = np.unique(mesh.material).tolist()
-    opaque = [k for k in used if mesh.materials[k].kind != "skin"]
-    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in opaque}
-    if not parts:
-        return {}
+    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in materials}
     triangle, weights = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
     colours = bake_albedo(renderer, scene, triangle, weights[:, 1:])
     ends = np.cumsum([len(part.triangle) for part in parts.values()])[:-1]

@@ -18,6 +18,7 @@ from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
+from dermis.formats.part_pictures import PartRole
 from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
@@ -26,8 +27,16 @@ Boundary = Literal["matched", "smooth", "rough"]
 BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
-"""Reflectance of an index-matched surface in all directions, equal to the mean of rough skin [-]."""
+"""Reflectance of an index-matched surface in all directions: the mean reflectance of rough skin [-]."""
 _OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
+_PART_IOR = 1.5  # of the metallic-roughness model
+_PART_INPUTS: Mapping[PartRole, str] = {
+    "colour": "base_color",
+    "roughness": "roughness",
+    "metalness": "metallic",
+}
+PART_ROLES: tuple[PartRole, ...] = (*_PART_INPUTS, "normal", "opacity")
+"""Roles of the pictures of parts that are not skin."""
 
 
 class IsotropicMedium(NamedTuple):
@@ -51,6 +60,8 @@ class SkinAppearance(NamedTuple):
     dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
         skin
     opaque : PLY file of each other material, by material index
+    pictured : roles of the pictures of a material, by material index, for materials with pictures
+    pictures : PNG files by role
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -58,6 +69,8 @@ class SkinAppearance(NamedTuple):
     transmittance: Floats | None = None
     dimming: Floats | None = None
     opaque: Mapping[int, bytes] = MappingProxyType({})
+    pictured: Mapping[int, set[PartRole]] = MappingProxyType({})
+    pictures: Mapping[PartRole, bytes] = MappingProxyType({})
 
 
 def scene_files(
@@ -83,6 +96,7 @@ def scene_files(
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
         yield _opaque_file(index), content
+    yield from ((_part_file(role), content) for role, content in appearance.pictures.items())
     if appearance.transmittance is not None and appearance.dimming is not None:
         yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
         yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
@@ -108,7 +122,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_description(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return Mitsuba's description of the skin's surface; of index-matched skin, only its outer layer.
+    """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
 
     boundary : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for 1
@@ -164,8 +178,13 @@ def _scene_elements(
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    for role in appearance.pictures:
+        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_file(role)}
+        parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
     for index in appearance.opaque:
-        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": opaque})
+        roles = appearance.pictured.get(index)
+        bsdf = opaque if roles is None else _part_surface(roles)
+        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
@@ -194,6 +213,24 @@ def _skin_elements(
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
         parts.append({**shape, "interior": xml.Ref("skin_medium")})
     return [xml.object_element(part, "", backend) for part in parts]
+
+
+def _part_surface(roles: set[PartRole]) -> SceneDict:
+    """Return Mitsuba's description of the surface of a part that is not skin, with pictures."""
+    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
+    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
+    if "normal" in roles:
+        bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
+    bsdf = {"type": "twosided", "bsdf": bsdf}
+    return {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf} if "opacity" in roles else bsdf
+
+
+def _part_texture(role: PartRole) -> xml.Ref:
+    return xml.Ref(f"parts_{role}")
+
+
+def _part_file(role: PartRole) -> str:
+    return f"textures/{_part_texture(role).name}.png"
 
 
 def _opaque_file(index: int) -> str:

@@ -1,12 +1,13 @@
 """Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as Mitsuba has no diffusion profiles.
 
-A refracting surface of index 1.4 around the medium corresponds to tissue. Light through it is found by random
-rays only, so an environment and area lights work. Point and spot lights need the index-matched surface, for
-which another medium is fitted.
+A refracting surface of index 1.4 around the medium corresponds to tissue. Lights cannot be
+sampled through a refracting surface, and random rays only hit environments and area lights. Point and spot
+lights therefore need the index-matched surface, for which another medium is fitted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
@@ -27,11 +29,13 @@ from dermis.apps.export.target import (
 from dermis.apps.export.targets.mitsuba.scene import (
     BOUNDARIES,
     MATCHED_REFLECTANCE,
+    PART_ROLES,
     Boundary,
     IsotropicMedium,
     SkinAppearance,
     scene_files,
 )
+from dermis.formats.part_pictures import PartRole
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.half_space import HalfSpaceKind, half_space, tabulated_albedo
 from dermis.optics.media import Floats
@@ -65,6 +69,10 @@ class Mitsuba(Target):
         "One medium per channel cannot represent layers, whose red light spreads differently. Through rough "
         "and smooth surfaces, point, spot and parallel lights cannot be sampled and are black. The matched "
         "surface has a constant reflectance, and colour maps change its lightness only. Hairs are omitted."
+    )
+    part_limitations = (
+        "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
+        "mirrored."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -109,9 +117,10 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and its meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        appearance = SkinAppearance(
-            media, *skin_textures(subject, colours), _opaque_meshes(scene, self.adapter)
-        )
+        pictured = _pictured_parts(subject)
+        opaque = _opaque_meshes(scene, self.adapter, pictured)
+        pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
+        appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
         return write_files(
             output, scene_files(scene, appearance, self._boundary, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
         )
@@ -122,7 +131,7 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium whose profile under a surface is closest to `curve`, as bright as the lightest skin.
+    """Return the medium whose profile under a surface is closest to `curve`, with the lightest skin's colour.
 
     Heads are lit from all directions. Under an index-matched surface, skin returns up to a quarter more of
     oblique light than of light along the normal; under a refracting surface, both are equal.
@@ -146,14 +155,31 @@ def _boundary_factor(boundary: Boundary) -> float:
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
-def _opaque_meshes(scene: Scene, adapter: str) -> dict[int, bytes]:
-    """Return a PLY file for each of the head's materials except skin, by material index."""
-    if all(material.kind == "skin" for material in scene.head.mesh.materials):
+def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
+    """Return the roles of each part's pictures by material index, except eyes with their own geometry."""
+    head, pictures = subject.head_or_ball, subject.part_pictures
+    if pictures is None:
         return {}
+    used = {*np.unique(head.mesh.material).tolist()} - {*(head.eyes.material.tolist() if head.eyes else ())}
+    roles = {k: pictures.roles(head.mesh.materials[k]) for k in sorted(used)}
+    return {k: part_roles for k, part_roles in roles.items() if part_roles}
+
+
+def _opaque_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
+    """Return a PLY file for each of the head's materials except skin, by material index.
+
+    pictured : indices of the materials with pictures
+    """
+    mesh, centre = scene.head.mesh, scene.head.centre_mm
+    opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
+    meshes = {k: mesh_ply(mesh, mesh.material == k, centre, v_up=False) for k in opaque if k in pictured}
+    if len(meshes) == len(opaque):
+        return meshes
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    return coloured_meshes(Renderer(adapter), scene)
+    coloured = [k for k in opaque if k not in pictured]
+    return meshes | coloured_meshes(Renderer(adapter), scene, coloured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +208,7 @@ class SkinColours:
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours of the subject's colour map, or the colour of its profile."""
+    """Return the colours in the subject's colour map or, without such a map, the colour of the profile."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)

@@ -16,7 +16,10 @@ _POINT_KEYS, _VECTOR_KEYS = ("position", "center"), ("direction",)
 _PLUGINS_BY_KIND = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
     "shape": ("rectangle", "sphere", "disk", "ply"),
-    "bsdf": ("null", "diffuse", "principled", "dielectric", "roughdielectric", "mask", "roughconductor"),
+    "bsdf": (
+        *("null", "diffuse", "principled", "dielectric", "roughdielectric", "roughconductor"),
+        *("mask", "normalmap", "twosided"),
+    ),
     "texture": ("bitmap", "mesh_attribute"),
     "medium": ("homogeneous",),
     "phase": ("isotropic", "hg"),
@@ -40,8 +43,8 @@ class Transform:
 
         The camera's +Z points towards `target`.
         """
-        forward = _unit(np.subtract(target, origin))
-        left = _unit(np.cross(np.asarray(up, np.float64), forward))
+        forward = _normalise(np.subtract(target, origin))
+        left = _normalise(np.cross(np.asarray(up, np.float64), forward))
         matrix = np.eye(4)
         matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
         return Transform(self.matrix @ matrix)
@@ -146,38 +149,41 @@ def _property_element(key: str, value: object, backend: XmlBackend) -> ET.Elemen
         return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
     if isinstance(value, Transform):
         node = ET.Element("transform", {"name": key})
-        ET.SubElement(node, "matrix", {"value": _numbers(value.matrix)})
+        ET.SubElement(node, "matrix", {"value": _format_numbers(value.matrix)})
         return node
     if isinstance(value, Bitmap):
         backend.bitmaps.append(value.values)
         return _value_element("filename", bitmap_path(len(backend.bitmaps) - 1))
     if isinstance(value, Mapping):
         if value["type"] == "rgb":
-            return ET.Element("rgb", {"name": key, "value": _numbers(value["value"])})
+            return ET.Element("rgb", {"name": key, "value": _format_numbers(value["value"])})
         return object_element(value, key, backend)
     return _value_element(key, value)
 
 
 def _value_element(key: str, value: object) -> ET.Element:
     if key in _POINT_KEYS or key in _VECTOR_KEYS:
-        kind, xyz = "point" if key in _POINT_KEYS else "vector", map(_number, np.asarray(value, np.float64))
+        kind, xyz = (
+            "point" if key in _POINT_KEYS else "vector",
+            map(_format_number, np.asarray(value, np.float64)),
+        )
         return ET.Element(kind, {"name": key, **dict(zip("xyz", xyz, strict=True))})
     if isinstance(value, bool):
         return ET.Element("boolean", {"name": key, "value": str(value).lower()})
     if isinstance(value, int | np.integer):
         return ET.Element("integer", {"name": key, "value": str(int(value))})
     if isinstance(value, float | np.floating):
-        return ET.Element("float", {"name": key, "value": _number(value)})
+        return ET.Element("float", {"name": key, "value": _format_number(value)})
     return ET.Element("string", {"name": key, "value": str(value)})
 
 
-def _numbers(values: ArrayLike) -> str:
-    return " ".join(map(_number, np.ravel(values)))
+def _format_numbers(values: ArrayLike) -> str:
+    return " ".join(map(_format_number, np.ravel(values)))
 
 
-def _number(value: SupportsFloat) -> str:
+def _format_number(value: SupportsFloat) -> str:
     return f"{float(value):.9g}"
 
 
-def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normalise(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(vector / np.linalg.norm(vector))

@@ -10,6 +10,7 @@ import MaterialX
 from dermis.apps.export.targets.openpbr.materials import (
     LENGTH_INPUTS,
     MAP_TYPES,
+    STANDARD_SURFACE,
     InputValue,
     OpenPbrMaterial,
     input_name,
@@ -49,14 +50,14 @@ def _add_material(
     name = MaterialX.createValidName(definition.name) or "material"
     node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
     for key, value in definition.values.items():
-        constant = node.setInputValue(input_name(shader, key), _value(value))
+        constant = node.setInputValue(input_name(shader, key), _materialx_value(value))
         if key in LENGTH_INPUTS:
             constant.setUnitType("distance")
             constant.setUnit("meter")
     if definition.maps:
         graph = document.addNodeGraph(document.createValidChildName(f"{name}_maps"))
         for key, role in definition.maps.items():
-            output = _add_map(graph, role, f"{prefix}{role}.png")
+            output = _add_map(graph, role, f"{prefix}{role}.png", shader)
             mapped = node.addInput(input_name(shader, key), output.getType())
             mapped.setNodeGraphString(graph.getName())
             mapped.setOutputString(output.getName())
@@ -65,25 +66,31 @@ def _add_material(
         material.setAttribute("uiname", definition.name)
 
 
-def _add_map(graph: MaterialX.NodeGraph, role: str, file: str) -> MaterialX.Output:
+def _add_map(graph: MaterialX.NodeGraph, role: str, file: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
     role : role of the map, such as "colour", which sets its type and colour space
     file : path of the map
+    shader : node category of the surface
     """
     map_type = MAP_TYPES[role]
+    output_type = map_type.type
     image = graph.addNode("image", f"{role}_image", map_type.type)
     filename = image.setInputValue("file", file, "filename")
     if map_type.space:
         filename.setColorSpace(map_type.space)
     last_node = image
-    if role == "normal":
+    if map_type.type == "vector3":
         last_node = graph.addNode("normalmap", "normal_in_space", map_type.type)
         last_node.addInput("in", map_type.type).setNodeName(image.getName())
-    output = graph.addOutput(role, map_type.type)
+    elif role == "parts_opacity" and shader == STANDARD_SURFACE:
+        output_type = "color3"
+        last_node = graph.addNode("convert", "opacity_of_channels", output_type)
+        last_node.addInput("in", map_type.type).setNodeName(image.getName())
+    output = graph.addOutput(role, output_type)
     output.setNodeName(last_node.getName())
     return output
 
 
-def _value(value: InputValue) -> MaterialX.Color3 | float:
+def _materialx_value(value: InputValue) -> MaterialX.Color3 | float:
     return MaterialX.Color3(*value) if isinstance(value, tuple) else float(value)

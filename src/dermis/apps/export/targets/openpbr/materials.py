@@ -1,4 +1,4 @@
-"""OpenPBR materials of a head: input values, and maps of inputs with their files."""
+"""OpenPBR materials of a head: values of their inputs, maps that set inputs, and the files of these maps."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import flat_tuple, write_files
+from dermis.formats.part_pictures import PartPictures, PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
@@ -38,12 +39,19 @@ _STANDARD_SURFACE_NAMES: Mapping[str, str] = {
     "specular_ior": "specular_IOR",
     "specular_roughness": "specular_roughness",
     "geometry_normal": "normal",
+    "base_metalness": "metalness",
+    "geometry_opacity": "opacity",
+    "emission_color": "emission_color",
+    "emission_luminance": "emission",
 }
 _METRES_PER_MM = 1e-3
 _MAX_NAME_LENGTH = 40
 _EYE_IOR = 1.376
 _ROUGHNESS_BY_KIND = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
 _DEFAULT_ROUGHNESS = 0.8
+_PART_IOR = 1.5  # of the metallic-roughness model
+PART_PREFIX = "parts_"
+"""Prefix of the roles of pictures of parts that are not skin."""
 MAP_INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
     "roughness": "specular_roughness",
@@ -51,6 +59,14 @@ MAP_INPUTS: Mapping[str, str] = {
     "normal": "geometry_normal",
 }
 """OpenPBR input that each map sets, by the role of the map."""
+_PART_INPUTS: Mapping[PartRole, str] = {
+    "colour": "base_color",
+    "opacity": "geometry_opacity",
+    "roughness": "specular_roughness",
+    "metalness": "base_metalness",
+    "normal": "geometry_normal",
+    "emission": "emission_color",
+}
 LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
@@ -77,6 +93,12 @@ MAP_TYPES: Mapping[str, MapType] = {
     "specular": MapType("float", "", "raw"),
     "normal": MapType("vector3", "", "raw"),
     "eye": MapType("color3", "srgb_texture", "sRGB"),
+    "parts_colour": MapType("color3", "srgb_texture", "sRGB"),
+    "parts_opacity": MapType("float", "", "raw"),
+    "parts_roughness": MapType("float", "", "raw"),
+    "parts_metalness": MapType("float", "", "raw"),
+    "parts_normal": MapType("vector3", "", "raw"),
+    "parts_emission": MapType("color3", "srgb_texture", "sRGB"),
 }
 
 
@@ -135,6 +157,18 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
         "specular_ior": _EYE_IOR if "eye" in name else SKIN_ETA,
     }
     return OpenPbrMaterial(material.name, values, {})
+
+
+def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial:
+    """Return the OpenPBR material of a part with pictures."""
+    roles = pictures.roles(material)
+    maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
+    values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
+    if max(material.emission) > 0.0:
+        values["emission_luminance"], values["emission_color"] = pictures.emission(material)
+    return OpenPbrMaterial(
+        material.name, {key: value for key, value in values.items() if key not in maps}, maps
+    )
 
 
 def eye_material(name: str) -> OpenPbrMaterial:
@@ -210,6 +244,20 @@ def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
     return dict(zip(files, written, strict=True))
 
 
+def write_part_pictures(
+    subject: Subject, folder: Path, prefix: str, roles: Iterable[PartRole] = ()
+) -> list[Path]:
+    """Write the pictures of parts that are not skin as PNG files, and return their paths.
+
+    prefix : prefix of the file names
+    roles : further roles of pictures to write, which OpenPBR does not use
+    """
+    if subject.part_pictures is None:
+        return []
+    files = subject.part_pictures.encode([*_PART_INPUTS, *roles])
+    return write_files(folder, ((f"{prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items()))
+
+
 def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
     """Return the OpenPBR materials of the subject's mesh by material index.
 
@@ -218,11 +266,13 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> d
     """
     red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
     colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
-    mesh = subject.head_or_ball.mesh
+    mesh, parts = subject.head_or_ball.mesh, subject.part_pictures
 
     def definition(material: Material) -> OpenPbrMaterial:
+        if parts is not None and material.has_maps:
+            return part_material(material, parts)
         if material.kind != "skin":
             return opaque_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
-    return {number: definition(mesh.materials[number]) for number in np.unique(mesh.material).tolist()}
+    return {index: definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

@@ -21,6 +21,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     input_name,
     mesh_materials,
     write_maps,
+    write_part_pictures,
 )
 from dermis.base.extras import import_extra
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -56,6 +57,10 @@ class OpenPbr(Target):
         "walks diffuse light up to 3.6 times too far, most in dark skin. MaterialX's GLSL only modifies "
         "shading by curvature. With a colour map, the diffusion is correct for the mean colour, and smaller "
         "in darker skin."
+    )
+    part_limitations = (
+        "The pictures of parts that are not skin have the uv of the meshes that exports to usd and gltf "
+        "contain, not those of the original file."
     )
 
     @property
@@ -101,7 +106,7 @@ class OpenPbr(Target):
         definitions = mesh_materials(subject, get_radii_mm(parameters, self.shader), maps)
         document = build_document([*definitions.values()], self.shader, prefix)
         mx.writeToXmlFile(document, str(file))
-        return [file, *maps.values()]
+        return [file, *maps.values(), *write_part_pictures(subject, file.parent, prefix)]
 
 
 def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:

@@ -91,6 +91,7 @@ class EnginePage(Target):
 
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
+    part_limitations: ClassVar[str] = ""
     licence: ClassVar[str]
     """Licence of the library."""
     drawing_script: ClassVar[Path]
@@ -122,7 +123,7 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the HTML that loads or embeds the library, and its sources for the page's policy."""
+        """Return the HTML that loads or embeds the library, and sources that the page's policy must allow."""
 
     def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
@@ -148,7 +149,7 @@ def module_url(text: str, names: Mapping[str, str]) -> str:
     """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
 
     text : source of the module
-    names : name in the page by the name in an import statement of the module
+    names : names that the page defines, by the name in the import statements of the module
     """
     for old, new in names.items():
         text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.scene_parts import encode_ply, supported_lights
+from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
 from dermis.environment.panorama import UNIFORM
-from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (
@@ -26,7 +25,7 @@ from dermis.scene.lights import (
     StripeLight,
 )
 
-DirectiveParameters = Mapping[str, ArrayLike]
+DirectiveParameters = Mapping[str, ArrayLike | Sequence[str]]
 Lines = list[str]
 PICTURE_SIDE, SAMPLES_PER_PIXEL = 1024, 256
 _MAX_BOUNCES = 100
@@ -37,13 +36,15 @@ def directive(word: str, kind: str, parameters: DirectiveParameters | None = Non
 
     word : first word of the directive, such as "Material"
     kind : pbrt's name of the implementation, such as "subsurface"
-    parameters : text, Boolean, number or array of numbers by type and name, such as "float eta"
+    parameters : values by type and name, such as "float eta": text, texts, Boolean, number or numbers
     """
     texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([word, f'"{kind}"', *texts])
 
 
-def _text(value: ArrayLike) -> str:
+def _text(value: ArrayLike | Sequence[str]) -> str:
+    if isinstance(value, list) and isinstance(value[0], str):
+        return " ".join(map(_text, value))
     if isinstance(value, str):
         return '"' + value.replace("\\", "_").replace('"', "_") + '"'
     if isinstance(value, bool):
@@ -75,7 +76,7 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of lights and environment, omitting with a note those that pbrt lacks."""
+    """Return the directives of lights and environment; those that pbrt lacks are omitted with a warning."""
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT_LIGHTS, "pbrt"), start=1):
         if PBRT_LIGHTS[light.kind] is _unsupported:
@@ -87,18 +88,6 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
     elif environment is not None:
         lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
     return lines
-
-
-def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float]) -> bytes:
-    """Return selected triangles of a mesh as a binary PLY file with normals and uv (v upwards).
-
-    faces : (t,) mask of the selected triangles
-    centre_mm : (3,) point that becomes the origin of the file [mm]
-    """
-    vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
-    uv = np.column_stack([mesh.uv[vertex, 0], 1.0 - mesh.uv[vertex, 1].astype("<f4")])
-    positions = mesh.positions[vertex] - np.asarray(centre_mm)
-    return encode_ply(corner.reshape(-1, 3), positions, mesh.normals[vertex], uv)
 
 
 def _distance(light: PointLight) -> float:

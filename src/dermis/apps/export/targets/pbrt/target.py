@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -10,13 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.export.fitting import fit_scale, scale_lengths
+from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
-from dermis.apps.export.targets.openpbr.materials import encode_map_files, file_prefix, map_arrays
+from dermis.apps.export.targets.openpbr.materials import (
+    PART_PREFIX,
+    encode_map_files,
+    file_prefix,
+    map_arrays,
+)
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines, mesh_ply
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines
+from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Material
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion.boundary import fresnel, internal_moment
 from dermis.optics.media import SKIN_ETA
@@ -27,13 +36,19 @@ Floats = NDArray[np.float64]
 
 _ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
 _FIRST_RADIUS, _RADIUS_RATIO = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
-_ALBEDO_DENSITY = 8.0
+_ALBEDO_DENSITY = 8.0  # larger values place more of the albedos near 1
 _TEXTURES_BY_ROLE = {
     "colour": ("spectrum", "sRGB", "reflectance"),
     "roughness": ("float", "linear", "roughness"),
 }
+_PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
+    "colour": ("spectrum", "sRGB"),
+    "alpha": ("float", "linear"),
+    "metalness": ("float", "linear"),
+    "opacity": ("float", "linear"),
+}
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
-_OPAQUE_ROUGHNESS = 0.3  # materials other than skin
+_OPAQUE_ROUGHNESS = 0.3  # of materials other than skin
 _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
     10.0,
     1.4,
@@ -72,7 +87,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     eta : index of refraction of the medium
 
-    Source: [Habel2013] in the form of [Pharr2023]; the moments of the reflectance are exact here.
+    Source: [Habel2013] in the form of [Pharr2023]; the moments of the Fresnel reflectance are exact here.
     """
     radius = np.concatenate([[0.0], _FIRST_RADIUS * _RADIUS_RATIO ** np.arange(_RADIUS_COUNT - 1)])
     steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)
@@ -110,7 +125,7 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
-    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # total internal reflection above
+    critical_depth = radius * np.sqrt(eta**2 - 1.0)  # light scattered at a smaller depth is totally reflected
     depth = critical_depth + _sample_depths()[:, None]
     path = np.hypot(radius, depth)
     cosine = depth / path
@@ -152,6 +167,10 @@ class Pbrt(Target):
         "cannot be reduced, as the material has no such parameter. Hairs and colours of eyes are omitted. "
         "Colours become smooth spectra. The scene must stay in millimetres: the parameter scale multiplies "
         "mfp here, but in media given by sigma it multiplies sigma."
+    )
+    part_limitations = (
+        "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
+        "mirrored."
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
@@ -227,19 +246,20 @@ def _scene_lines(
     textures = skin_textures(subject, prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
     lines += [*camera_lines(scene.camera, f"{prefix}picture.exr"), "WorldBegin"]
-    lines += [*light_lines(scene.lights, scene.environment), *textures.lines]
-    files = dict(textures.files)
-    for number in np.unique(head.mesh.material).tolist():
-        material, name = head.mesh.materials[number], f"{prefix}part_{number}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == number, head.centre_mm)
-        is_skin = material.kind == "skin"
-        text = (
-            _skin_material(parameters, textures.material_textures)
-            if is_skin
-            else _opaque_material(material.colour)
-        )
-        shape = directive("Shape", "plymesh", {"string filename": name})
-        lines += ["AttributeBegin", text, shape, "AttributeEnd"]
+    part_lines, part_files = _part_textures(subject, prefix)
+    lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
+    files = textures.files | part_files
+    for index in np.unique(head.mesh.material).tolist():
+        material, name = head.mesh.materials[index], f"{prefix}part_{index}.ply"
+        files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, v_up=True)
+        roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
+        if material.kind == "skin":
+            texts = [_skin_material(parameters, textures.material_textures)]
+        else:
+            texts = _opaque_materials(material, roles, f"part_{index}", prefix)
+        alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
+        shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
+        lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
     return lines, files
 
 
@@ -258,9 +278,49 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return directive("Material", "subsurface", values)
 
 
-def _opaque_material(colour: tuple[float, float, float]) -> str:
-    roughness = {"float roughness": _OPAQUE_ROUGHNESS, "bool remaproughness": False}
-    return directive("Material", "coateddiffuse", {"rgb reflectance": colour, **roughness})
+def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
+    """Return the material directives for a part that is not skin, with references to the part's pictures.
+
+    name : prefix of the names of the two materials that are mixed for a metal part
+    prefix : prefix of the names of the image files
+    """
+    values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
+    if "colour" in roles:
+        values = {"texture reflectance": "parts_colour"}
+    if "alpha" in roles:
+        values["texture roughness"] = "parts_alpha"
+    else:
+        values["float roughness"] = _OPAQUE_ROUGHNESS
+    values["bool remaproughness"] = False
+    if "normal" in roles:
+        values["string normalmap"] = f"{prefix}{PART_PREFIX}normal.png"
+    if "metalness" not in roles:
+        return [directive("Material", "coateddiffuse", values)]
+    names = {f"{name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
+    mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
+    mixed = directive("Material", "mix", {**mix, "texture amount": "parts_metalness"})
+    named = [directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names]
+    return [*named, mixed]
+
+
+def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
+    """Return the texture directives for parts that are not skin, and the image files by name.
+
+    prefix : prefix of the names of the image files
+    """
+    lines, files = Lines(), dict[str, bytes]()
+    if subject.part_pictures is not None:
+        for role, data in subject.part_pictures.encode([*_PART_TEXTURES, "normal"]).items():
+            file = f"{prefix}{PART_PREFIX}{role}.png"
+            files[file] = data
+            if role in _PART_TEXTURES:
+                lines.append(_image_directive(f"{PART_PREFIX}{role}", *_PART_TEXTURES[role], file))
+    return lines, files
+
+
+def _image_directive(name: str, texture_type: str, encoding: str, file: str) -> str:
+    options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
+    return directive(f'Texture "{name}" "{texture_type}"', "imagemap", options)
 
 
 class SkinTextures(NamedTuple):
@@ -268,8 +328,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : contents of the image files by file name
-    material_textures : pbrt type, and name of the texture or image file, by the parameter of the skin's
-        material that uses it
+    material_textures : for each parameter of the skin's material with a map: pbrt type, and name of the
+        texture or image file
     """
 
     lines: Lines
@@ -296,8 +356,7 @@ def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
             textures.material_textures["normalmap"] = "string", file
             continue
         texture_type, encoding, parameter = _TEXTURES_BY_ROLE[role]
-        options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
-        textures.lines.append(directive(f'Texture "{role}" "{texture_type}"', "imagemap", options))
+        textures.lines.append(_image_directive(role, texture_type, encoding, file))
         textures.material_textures[parameter] = "texture", role
     return textures
 

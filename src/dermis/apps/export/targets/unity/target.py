@@ -38,7 +38,7 @@ _TRANSMISSION_NAME, _THICKNESS_NAME = "transmissionTint", "thicknessRemap"
 _SKIN_IOR, _RELATIVE_MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
 _NAIVE_MULTIPLIER_MM = 1.0
 _VERSION_BEFORE_14 = "12"
-_FILE_VERSIONS = {_VERSION_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; 1 has no multiplier
+_FILE_VERSIONS = {_VERSION_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; version 1 has no multiplier
 
 
 class Unity(Target):
@@ -95,7 +95,7 @@ class Unity(Target):
 
 
 def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
-    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier since.
+    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier from HDRP 14 on.
 
     d_mm : (3,) widths of the Burley profiles [mm]
     """

@@ -1,8 +1,8 @@
 """Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
 In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
-over 0.6 s(A), where A is the albedo and s Burley's factor for perpendicular light; the scaling of searchlight
-profiles cancels.
+divided by 0.6 s(A), where A is the albedo and s Burley's factor for perpendicular light; the engine's scaling
+of searchlight profiles cancels out.
 """
 
 from __future__ import annotations
@@ -112,7 +112,9 @@ def _editor_script(subject: Subject, parameters: Parameters, maps: Mapping[str, 
 
     maps : file names of the maps by role
     """
-    settings = [f"    {json.dumps(one.name)}: {_value(one.value)},  # {one.unit}\n" for one in parameters]
+    settings = [
+        f"    {json.dumps(one.name)}: {_python_literal(one.value)},  # {one.unit}\n" for one in parameters
+    ]
     files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in maps.items()]
     text = Path(__file__).with_name("editor_script.txt").read_text("utf-8")
     fields = {"NAME": json.dumps(subject.identifier), "VERSION": version}
@@ -122,7 +124,7 @@ def _editor_script(subject: Subject, parameters: Parameters, maps: Mapping[str, 
     return text
 
 
-def _value(value: ParameterValue) -> str:
+def _python_literal(value: ParameterValue) -> str:
     if isinstance(value, tuple):
         return f"unreal.LinearColor({', '.join(f'{x:.6g}' for x in value)}, 1.0)"
     return f"{value:.6g}" if isinstance(value, float) else repr(value)

@@ -70,6 +70,8 @@ def add_mesh(
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable.normals[vertex])))
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    if head.maps.parts is not None:
+        prim.CreateDoubleSidedAttr(True)
     _add_uv(prim, texture_coordinates(head), polygons)
     subsets, family, tokens = {}, "materialBind", UsdGeom.Tokens
     for k in np.unique(polygons.material).tolist():
@@ -93,7 +95,7 @@ def texture_coordinates(head: Head) -> Floats:
 def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     """Add texture coordinates to a mesh as face-varying values.
 
-    uv : (v, 2) texture coordinates of the vertices, with v upwards
+    uv : (v, 2) texture coordinates of the vertices, with v downwards; USD has v upwards
     """
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens

@@ -22,6 +22,8 @@ _PREVIEW_INPUTS = {
     "specular_roughness": "roughness",
     "specular_ior": "ior",
     "geometry_normal": "normal",
+    "base_metalness": "metallic",
+    "emission_color": "emissiveColor",
 }
 _UV_PRIMVAR = "st"
 
@@ -116,7 +118,7 @@ def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, pref
         file.GetAttr().SetColorSpace(map_type.space or "raw")
         image.CreateInput("texcoord", types.Float2).ConnectToSource(uv)
         output = image.CreateOutput("out", usd_type)
-        if role == "normal":
+        if map_type.type == "vector3":
             normal_map = _add_shader(material, "normal_in_space", "ND_normalmap_float")
             normal_map.CreateInput("in", usd_type).ConnectToSource(output)
             output = normal_map.CreateOutput("out", usd_type)
@@ -132,29 +134,39 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
     """
     types = Sdf.ValueTypeNames
     surface = _add_shader(material, "preview", "UsdPreviewSurface")
+    luminance = float(np.max(definition.values.get("emission_luminance", 0.0)))
     for key, value in definition.values.items():
         if key in _PREVIEW_INPUTS and not (key == "base_color" and "subsurface_color" in definition.maps):
-            _set_input(surface, _PREVIEW_INPUTS[key], value)
+            radiance = tuple(luminance * np.array(value)) if key == "emission_color" else value
+            _set_input(surface, _PREVIEW_INPUTS[key], radiance)
     uv = None
     for key, role in definition.maps.items():
         if key not in _PREVIEW_INPUTS:
             continue
+        is_cut = role == "parts_colour" and "geometry_opacity" in definition.maps
+        file, map_type = "parts_cutout" if is_cut else role, MAP_TYPES[role]
         if uv is None:
             uv_node = _add_shader(material, "preview_place", "UsdPrimvarReader_float2")
             uv_node.CreateInput("varname", types.String).Set(_UV_PRIMVAR)
             uv = uv_node.CreateOutput("result", types.Float2)
         texture = _add_shader(material, f"preview_{role}", "UsdUVTexture")
-        texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
-        texture.CreateInput("sourceColorSpace", types.Token).Set(MAP_TYPES[role].preview_space)
+        texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{file}.png"))
+        texture.CreateInput("sourceColorSpace", types.Token).Set(map_type.preview_space)
         texture.CreateInput("st", types.Float2).ConnectToSource(uv)
         for wrap in ("wrapS", "wrapT"):
             texture.CreateInput(wrap, types.Token).Set("clamp")
-        if role == "normal":
+        if map_type.type == "vector3":
             texture.CreateInput("scale", types.Float4).Set((2.0, 2.0, 2.0, 1.0))
             texture.CreateInput("bias", types.Float4).Set((-1.0, -1.0, -1.0, 0.0))
-        scalar = role == "roughness"
+        if role == "parts_emission":
+            texture.CreateInput("scale", types.Float4).Set((luminance, luminance, luminance, 1.0))
+        if is_cut:
+            opacity = texture.CreateOutput("a", types.Float)
+            surface.CreateInput("opacity", types.Float).ConnectToSource(opacity)
+            surface.CreateInput("opacityThreshold", types.Float).Set(0.5)
+        scalar = map_type.type == "float"
         output = texture.CreateOutput("r" if scalar else "rgb", types.Float if scalar else types.Float3)
-        input_type = {"normal": types.Normal3f, "roughness": types.Float}.get(role, types.Color3f)
+        input_type = {"vector3": types.Normal3f, "float": types.Float}.get(map_type.type, types.Color3f)
         surface.CreateInput(_PREVIEW_INPUTS[key], input_type).ConnectToSource(output)
     out = surface.CreateOutput("surface", types.Token)
     material.CreateSurfaceOutput().ConnectToSource(out)

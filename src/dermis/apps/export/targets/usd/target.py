@@ -14,6 +14,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     file_prefix,
     mesh_materials,
     write_maps,
+    write_part_pictures,
 )
 from dermis.apps.export.targets.openpbr.target import OpenPbr, get_radii_mm
 from dermis.base.errors import refuse
@@ -35,6 +36,7 @@ class Usd(OpenPbr):
         "use UsdPreviewSurface, which has no subsurface scattering. Hairs do not follow the head's motion. "
         "Programs that convert the unit of a stage must also scale the radii."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the OpenPBR parameters for which the random walk is closest to the reference profile."""
@@ -76,10 +78,11 @@ def _write_stage(subject: Subject, parameters: Parameters, file: Path, prefix: s
         maps["eye"].write_bytes(encode_map_files({"eye": eye_pictures.colour})["eye"])
         for material in definitions.keys() & set(head.eyes.material.tolist()):
             definitions[material] = eye_material(head.mesh.materials[material].name)
+    part_pictures = write_part_pictures(subject, file.parent, prefix, ["cutout"])
     stage = build_stage(head, Path(subject.name).stem or subject.name, definitions, prefix)
     if not stage.GetRootLayer().Export(str(file)):
         refuse(file.name, "a stage that USD can write", "it failed", "Choose another name")
-    return [*maps.values()]
+    return [*maps.values(), *part_pictures]
 
 
 TARGET = Usd()

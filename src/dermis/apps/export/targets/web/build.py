@@ -1,4 +1,4 @@
-"""Frames of a scene captured for the web page, for GPUs and software adapters and several picture sizes."""
+"""Capture of the frames of the web page, for GPUs and software adapters and in several picture sizes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PAGE_TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
 INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
-"""Side [pixel], samples per pixel and merged hairs during interaction, by kind of adapter."""
+"""Side [pixel], samples per pixel and number of hairs drawn as one during interaction, by kind of adapter."""
 
 
 @dataclass
@@ -41,11 +41,11 @@ class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
     frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
-    packer : compressed buffers and textures
+    packer : collector of the buffers and textures, which compresses them
     maps : maps encoded as pictures
-    pictures : WebP files of the maps, in the order in which entries refer to them
-    picture_entries : index in `pictures`, byte run of the value curves, and number of colour channels, by
-        role, mip level and layer of a map
+    pictures : WebP files of the maps; `picture_entries` has indices in this list
+    picture_entries : for each role, mip level and layer of a map: index in `pictures`, index of the value
+        curves in `Packer.runs`, and number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -151,7 +151,7 @@ def _capture_frames(
     kind_json = frames_json(capture, frames, picture_maps, steps, content.packer)
     for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
-    kind_json["maps"] = {str(number): _mip_entries(content, one) for number, one in picture_maps.items()}
+    kind_json["maps"] = {str(index): _mip_entries(content, one) for index, one in picture_maps.items()}
     assert base is not None
     kind_json["hands"] = _interaction_json(request.scene, base)
     kind_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
@@ -166,7 +166,7 @@ def _frame_changes(
     base: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
-    """Return, by slider, the changes of a frame's records and buffers at each node of the slider.
+    """Return, by slider name, how a frame's records and buffers change at each node of the slider.
 
     base : inputs of the frame with all sliders at their defaults
     """
@@ -192,8 +192,8 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
     """Return the index of the colour map and, by slider, the pictures that replace it at the nodes."""
-    number = next((k for k, one in maps.items() if one.role == "colour_map"), None)
-    if number is None:
+    map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
+    if map_index is None:
         return {}
     settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
     for slider in (one for one in request.sliders if not one.changes_pose_only):
@@ -201,7 +201,7 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
         nodes = [_colour_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes]
         if any(nodes):
             entries[slider.name] = nodes
-    return {"map": number, "dials": entries} if entries else {}
+    return {"map": map_index, "dials": entries} if entries else {}
 
 
 def _colour_entry(

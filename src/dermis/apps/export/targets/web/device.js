@@ -1,4 +1,4 @@
-// Creation of the resources, pipelines and bind groups that the file describes.
+// Creation of the resources, pipelines and bind groups that the page's data describes.
 
 import { makeSlot } from "./graph.js";
 import { unpackRun } from "./packed.js";
@@ -32,7 +32,7 @@ import { unpackRun } from "./packed.js";
 /**
  * @typedef {{shaders: string[], programs: Program[], resources: ResourceDescription[],
  *     contents: Record<string, number[]>, frames: Frame[], halved: Record<string, Pass[]>,
- *     maps: Record<string, Layer[][]>, hands: import("./camera.js").Hands,
+ *     maps: Record<string, Layer[][]>, hands: import("./camera.js").Interaction,
  *     colours: {map: number, dials: Record<string, (Layer | null)[]>},
  *     structs: Record<string, {size: number, members: Record<string, any>}>}} Scene
  */

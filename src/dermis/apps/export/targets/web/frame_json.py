@@ -60,7 +60,7 @@ def frames_json(
 ) -> Json:
     """Return the JSON of frames with their shaders, resources and passes, and add their data to the packer.
 
-    Resources are created with zeros, so that data which is all zero is not stored.
+    Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
     steps : quantisation step of each column of quantised float buffers, by resource index
@@ -69,16 +69,16 @@ def frames_json(
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
-    for number in resources_read_first(capture, captured_frames):
-        if number in steps:
-            floats = capture.read_content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
-            contents[number] = [packer.add_floats(floats, steps[number])]
+    for index in resources_read_first(capture, captured_frames):
+        if index in steps:
+            floats = capture.read_content(index)[0].view(np.float32).reshape(-1, len(steps[index]))
+            contents[index] = [packer.add_floats(floats, steps[index])]
             continue
-        _, picture_count, mip_passes = picture_maps.get(number, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mip_bytes(capture, number)[picture_count:]
+        _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
+        mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
         if any(one.any() for one in mips):
-            add = packer.add if number not in tables else _column_packer(packer)
-            contents[number] = [-1] * picture_count + [add(one) for one in mips]
+            add = packer.add if index not in tables else _column_packer(packer)
+            contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
         "programs": [_program_json(one) for one in capture.programs],
@@ -91,33 +91,33 @@ def frames_json(
 
 
 def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
-    """Return a function that packs each third of a buffer separately and returns the byte run of all.
+    """Return a function that packs each third of a buffer separately and returns the index of the joined run.
 
     The buffers are triangle tables: three columns of equal length, one after the other.
     """
     return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, number: int) -> list[Bytes]:
-    """Return the bytes of a texture by mip level, with all layers of a level joined, or of a buffer.
+def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
+    """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
-    number : resource index
+    index : resource index
     """
-    parts, layers = capture.read_content(number), capture.resources[number].get("size")
+    parts, layers = capture.read_content(index), capture.resources[index].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame_json(one: NamedFrame, picture: list[int], packer: Packer) -> Json:
-    records = [(struct, packer.add(record.tobytes())) for struct, record in one.captured.records]
+def _frame_json(frame: NamedFrame, picture: list[int], packer: Packer) -> Json:
+    records = [(struct, packer.add(record.tobytes())) for struct, record in frame.captured.records]
     return {
-        "name": one.name,
-        "size": one.size,
-        "moving": one.merged_hairs > 0,
+        "name": frame.name,
+        "size": frame.size,
+        "moving": frame.merged_hairs > 0,
         "picture": picture[0],
         "linear": picture[1],
-        "views": {stage: _view_record(one.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes_json(one.captured, packer),
+        "views": {stage: _view_record(frame.captured, stage) for stage in ("visibility", "shadows")},
+        "passes": _passes_json(frame.captured, packer),
         "records": records,
     }
 
@@ -133,13 +133,16 @@ def _view_record(captured: CapturedFrame, stage: str) -> int:
 
 
 def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
-    """Return the passes of a frame; bytes that the host writes become a buffer index and a byte run."""
+    """Return the passes of a frame; bytes that the host writes are given as buffer index and byte run."""
     writes = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
 
 
-def _program_json(one: Json) -> Json:
-    return {**one, "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in one["bindings"]]}
+def _program_json(program: Json) -> Json:
+    return {
+        **program,
+        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program["bindings"]],
+    }
 
 
 def _struct_json(dtype: np.dtype[Any]) -> Json:
@@ -191,45 +194,49 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
     return found
 
 
-def base_resource(capture: FrameCapture, number: int) -> int:
+def base_resource(capture: FrameCapture, index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
-    number : resource index
+    index : resource index
     """
-    return int(capture.resources[number].get("of", number))
+    return int(capture.resources[index].get("of", index))
 
 
-def resources_read_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
-    one : the pass
+    captured_pass : pass that reads
     """
-    yield from (k for k, entry in _bound_entries(capture, one) if _reads(entry))
-    if one.raster and one.raster["indices"] >= 0:
-        yield int(one.raster["indices"])
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
+    if captured_pass.raster and captured_pass.raster["indices"] >= 0:
+        yield int(captured_pass.raster["indices"])
 
 
-def resources_written_by(capture: FrameCapture, one: CapturedPass) -> Iterator[int]:
+def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
-    one : the pass
+    captured_pass : pass that writes
     """
-    if one.written:
-        yield one.written[0]
-    yield from (k for k, entry in _bound_entries(capture, one) if _writes(entry))
-    if one.raster:
-        yield from (int(one.raster[name]) for name in ("depth", "target") if one.raster[name] >= 0)
+    if captured_pass.written:
+        yield captured_pass.written[0]
+    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_writing(entry))
+    if captured_pass.raster:
+        yield from (
+            int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
+        )
 
 
-def _bound_entries(capture: FrameCapture, one: CapturedPass) -> Iterator[tuple[int, Json]]:
-    if one.program is not None:
-        bindings = capture.programs[one.program]["bindings"]
-        yield from ((k, entry) for k, (_, _, entry) in zip(one.bound, bindings, strict=True) if k >= 0)
+def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
+    if captured_pass.program is not None:
+        bindings = capture.programs[captured_pass.program]["bindings"]
+        yield from (
+            (k, entry) for k, (_, _, entry) in zip(captured_pass.bound, bindings, strict=True) if k >= 0
+        )
 
 
-def _reads(entry: Json) -> bool:
+def _allows_reading(entry: Json) -> bool:
     return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
 
 
-def _writes(entry: Json) -> bool:
+def _allows_writing(entry: Json) -> bool:
     return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}

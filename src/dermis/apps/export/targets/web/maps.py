@@ -111,7 +111,7 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the stored picture of a role was encoded."""
+        """Return whether texels equal the texels from which the stored picture of a role was encoded."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
@@ -120,26 +120,26 @@ class MapPictures:
         The renderer then shows the same maps as the page. Returns the maps by resource index.
         """
         maps = {}
-        for number, role in _picture_textures(capture, frames).items():
-            texture, description = capture.resource_at(number), capture.resources[number]
+        for index, role in _picture_textures(capture, frames).items():
+            texture, description = capture.resource_at(index), capture.resources[index]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
             mips = (
                 1 if storable else sum(side >> mip >= MIN_PICTURE_SIDE for mip in range(description["mips"]))
             )
-            levels = [self._add_pictures(capture, number, role, mip) for mip in range(mips)]
+            levels = [self._add_pictures(capture, index, role, mip) for mip in range(mips)]
             small_mips = range(mips, description["mips"] if mips > 1 else 0)
-            levels += [read_texels(capture, number, mip) for mip in small_mips]
+            levels += [read_texels(capture, index, mip) for mip in small_mips]
             update_map(renderer, texture, levels)
-            maps[number] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
+            maps[index] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
         return maps
 
-    def _add_pictures(self, capture: FrameCapture, number: int, role: str, mip: int) -> NDArray[np.float16]:
+    def _add_pictures(self, capture: FrameCapture, index: int, role: str, mip: int) -> NDArray[np.float16]:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
 
-        number : resource index
+        index : resource index
         mip : mip level
         """
-        layers = read_texels(capture, number, mip)
+        layers = read_texels(capture, index, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
                 self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
@@ -169,29 +169,29 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
     Returns the quantisation step of each column by resource index.
     """
     buffers = resources_bound_as(capture, frames, ("knots",))
-    for number in buffers:
-        knots = capture.read_content(number)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
+    for index in buffers:
+        knots = capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
         data = quantise(knots, _KNOT_STEPS_MM)
-        renderer.device.write(capture.resource_at(number), data.tobytes(), data.nbytes)
+        renderer.device.write(capture.resource_at(index), data.tobytes(), data.nbytes)
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, number: int, mip: int) -> NDArray[np.float16]:
+def read_texels(capture: FrameCapture, index: int, mip: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
-    number : resource index
+    index : resource index
     """
-    width, height, layers = capture.resources[number]["size"]
+    width, height, layers = capture.resources[index]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
-    parts = capture.read_content(number)[mip * layers : (mip + 1) * layers]
+    parts = capture.read_content(index)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
     """Return the roles of half-float map textures that are large enough for pictures, by resource index."""
     return {
-        number: role
-        for number, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
-        if capture.resources[number].get("format", "").endswith("16float")
-        and min(capture.resources[number]["size"][:2]) >= MIN_PICTURE_SIDE
+        index: role
+        for index, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
+        if capture.resources[index].get("format", "").endswith("16float")
+        and min(capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
     }

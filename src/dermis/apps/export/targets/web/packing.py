@@ -33,7 +33,7 @@ class Packer:
 
     def __init__(self) -> None:
         self.runs: list[ByteRun] = []
-        self._run_numbers: dict[bytes, int] = {}
+        self._run_indices: dict[bytes, int] = {}
         self._data: list[bytes] = []
         self._end = 0
 
@@ -53,7 +53,7 @@ class Packer:
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """Add floats as integer multiples of a step for each column, and return the index of the run.
+        """Add a run of floats as integer multiples of one step per column; return its index in `runs`.
 
         values : (n, c) floats that are multiples of the steps
         steps : (c,) steps, powers of two
@@ -64,14 +64,14 @@ class Packer:
 
     def _add(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
         key = hashlib.sha256(raw.tobytes()).digest() + repr(steps).encode()
-        if key not in self._run_numbers:
-            self._run_numbers[key] = len(self.runs)
+        if key not in self._run_indices:
+            self._run_indices[key] = len(self.runs)
             layout = _best_layout(raw, layouts)
             planes = byte_planes(raw, *layout)
             self.runs.append((self._end, len(planes), *layout, steps))
             self._data.append(planes)
             self._end += len(planes)
-        return self._run_numbers[key]
+        return self._run_indices[key]
 
     def compress(self) -> bytes:
         """Return all runs as one gzip file."""
@@ -98,7 +98,7 @@ def encode_seven_bits(data: bytes) -> str:
 
 
 def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
-    """Return the bytes of a table of words by byte column, which compresses better than row by row.
+    """Return the bytes of a table of words, one byte column after another, which improves compression.
 
     raw : the table, row by row
     word, row : bytes per word and words per row

@@ -102,15 +102,15 @@ def _float_word_mask(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
     return is_float
 
 
-def _written_floats(one: CapturedPass) -> Floats:
-    return np.frombuffer(one.written[1] if one.written else b"", "<f4")
+def _written_floats(captured_pass: CapturedPass) -> Floats:
+    return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
 def _differences(
     pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer
 ) -> list[tuple[int, int, int]]:
     changes = []
-    for number, (before, after) in pairs:
+    for index, (before, after) in pairs:
         if before.tobytes() == after.tobytes():
             continue
         if len(before) != len(after):
@@ -121,7 +121,7 @@ def _differences(
         changed = np.flatnonzero(difference)
         if len(changed):
             part = difference[changed[0] : changed[-1] + 1]
-            changes.append((number, int(changed[0]), packer.add(part.view(np.uint8))))
+            changes.append((index, int(changed[0]), packer.add(part.view(np.uint8))))
     return changes
 
 

@@ -100,6 +100,7 @@ class Web(Target):
         "side, 8 bits per channel and WebP compression. Expressions move skin without folds and flushing. "
         "Sliders interpolate between a few values. Hairs keep the width of the first view."
     )
+    part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the side of the atlas, and the Gaussians with which the page diffuses light."""
@@ -114,7 +115,7 @@ class Web(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the exported parameters, as users of the page cannot choose any."""
+        """Return the exported parameters: the page has no parameters that a user could set."""
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

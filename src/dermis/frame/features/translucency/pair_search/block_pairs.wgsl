@@ -1,4 +1,4 @@
-// Bits that tell between which blocks of tiles translucent pairs are possible.
+// A bit for each pair of blocks of tiles: whether translucent pairs between them are possible.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> blocks: array<Bounds>;

@@ -175,8 +175,8 @@ def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
     """
     count = first[chosen + 1] - first[chosen]
     position = np.repeat(np.arange(len(chosen)), count)
-    numbers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
-    return numbers, position
+    integers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
+    return integers, position
 
 
 def compute_positions(

@@ -4,7 +4,7 @@ struct Search {
     radius_mm: f32, // largest distance of a pair
     variance_mm2: f32, // of the widest Gaussian
     tile: f32, // side of a tile, in units of the side of the atlas
-    margin: f32, // by which a tile may show more than it covers, in the same unit
+    margin: f32, // width around a tile in which triangles also count as inside, in the same unit
     tiles: u32, // tiles along a side of the atlas
     blocks: u32, // blocks of tiles along a side of the atlas
     block: u32, // tiles along a side of a block

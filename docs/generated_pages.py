@@ -1,4 +1,8 @@
-"""Pages that Sphinx makes from the code: gallery, settings of a scene, public names, bibliography."""
+"""Sphinx extension that generates pages from the code: gallery, settings, reference and bibliography.
+
+Docstrings have numpydoc sections, which `sphinx.ext.napoleon` converts, or lines "name : meaning", which this
+extension converts to the same fields.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +51,7 @@ TABLES: dict[str, tuple[type[FrozenModel], dict[str, str] | None]] = {
     "[camera]": (Camera, None),
     "[render]": (Settings, {}),
 }
-"""The tables of a scene's file: their models, and options by field where these are called otherwise."""
+"""Tables of a scene file: their models, and option names by field where they differ from the field's name."""
 SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "Above all tables": Spec,
     "[person]": PersonTable,
@@ -61,13 +65,12 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[background]": BackgroundTable,
     "[[correlated]]": CorrelationGroup,
 }
-_KEYWORDS = re.compile(r"^\*\*(\w+)$")
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
-_PARTS = re.compile(
+_TEX_GROUPS = re.compile(
     r"_(?P<index>[A-Za-z]{2,})|\^(?:\((?P<power>[^()]*)\)|(?P<name>[A-Za-z]{2,}))"
     r"|(?P<word>[A-Za-z]{3,}(?:[ -][A-Za-z]+)*)"
 )
-"""What is more than a letter in the equation of a script."""
+"""Words, indices and powers of several letters in the equation of a gallery script."""
 _SIGNS = {"Σ": "sum", "ρ": "rho", "σ": "sigma", "π": "pi", "∂": "partial", "·": "cdot", "≈": "approx"}
 _TEX = {sign: rf"\{name} " for sign, name in _SIGNS.items()}
 _TEX |= {"∗": "*", "−": "-", "′": "'", "₀": "_0", "²": "^2", "⁵": "^5"}
@@ -75,15 +78,16 @@ _KEY = re.compile(r"\[([A-Za-z]{2,}\d{4}[a-z]?)\]")
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Sphinx calls this."""
+    """Register the extension; Sphinx calls this function."""
     app.connect("builder-inited", lambda app: write_pages(HERE / "generated"))
-    app.connect("autodoc-process-docstring", _as_fields)
+    app.connect("autodoc-process-docstring", _drop_model_parameters, priority=400)  # before napoleon
+    app.connect("autodoc-process-docstring", _convert_short_fields, priority=600)  # after napoleon
     app.connect("autodoc-process-signature", _signature)
     return {"parallel_read_safe": True}
 
 
 def write_pages(folder: Path) -> None:
-    """Write the pages."""
+    """Write all generated pages into a folder."""
     folder.mkdir(exist_ok=True)
     pages = {"gallery": gallery(), "settings": settings(), "spec": spec()}
     pages |= {"reference": reference(), "bibliography": bibliography()}
@@ -92,56 +96,59 @@ def write_pages(folder: Path) -> None:
 
 
 def gallery() -> str:
-    """Each picture with what its script says of it."""
-    intro = "# Gallery\n\n`dermis gallery -o out` draws all of it, as a page with sliders.\n"
+    """Return the gallery page: each picture with the description in its script."""
+    intro = "# Gallery\n\n`dermis gallery -o out` renders all pictures and a page with sliders.\n"
     return "\n".join([intro, *map(_picture, find_scripts())])
 
 
 def _picture(script: Script) -> str:
     lines = [f"## {script.title}", "", script.caption, ""]
-    lines += [f"$${_drawn(script.equation)}$$", ""] if script.equation else []
+    lines += [f"$${_tex(script.equation)}$$", ""] if script.equation else []
     lines += [f"![{script.title}](../images/{script.name}.webp)", ""]
-    told = [f"`dermis gallery --only {script.name}`", *(f"[{key}](#{key.lower()})" for key in script.sources)]
-    return "\n".join([*lines, " · ".join(told), ""])
+    links = [
+        f"`dermis gallery --only {script.name}`",
+        *(f"[{key}](#{key.lower()})" for key in script.sources),
+    ]
+    return "\n".join([*lines, " · ".join(links), ""])
 
 
-def _drawn(equation: str) -> str:
+def _tex(equation: str) -> str:
     """Return the equation of a script in TeX."""
 
-    def part(found: re.Match[str]) -> str:
-        index, power, name, word = found["index"], found["power"], found["name"], found["word"]
+    def group(match: re.Match[str]) -> str:
+        index, power, name, word = match["index"], match["power"], match["name"], match["word"]
         if index or name:
             return rf"{'_' if index else '^'}{{\text{{{index or name}}}}}"
         if power:
-            return f"^{{{_PARTS.sub(part, power)}}}"
+            return f"^{{{_TEX_GROUPS.sub(group, power)}}}"
         return rf"\{word} " if word in ("exp", "max") else rf"\,\text{{{word}}}"
 
-    return _PARTS.sub(part, equation).translate(str.maketrans(_TEX))
+    return _TEX_GROUPS.sub(group, equation).translate(str.maketrans(_TEX))
 
 
 def settings() -> str:
-    """Return the tables of a scene's file, key by key."""
-    intro = "The tables of a scene's file, and the options of `dermis render` and `dermis view` for each key."
+    """Return the page of all settings: the tables of a scene file with their keys."""
+    intro = (
+        "Tables and keys of scene files, with the options of `dermis render` and `dermis view` for each key."
+    )
     parts = [f"## {title}\n\n{table_of(model, names)}" for title, (model, names) in TABLES.items()]
     return "\n".join(["# Settings", "", intro, "", *parts])
 
 
 def spec() -> str:
-    """Return the tables of a data set's spec, key by key."""
-    intro = (
-        "The tables of a spec, from which `dermis batch` draws [data sets](../batch.md). `size`, width and"
-    )
-    intro += (
-        " height, stands above all tables too; keys of tables below `[person]` are names of what is drawn."
-    )
+    """Return the page of all tables of a spec with their keys."""
+    intro = "Tables and keys of a spec, from which `dermis batch` renders [data sets](../batch.md). The key "
+    intro += "`size` (width and height) is above all tables too. In the tables below `[person]`, keys are "
+    intro += "names of fields or morph targets."
     parts = [f"## {title}\n\n{table_of(model, None)}" for title, model in SPEC_TABLES.items()]
     return "\n".join(["# Keys of a spec", "", intro, "", *parts])
 
 
 def table_of(model: type[FrozenModel], names: dict[str, str] | None) -> str:
-    """Return a model's fields as a table.
+    """Return the fields of a model as a Markdown table.
 
-    names : options by field where they are called otherwise; None for a model without options
+    names : option names by field where they differ from the field's name, "" for fields without an option;
+        None for a model without options
     """
     columns = ["key", *(["option"] if names is not None else []), "values", "default", "meaning"]
     rows = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
@@ -153,7 +160,7 @@ def table_of(model: type[FrozenModel], names: dict[str, str] | None) -> str:
         if names is not None:
             known = names.get(field) != "" and is_option(model, field)
             cells.append(f"`{option_name(field, names)}`" if known else "")
-        default = "needed" if info.is_required() else _default(info.get_default())
+        default = "required" if info.is_required() else _default(info.get_default())
         meaning = f"*{heading}.* {field_help(model, field)}" if heading else field_help(model, field)
         cells += [accepted_values(model, field), default, meaning]
         rows.append(f"| {' | '.join(cells)} |")
@@ -161,42 +168,45 @@ def table_of(model: type[FrozenModel], names: dict[str, str] | None) -> str:
 
 
 def _default(value: Any) -> str:
-    """Return the default as a user would type it, or an empty text for tables."""
+    """Return a default value as users type it; an empty text for models."""
     if isinstance(value, Distribution):
-        told = value.spec_value()
-        return format_default(told) if isinstance(told, str | float) else f"`{value_text(told)}`"
+        toml = value.spec_value()
+        return format_default(toml) if isinstance(toml, str | float) else f"`{value_text(toml)}`"
     return "" if isinstance(value, FrozenModel) else format_default(value)
 
 
 def reference() -> str:
-    """Return the public names, each with its docstring."""
+    """Return the reference page: all public names with their docstrings."""
     entries = []
     for name in dermis.__all__:
         thing = getattr(dermis, name)
         kind = "autofunction" if not isinstance(thing, type) else "autoclass"
         kind = "autoexception" if isinstance(thing, type) and issubclass(thing, Exception) else kind
         members = ", ".join(_methods(thing)) if kind == "autoclass" else ""
-        listed = f"\n   :members: {members}" if members else ""
-        entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: dermis.{name}{listed}\n```\n"
-        told = isinstance(thing, type) and issubclass(thing, FrozenModel)
-        entries.append(f"{entry}\n{table_of(thing, None)}" if told else entry)
-    intro = "All of these are names of `dermis`. Lights, cameras, skins, environments and settings do not "
-    intro += "change: `replace(...)` of each gives a checked copy with other values."
+        option = f"\n   :members: {members}" if members else ""
+        entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: dermis.{name}{option}\n```\n"
+        is_model = isinstance(thing, type) and issubclass(thing, FrozenModel)
+        entries.append(f"{entry}\n{table_of(thing, None)}" if is_model else entry)
+    intro = "All names on this page are imported from `dermis`. Lights, cameras, skins, environments and "
+    intro += "settings are immutable; their method `replace(...)` returns a validated copy with other values."
     return f"# Reference\n\n{intro}\n\n" + "\n".join(entries)
 
 
 def _methods(kind: type) -> list[str]:
-    """Return the names of the methods and class attributes of a class."""
+    """Return the names of the public methods and properties of a class that have a docstring."""
     fields = getattr(kind, "model_fields", getattr(kind, "__dataclass_fields__", {}))
     return [
         name
         for name, thing in vars(kind).items()
-        if not name.startswith(("_", "model_")) and name not in fields and name != "synonyms" and _told(thing)
+        if not name.startswith(("_", "model_"))
+        and name not in fields
+        and name != "synonyms"
+        and _is_documented(thing)
     ]
 
 
-def _told(thing: Any) -> bool:
-    """Whether it is a method or a property with a docstring."""
+def _is_documented(thing: Any) -> bool:
+    """Return whether an attribute of a class is a method or a property with a docstring."""
     thing = getattr(thing, "__func__", thing)
     return bool(callable(thing) or hasattr(thing, "func") or isinstance(thing, property)) and bool(
         thing.__doc__
@@ -204,7 +214,7 @@ def _told(thing: Any) -> bool:
 
 
 def bibliography() -> str:
-    """Return the page of all works, by their keys."""
+    """Return the bibliography page, sorted by key."""
     works = [
         f"({key.lower()})=\n## {key}\n\n```bibtex\n{cite.bibtex([key])}\n```\n"
         for key in sorted(cite.citation_keys())
@@ -212,37 +222,44 @@ def bibliography() -> str:
     return "# Bibliography\n\n" + "\n".join(works)
 
 
-def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    """Turn the lines "name : meaning" of docstrings into fields of Sphinx, and citation keys into links."""
+def _drop_model_parameters(
+    app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """Remove the sections of parameters from docstrings of models, whose fields are in a table below."""
     if isinstance(thing, type) and issubclass(thing, FrozenModel) and "Parameters" in lines:
-        del lines[lines.index("Parameters") :]  # the table that follows has them
-    made: list[str] = []
-    entry: list[str] = []  # of the fields of a line, with what goes on below it
-    for line in [*(_KEYWORDS.sub(r"\1 : keyword arguments", line) for line in lines), ""]:
-        found = _FIELD.match(line)
-        if entry and (found or not line.startswith(" ")):
-            made += _fields_of(entry)
+        end = lines.index("Examples") if "Examples" in lines else len(lines)
+        del lines[lines.index("Parameters") : end]
+
+
+def _convert_short_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Convert lines "name : meaning" of docstrings to fields of Sphinx, and citation keys to links."""
+    converted: list[str] = []
+    entry: list[str] = []  # line "name : meaning" with its continuation lines
+    for line in [*lines, ""]:
+        starts_entry = _FIELD.match(line) is not None
+        if entry and (starts_entry or not line.startswith(" ")):
+            converted += _fields_of(entry)
             entry = []
-        if found or entry:
+        if starts_entry or entry:
             entry.append(line)
         else:
-            made.append(line)
-    lines[:] = [_KEY.sub(lambda key: f":ref:`{key[1]} <{key[1].lower()}>`", line) for line in made]
+            converted.append(line)
+    lines[:] = [_KEY.sub(lambda key: f":ref:`{key[1]} <{key[1].lower()}>`", line) for line in converted]
 
 
 def _fields_of(entry: list[str]) -> list[str]:
-    """Return the fields of "position, target : meaning", one for each name."""
-    found = _FIELD.match(entry[0])
-    assert found is not None
-    made: list[str] = []
-    for name in found["names"].split(", "):
+    """Return the fields of an entry "position, target : meaning", one for each name."""
+    match = _FIELD.match(entry[0])
+    assert match is not None
+    fields: list[str] = []
+    for name in match["names"].split(", "):
         kind = "raises" if name.endswith("Error") else "param"
-        made += [f":{kind} {name}: {found['meaning']}", *entry[1:]]
-    return made
+        fields += [f":{kind} {name}: {match['meaning']}", *entry[1:]]
+    return fields
 
 
 def _signature(
     app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Return the signature with dots in place of defaults that are created for each object."""
+    """Return a signature in which "..." replaces defaults that are created for each object."""
     return signature and signature.replace("<factory>", "..."), returned

@@ -17,13 +17,13 @@ Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 LEVELS = 3
-STEPS = 8  # places along a side of a quad
+STEPS = 8  # candidates along a side of a quad
 _UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from corner to corner
 _EDGE, _CREST = 1, 2  # columns of lid_rings.csv
 _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
 _CORNER_MM = 22.2
-_AHEAD = 0.4  # how much of the way ahead counts as height, where the edge of a lip is sought
-_NEAR_MM = 1.2  # of a place in the front plane
+_AHEAD = 0.4  # weight of z relative to height in the search for the edge of a lip
+_NEAR_MM = 1.2  # search radius around a position in the front plane
 # Artist's values on the average human, seen from the front and the side: the outline of the face from in
 # front of the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
 _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42, -50], [61.6, -52, -45],
@@ -34,7 +34,7 @@ _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42
 class Surface:
     """Dense surface of the average human.
 
-    quad, place : (n,) quad of each candidate and (n, 2) position in it
+    quad, position : (n,) quad of each candidate and (n, 2) position in it
     at_mm : (n, 3) positions on the average human [mm]
     """
 
@@ -44,8 +44,8 @@ class Surface:
         steps = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1).reshape(-1, 2)
         quads = len(average_head().mesh.quads)
         self.quad = np.repeat(np.arange(quads), len(steps))
-        self.place = np.tile(steps, (quads, 1)).astype(np.float32)
-        fine = refine_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.place), LEVELS)
+        self.position = np.tile(steps, (quads, 1)).astype(np.float32)
+        fine = refine_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.position), LEVELS)
         self._corner, self._share = quad_corners(self.head.mesh, fine.quad), quad_weights(fine.position)
         self.points_mm = self.head.mesh.points_mm
         self.at_mm = self._of(self.points_mm)
@@ -101,9 +101,9 @@ class Surface:
         part = (-low / (high - low))[:, None]
         return np.asarray((1 - part) * edge + part * crest)
 
-    def on_lid(self, place: Doubles) -> int:
+    def on_lid(self, position: Doubles) -> int:
         """Return the index of the candidate on the edge of the lids nearest to a position (3,) [mm]."""
-        return self.nearest(place, self.skin & (np.abs(self.lids) < 0.12) & (self.at_mm[:, 0] > 0))
+        return self.nearest(position, self.skin & (np.abs(self.lids) < 0.12) & (self.at_mm[:, 0] > 0))
 
     def lip_border(self, upper: bool) -> Doubles:
         """Return the (n, 3) outer border of a lip, from its corner to the centre [mm]."""
@@ -136,11 +136,11 @@ class Surface:
             rows.append(self.at_mm[edge] * [0, 1, 1] + [x, 0, 0])
         return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
 
-    def on_inner_lip(self, place: Doubles, upper: bool) -> int:
+    def on_inner_lip(self, position: Doubles, upper: bool) -> int:
         """Return the index of the candidate on a lip nearest to a position on its inner edge."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         side = (self.at_mm[:, 1] > seam) == upper
-        return self.nearest(place, self.skin & side & (self.mouth > 15))
+        return self.nearest(position, self.skin & side & (self.mouth > 15))
 
     def jaw(self) -> Doubles:
         """Return the (n, 3) outline of the face, from the height of the eyes to the chin [mm]."""

@@ -1,0 +1,62 @@
+"""Declarations of file properties and what the readers do with them; docs/formats.md is built from these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect"]
+
+
+@dataclass(frozen=True)
+class FileProperty:
+    """Property of a file, and what the reader does with it.
+
+    treatment : "drawn" if the scene follows the property; "noted" if the property is ignored and a note says
+        so; "no effect" if it is ignored without a note; "refused" if it raises an error
+    name : property as the documentation shows it, in Markdown
+    detail : how it is drawn, or why it is not, in Markdown
+    keys : words by which the reader recognises the property, such as statements or extensions
+    other_parts : treatment in materials of parts that are not skin; None if it is the same as for skin
+    """
+
+    treatment: Treatment
+    name: str
+    detail: str = ""
+    keys: tuple[str, ...] = ()
+    other_parts: Treatment | None = None
+
+    def cells(self, is_material: bool) -> list[str]:
+        """Return the cells of this property's row in the documentation.
+
+        is_material : whether the table has separate columns for the treatment in skin and in other parts
+        """
+        others = [self.other_parts or self.treatment] if is_material else []
+        return [self.name, self.treatment, *others, self.detail]
+
+
+def _property(
+    treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
+) -> FileProperty:
+    """Return a property; `drawn`, `noted` and so on are this function with a fixed treatment."""
+    return FileProperty(treatment, name, detail, keys, other_parts)
+
+
+drawn = partial(_property, "drawn")
+drawn_with_note = partial(_property, "drawn with a note")
+noted = partial(_property, "noted")
+refused = partial(_property, "refused")
+no_effect = partial(_property, "no effect")
+
+
+def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
+    """Return the keys of the properties with one of the given treatments; by default of all properties."""
+    chosen = (item for item in properties if not treatments or item.treatment in treatments)
+    return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
+
+
+def in_code(keys: Iterable[str]) -> str:
+    """Return words as code in Markdown, separated by commas."""
+    return ", ".join(f"`{key}`" for key in keys)

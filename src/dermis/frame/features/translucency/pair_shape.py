@@ -1,0 +1,57 @@
+"""Shape in which translucent pairs are searched: the head at rest, or another shape that is too strained."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.base.arrays import Floats, Intp
+from dermis.frame.request import FrameRequest
+from dermis.gpu import Memo
+from dermis.mesh.head import Head
+
+MAX_STRAIN = 0.2
+"""Relative change of lengths on the surface up to which the pairs of the head at rest are used."""
+_SAMPLES, _SEED = 2000, 0
+_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few lengths from lip to lip
+
+
+class StrainGauge:
+    """Short lengths on the surface of a head at rest, by which its strain in other shapes is measured."""
+
+    def __init__(self, head: Head) -> None:
+        from scipy.spatial import cKDTree
+
+        self._rest_mm = head.control.positions_mm
+        count = len(self._rest_mm)
+        sample = np.random.default_rng(_SEED).permutation(count)[:_SAMPLES]
+        nearest = np.asarray(cKDTree(self._rest_mm[sample]).query(self._rest_mm[sample], 2)[1])
+        pairs: Intp = np.column_stack([sample, sample[nearest[:, 1]]])
+        self._pairs = pairs[self._lengths(self._rest_mm, pairs) > 0.0]
+        self._rest_lengths = self._lengths(self._rest_mm, self._pairs)
+
+    def strain(self, positions_mm: Floats) -> float:
+        """Return the relative change that nine in ten lengths do not exceed [-].
+
+        positions_mm : (p, 3) control points of another shape [mm]
+        """
+        lengths = self._lengths(positions_mm, self._pairs)
+        return float(np.quantile(np.abs(lengths / self._rest_lengths - 1.0), _QUANTILE))
+
+    @staticmethod
+    def _lengths(positions_mm: Floats, pairs: Intp) -> Floats:
+        offset = positions_mm[pairs[:, 0]] - positions_mm[pairs[:, 1]]
+        return np.asarray(np.linalg.norm(offset, axis=1))
+
+
+def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
+    """Return the control points in which pairs are searched, None for those of the topology at rest [mm].
+
+    Pairs of the topology follow other shapes, such as the frames of a mesh sequence: only their weights
+    change. A shape that strains the surface by more than `MAX_STRAIN` has pairs of its own. People of one
+    template always share its pairs.
+    """
+    positions = request.rest_positions_mm
+    if positions is None or request.is_shared:
+        return None
+    gauge = memo.get(StrainGauge, request.topology)
+    return positions if gauge.strain(positions) > MAX_STRAIN else None

@@ -1,0 +1,159 @@
+"""Direction in which a face looks, from its eyes, or from the symmetry and the relief of the head."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Index
+from dermis.mesh.geometry import cross_columns, dot_columns
+
+Direction = Literal["x", "z", "-x", "-z"]
+# Numbers of examined triangles, of points sampled on them, and of points that are mirrored:
+_MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
+# Limits for the eyes, relative to the width of both together:
+_MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MIN_GAP, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.1, 0.25, 0.25, 3.0
+# Limits for the head, relative to its height:
+_HEAD_WIDTH = 0.68  # largest width of the head without shoulders
+_DEPTHS = 0.5, 1.6  # smallest and largest depth
+_MAX_ASYMMETRY = 0.03  # root mean square distance of mirrored points from the surface
+_MIN_NOSE = 0.04  # protrusion of the middle of the face
+_MIN_RELIEF = 0.03  # see `_relief`
+_CELL = 0.08  # side of the cells in `_relief`
+_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)  # in `_ridge`: height of rows, and distances from the middle
+# Smallest ratio of the asymmetries about both horizontal axes, and of relief and nose in front to the back:
+_MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
+
+
+def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direction | None:
+    """Return the horizontal axis along which a face looks; None if it is uncertain.
+
+    positions : (v, 3) vertices of any unit, Y up
+    triangles : (f, 3) vertex indices
+    eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if they are not known
+
+    Eyes lie in front of the middle of the head. Without them, the head must be symmetric about a vertical
+    plane, and the front is the side of more relief with a ridge in its middle, the nose.
+    """
+    if not len(triangles):
+        return None
+    corners = positions[triangles[:: 1 + len(triangles) // _MAX_TRIANGLES]]
+    return _direction_from_eyes(corners[:, 0], eyes) or _direction_from_shape(corners)
+
+
+def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
+    if len(eyes) < 2:
+        return None
+    middle, spread = (eyes.min(axis=0) + eyes.max(axis=0)) / 2, np.ptp(eyes, axis=0)
+    front = 2 if spread[0] > spread[2] else 0
+    width = spread[2 - front]
+    if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_GAP * width:
+        return None  # the vertices are those of one eye
+    offset = np.abs(points - middle)
+    near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _REACH * width)]
+    if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
+        return None
+    shift = middle - (near.min(axis=0) + near.max(axis=0)) / 2
+    if abs(shift[front]) < _MIN_AHEAD * width or abs(shift[2 - front]) > _MAX_ASIDE * width:
+        return None
+    return _direction(front, shift[front])
+
+
+def _direction_from_shape(corners: Doubles) -> Direction | None:
+    """Return the direction of the face of a head or of a standing figure from its triangles (f, 3, 3)."""
+    top, height = float(corners[..., 1].max()), _head_height(corners[:, 0])
+    head = corners[corners[..., 1].max(axis=1) >= top - height]
+    normals = _normals(head)
+    if height <= 0 or not normals.any():
+        return None
+    points, normals = _sample(head, normals)
+    points = (points - [0.0, top, 0.0]) / height
+    points[:, ::2] -= (points[:, ::2].min(axis=0) + points[:, ::2].max(axis=0)) / 2
+    asymmetry = _asymmetry(points, 0), _asymmetry(points, 2)
+    front = 2 if asymmetry[0] < asymmetry[1] else 0
+    low, high = sorted(asymmetry)
+    depths = np.ptp(points[:, front])
+    if low > _MAX_ASYMMETRY or high < _MIN_ASYMMETRY_RATIO * low or not _DEPTHS[0] < depths < _DEPTHS[1]:
+        return None
+    sides = points[:, front] > 0, points[:, front] < 0
+    reliefs = [_relief(points[side], normals[side]) for side in sides]
+    noses = [_ridge(points[side], front) for side in sides]
+    first = int(noses[1] > noses[0])
+    has_nose = noses[first] > max(_MIN_NOSE, _MIN_NOSE_RATIO * noses[1 - first])
+    has_relief = reliefs[first] > max(_MIN_RELIEF, _MIN_RELIEF_RATIO * reliefs[1 - first])
+    if not (has_nose and has_relief):
+        return None
+    return _direction(front, 1 - 2 * first)
+
+
+def _direction(axis: int, sign: float) -> Direction:
+    if axis == 0:
+        return "x" if sign > 0 else "-x"
+    return "z" if sign > 0 else "-z"
+
+
+def _head_height(points: Doubles) -> float:
+    """Return the height of the head at the top of points (n, 3), down to where shoulders exceed its width."""
+    ordered = points[np.argsort(-points[:, 1])]
+    depth, across = ordered[0, 1] - ordered[:, 1], ordered[:, ::2]
+    widths = np.maximum.accumulate(across) - np.minimum.accumulate(across)
+    fits = np.flatnonzero((widths.min(axis=1) <= _HEAD_WIDTH * depth) & (depth > 0.03 * depth[-1]))
+    return float(depth[fits[0]] if len(fits) else depth[-1])
+
+
+def _normals(corners: Doubles) -> Doubles:
+    """Return the normals of triangles (f, 3, 3) with twice the area as their length, as columns (3, f)."""
+    a, b, c = np.moveaxis(corners, 0, -1)
+    return cross_columns(b - a, c - a)
+
+
+def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
+    """Return points (n, 3) that are spread evenly over triangles (f, 3, 3), and their unit normals.
+
+    normals : normals of the triangles with twice the area as their length, as columns (3, f)
+    """
+    areas = np.sqrt(dot_columns(normals, normals))
+    total = np.cumsum(areas)
+    chosen = np.searchsorted(total, (np.arange(_SAMPLES) + 0.5) / _SAMPLES * total[-1])
+    shares = np.sort(np.random.default_rng(0).random((2, _SAMPLES)), axis=0)
+    shares = np.diff(shares, axis=0, prepend=0, append=1)
+    return np.einsum("fkc,kf->fc", corners[chosen], shares), (normals[:, chosen] / areas[chosen]).T
+
+
+def _asymmetry(points: Doubles, axis: int) -> float:
+    """Return the root mean square distance of mirrored points (n, 3) from the nearest original points.
+
+    axis : index of the coordinate that is mirrored
+    """
+    single = points.astype(np.float32)
+    mirrored = single[:: len(points) // _MIRRORED] * np.where(np.arange(3) == axis, -1, 1).astype(np.float32)
+    squares = (-2 * mirrored) @ single[::2].T
+    squares += (single[::2] ** 2).sum(axis=1)
+    nearest = squares.min(axis=1) + (mirrored**2).sum(axis=1)
+    return float(np.sqrt(np.maximum(nearest, 0).mean()))
+
+
+def _relief(points: Doubles, normals: Doubles) -> float:
+    """Return the variation of normals (n, 3) at points (n, 3) within small cells, 0 to 1 [-]."""
+    keys = np.floor(points / _CELL).astype(np.int64) @ [1, 1 << 20, 1 << 40]
+    cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
+    sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
+    return 1 - float(np.sqrt(dot_columns(sums, sums)).sum()) / max(len(points), 1)
+
+
+def _ridge(points: Doubles, front: int) -> float:
+    """Return how far the middle of a face protrudes beyond both sides, at the height where it does most.
+
+    points : (n, 3) points of the front or back of a head
+    front : index of the coordinate along which the face may look
+    """
+    row = (points[:, 1] / -_ROW).astype(int)
+    across, depth = points[:, 2 - front], np.abs(points[:, front])
+    low, high = _SIDES
+    bands = np.abs(across) < _RIDGE, (across > low) & (across < high), (across < -low) & (across > -high)
+    middle, left, right = reach = np.zeros((3, row.max(initial=0) + 1))
+    for deepest, band in zip(reach, bands, strict=True):
+        np.maximum.at(deepest, row[band], depth[band])
+    known = (middle > 0) & (left > 0) & (right > 0)
+    return float((middle - np.maximum(left, right))[known].max(initial=0.0))

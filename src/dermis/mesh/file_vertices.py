@@ -1,0 +1,27 @@
+"""Relation of a head to the vertices of its mesh file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dermis.base.arrays import Doubles, Ints
+from dermis.base.summary import ShortRepr
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FileVertices(ShortRepr):
+    """Vertices of a mesh file from which the points of a head come, for mesh sequences.
+
+    A vertex of the file may be at several points, where sheets of the surface were separated, or at none.
+
+    count : number of vertices that the triangles of the file use
+    vertex, point : (n,) vertex indices in the file, and the head's point at each of these vertices
+    triangles : (f, 3) triangles of the head before any subdivision, as indices in `vertex`
+    to_head : (3, 3) rotation from the axes of the file to those of the head
+    """
+
+    count: int
+    vertex: Ints
+    point: Ints
+    triangles: Ints
+    to_head: Doubles
