@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -28,6 +29,12 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
+GENERATOR = 1
+"""Number that is increased whenever a spec gives other parameters or pictures, so that no set mixes both."""
+COUNT_LINE = re.compile(r"(?m)^count = (\d+)\n")
+"""Line of a canonical spec with the number of images, by which data sets may grow."""
+GENERATOR_LINE = re.compile(r"(?m)^generator = (\d+)\n")
+"""Line of a canonical spec with the generator number; earlier versions wrote none."""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
 _BACKGROUND_TABLE = "[background]"
@@ -53,6 +60,8 @@ class Spec(FrozenModel):
     """Number of images."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
     """Seed of all random numbers."""
+    generator: Annotated[int, Field(ge=GENERATOR, le=GENERATOR)] = GENERATOR
+    """Number of the generator, which changes when a spec gives other images; compared if given."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
@@ -97,6 +106,7 @@ class Spec(FrozenModel):
     """Folder of the files that the spec names; not part of its TOML."""
 
     _sampler: Sampler = PrivateAttr()
+    _digest: str = PrivateAttr("")
 
     def model_post_init(self, context: object) -> None:
         """Check the distributions across tables and create the sampler."""
@@ -149,8 +159,19 @@ class Spec(FrozenModel):
         return "\n".join([_TOML_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """Return the SHA-256 of the canonical TOML, which identifies the data set."""
-        return hashlib.sha256(self.to_toml().encode()).hexdigest()
+        """Return the SHA-256 of the canonical TOML without `count`, which identifies the data set."""
+        if not self._digest:
+            digest = _sha256(COUNT_LINE.sub("", self.to_toml(), count=1))
+            BaseModel.__setattr__(self, "_digest", digest)
+        return self._digest
+
+    def matches(self, digest: str) -> bool:
+        """Return whether a digest is that of this spec, or the one by versions without generator numbers."""
+        return digest == self.digest() or digest == _sha256(GENERATOR_LINE.sub("", self.to_toml(), count=1))
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _table_distributions(name: str, value: object) -> dict[str, Distribution]:
@@ -191,6 +212,10 @@ def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """
     if "folder" in data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
+    if data.get("generator", GENERATOR) != GENERATOR:
+        actual = f"got {format_value(data['generator'])}"
+        advice = "Remove it to start another data set, or use the version of dermis that wrote it"
+        refuse("generator", f"{GENERATOR}, the generator number of this version", actual, advice)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in data.items()}
     fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
