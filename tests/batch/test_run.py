@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
 import os
 import random
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
+from small_set import COUNT, HERE, PARTS, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
 
+from dermis.apps.batch.parts import copy_images
+from dermis.apps.batch.reader import shard_files
 from dermis.apps.batch.run import Progress, run
-from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.shards import ShardWriter, list_shards, shard_path
+from dermis.apps.batch.spec import GENERATOR_LINE, Spec
 from dermis.apps.batch.worker import RunOptions
 from dermis.apps.batch.worker_pool import ProcessPool
 from dermis.base.errors import DermisError
@@ -52,12 +57,86 @@ def test_two_workers_that_have_encoders_write_the_same(
     assert progress[-1] == (COUNT, COUNT)
 
 
-def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
-    first = drawn(small_spec, tmp_path, part=(1, 2))
+def test_shares_of_shards_make_the_whole_in_any_order(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    first = drawn(small_spec, tmp_path, shards=(1, 2))
     assert not first.is_complete and "index.parquet" not in contents(tmp_path)
-    second = drawn(small_spec, tmp_path, part=(0, 2))
+    second = drawn(small_spec, tmp_path, shards=(0, 2))
     assert second.is_complete and first.shards + second.shards == SHARDS
     assert contents(tmp_path) == undisturbed
+
+
+def test_shares_of_parts_make_the_whole_in_any_order(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    reports = [drawn(small_spec, tmp_path, parts=(share, 3)) for share in (2, 0, 1)]
+    assert [one.is_complete for one in reports] == [False, False, True]
+    assert [one.images for one in reports] == [
+        sum(stop - first for first, stop in PARTS[k::3]) for k in (2, 0, 1)
+    ]
+    assert sum(one.shards for one in reports) == SHARDS and contents(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_a_set_that_grows_is_the_one_made_at_once(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path, workers: int
+) -> None:
+    """It grows in the middle of a part, from an interrupted run, by any number of workers."""
+    first = drawn(small_spec.replace(count=35), tmp_path, workers, shards=(1, 2))
+    assert (first.images, first.shards, first.is_complete) == (15, 1, False)
+    second = drawn(small_spec, tmp_path, workers)
+    assert (second.images, second.shards, second.is_complete) == (COUNT - 15, SHARDS, True)
+    assert contents(tmp_path) == undisturbed
+
+
+def test_images_that_are_there_keep_their_bytes(small_spec: Spec, tmp_path: Path) -> None:
+    """A picture that no renderer would draw survives growth, so it was not rendered again."""
+    small = small_spec.replace(count=18)
+    drawn(small, tmp_path)
+    shard, marked = list_shards(small)[0], tmp_path / "marked"
+    marked.mkdir()
+    with (
+        shard_files(shard_path(tmp_path, shard, small)) as images,
+        ShardWriter(marked, shard, small) as writer,
+    ):
+        for key, files in images.items():
+            entries = {suffix: read() for suffix, read in files.items()}
+            writer.add(int(key), {**entries, "normal.png": entries["normal.png"] + b"mark"})
+    shard_path(marked, shard, small).replace(shard_path(tmp_path, shard, small))
+    marked.rmdir()
+    assert drawn(small_spec.replace(count=40), tmp_path, 2).images == 22
+    pictures = [data.count(b"mark") for name, data in contents(tmp_path).items() if name.endswith(".tar")]
+    assert pictures == [18, 0]
+
+
+def test_a_set_of_an_earlier_version_is_continued(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its stamps have the hash of the spec with the count, and without a generator number."""
+    text = GENERATOR_LINE.sub("", small_spec.to_toml(), count=1)
+    put(undisturbed, tmp_path / "new")
+    put({"spec.toml": text.encode()}, tmp_path / "old")
+    with monkeypatch.context() as patch:
+        patch.setattr(Spec, "digest", lambda _: hashlib.sha256(text.encode()).hexdigest())
+        for shard in list_shards(small_spec)[:2]:
+            with ShardWriter(tmp_path / "old", shard, small_spec) as writer:
+                path = shard_path(tmp_path / "new", shard, small_spec)
+                copy_images(writer, path, shard.first, shard.stop)
+    before = contents(tmp_path / "old")
+    report = drawn(small_spec, tmp_path / "old")
+    assert (report.shards, report.skipped, report.is_complete) == (1, 2, True)
+    after = contents(tmp_path / "old")
+    assert before.items() <= after.items() and after["index.parquet"] == undisturbed["index.parquet"]
+
+
+def test_missing_packages_are_found_before_the_first_image(
+    small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(DermisError, match="expected the package pyarrow"):
+        drawn(small_spec, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
@@ -84,7 +163,7 @@ def test_a_shard_that_was_damaged_is_drawn_again(
 def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     rng = random.Random(1)
     moments = set(rng.sample(range(1, COUNT - 1), 2))
-    with pytest.warns(UserWarning, match=r"SIGKILL; its shard is rendered again"):
+    with pytest.warns(UserWarning, match=r"SIGKILL; its part is rendered again"):
         report = drawn(small_spec, tmp_path, 2, 1, on_progress=killing(moments, rng))
     assert report.is_complete and contents(tmp_path) == undisturbed
 
@@ -99,7 +178,7 @@ def test_a_shard_that_no_worker_survives_is_given_up(
     kill_all = lambda now: [one.kill() for one in multiprocessing.active_children()]  # noqa: E731
     with (
         pytest.warns(UserWarning, match="rendered again"),
-        pytest.raises(DermisError, match=r"shard 0: .*2 failed.*SIGKILL"),
+        pytest.raises(DermisError, match=r"images 0 to 15 of shard 0: .*2 failed.*SIGKILL"),
     ):
         drawn(small_spec, tmp_path, on_progress=kill_all)
     assert contents(tmp_path).keys() == undisturbed.keys() - {lost}
@@ -117,7 +196,7 @@ def test_a_bad_head_is_refused_and_what_is_whole_stays(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
         drawn(spec, tmp_path / "out")
     left = contents(tmp_path / "out")
-    assert all(name == "spec.toml" or name.startswith("shard-") for name in left)
+    assert all(name == "spec.toml" or name.startswith(("shard-", "part-")) for name in left)
 
 
 def test_bad_heads_are_left_out_the_same_by_all(tmp_path: Path) -> None:
@@ -138,7 +217,7 @@ def test_bad_heads_are_left_out_the_same_by_all(tmp_path: Path) -> None:
 def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     import resource
 
-    lost = [name for name in undisturbed if name.startswith("shard-00003")]
+    lost = [name for name in undisturbed if name.startswith("shard-00002")]
     put({name: data for name, data in undisturbed.items() if name not in lost}, tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -23,6 +24,8 @@ from dermis.apps.batch.shards import (
 )
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError
+
+_MAX_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
@@ -77,18 +80,27 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
     Raises DermisError if the shard cannot be written.
     """
     parts = {part: shard_path(out, part, spec) for part in list_parts(shard, spec)}
-    if not all(path.exists() for path in reversed(parts.values())):  # the last one is usually missing
-        return ()
-    damaged = tuple(part for part in parts if not is_intact(out, part, spec))
-    try:
-        if not damaged:
-            with ShardWriter(out, shard, spec) as writer:
-                for part, path in parts.items():
-                    copy_images(writer, path, part.first, part.stop)
-    except DermisError:
+    for attempts_left in reversed(range(_MAX_ATTEMPTS)):  # another process may remove files in between
+        if not all(path.exists() for path in reversed(parts.values())):  # the last one is usually missing
+            return ()
+        damaged = tuple(part for part in parts if not is_intact(out, part, spec))
         if not shard_exists(out, shard, spec):
-            raise
-    removed = damaged if damaged and not shard_exists(out, shard, spec) else parts
-    for part in removed:
-        remove_path(parts[part])
-    return damaged if removed is damaged else ()
+            if damaged:
+                _remove(parts[part] for part in damaged)
+                return damaged
+            try:
+                with ShardWriter(out, shard, spec) as writer:
+                    for part, path in parts.items():
+                        copy_images(writer, path, part.first, part.stop)
+            except DermisError:
+                if not attempts_left:
+                    raise
+                continue
+        _remove(parts.values())
+        break
+    return ()
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        remove_path(path)

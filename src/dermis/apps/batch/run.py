@@ -202,6 +202,7 @@ def _process(
         elif event.done is not None:
             progress.verified += 1
             damaged |= {event.done} if event.missing else set()
+        progress.images = min(progress.images, progress.total)  # images of lost workers are rendered twice
         if event.images or event.done is not None:
             on_progress(progress)
     return rendered, damaged, tuple(sorted(failed))

@@ -203,7 +203,7 @@ def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
     if not shard_exists(out, shard, spec):
         return False
     path = shard_path(out, shard, spec)
-    with suppress(DermisError):
+    with suppress(DermisError, OSError):
         return shard_sha256(path) == read_manifest(path).sha256
     return False
 
