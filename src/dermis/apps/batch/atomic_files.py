@@ -56,8 +56,14 @@ def move_into_place(temporary: Path, target: Path) -> None:
     if target.is_dir() and not target.is_symlink():
         replaced = temporary_path(target)
         target.rename(replaced)
-        temporary.rename(target)
-        remove_path(replaced)
+        try:
+            temporary.rename(target)
+        except OSError:
+            with contextlib.suppress(OSError):  # another process has moved a folder there
+                replaced.rename(target)
+            raise
+        finally:
+            remove_path(replaced)
     else:
         temporary.replace(target)
     flush_to_disk(target.parent)

@@ -101,8 +101,8 @@ def run(
     all_shards = list_shards(spec)
     selected = all_shards[shards[0] :: shards[1]]
     existing = {shard for shard in selected if shard_exists(out, shard, spec)}
-    missing = [part for shard in selected if shard not in existing for part in list_parts(shard, spec)]
-    missing = missing[parts[0] :: parts[1]]
+    share = [part for shard in selected for part in list_parts(shard, spec)][parts[0] :: parts[1]]
+    missing = [part for part in share if shard_at(part.index, spec) not in existing]
     verified = [shard for shard in selected if shard in existing][parts[0] :: parts[1]]
     own = {shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))}
     remove_unfinished(out, own)
