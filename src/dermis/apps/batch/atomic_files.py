@@ -48,12 +48,14 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
         return
 
 
-def move_into_place(temporary: Path, target: Path) -> None:
+def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, replacing a file or folder there.
+
+    replaces_folder : False keeps a folder that is there
 
     Raises OSError if this fails.
     """
-    if target.is_dir() and not target.is_symlink():
+    if replaces_folder and target.is_dir() and not target.is_symlink():
         replaced = temporary_path(target)
         target.rename(replaced)
         try:

@@ -92,8 +92,6 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
                 with ShardWriter(out, shard, spec) as writer:
                     for part, path in parts.items():
                         copy_images(writer, path, part.first, part.stop)
-                    if shard_exists(out, shard, spec):
-                        raise FileExistsError(f"{shard} was joined by another process")
             except (DermisError, OSError):
                 if not attempts_left:
                     raise

@@ -109,6 +109,7 @@ class ShardWriter:
 
     def __enter__(self) -> Self:
         """Create the temporary file or folder to which the shard is written."""
+        self._replaces_folder = isinstance(self._shard, Part) or self._target.exists()
         writer = TarWriter if self._spec.format == "webdataset" else FolderWriter
         try:
             self._files: TarWriter | FolderWriter = writer(self._temporary)
@@ -143,7 +144,7 @@ class ShardWriter:
         try:
             if kind is None:
                 self._files.finish(self._manifest_bytes())
-                move_into_place(self._temporary, self._target)
+                move_into_place(self._temporary, self._target, self._replaces_folder)
         except OSError as fault:
             refuse_output(self._target, fault)
         finally:
