@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 from small_observation import observation, small_spec, write_shard
-from small_set import contents
+from small_set import HERE, contents
 
 from dermis.apps.batch import parts as module
+from dermis.apps.batch import worker_pool
 from dermis.apps.batch.parts import copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.run import claim_folder
 from dermis.apps.batch.shards import (
     Part,
+    Shard,
     ShardWriter,
     is_intact,
     list_parts,
@@ -28,6 +32,7 @@ from dermis.apps.batch.shards import (
     shard_path,
 )
 from dermis.apps.batch.spec import COUNT_LINE, GENERATOR_LINE, Spec
+from dermis.apps.batch.worker import RunOptions, Worker, WorkerEvent
 from dermis.base.errors import DermisError
 
 COUNT, SHARD_SIZE = 50, 40
@@ -195,3 +200,58 @@ def test_a_set_that_grows_has_the_larger_spec(tmp_path: Path, spec: Spec) -> Non
 def test_another_generator_number_is_refused() -> None:
     with pytest.raises(DermisError, match="generator: expected 1, the generator number of this version"):
         small_spec(generator=2)
+
+
+def test_the_next_part_is_requested_while_frames_are_in_flight(small_spec: Spec, tmp_path: Path) -> None:
+    log: list[str] = []
+
+    def tasks() -> Iterator[Part]:
+        for part in list_parts(list_shards(small_spec)[0], small_spec):
+            log.append(f"requested {part.first}")
+            yield part
+
+    def record(event: WorkerEvent) -> None:
+        if isinstance(event.done, Part):
+            log.append(f"done {event.done.first}")
+
+    with closing(Worker(HERE.adapter, RunOptions(small_spec, tmp_path))) as worker:
+        worker.process(tasks(), record)
+    assert log == ["requested 0", "requested 16", "done 0", "done 16"]
+    assert [path.name for path in tmp_path.iterdir()] == ["shard-00000.tar"]
+
+
+class Child:
+    """Worker process that does nothing: a pipe with prepared events, and the tasks that were sent to it."""
+
+    def __init__(self, *_: object) -> None:
+        self.pipe, self.sent, self.events = self, list[Shard](), list[WorkerEvent]()
+        self.send, self.recv = self.sent.append, lambda: self.events.pop(0)
+
+    def kill(self) -> None:
+        """Do nothing."""
+
+
+def test_the_next_part_is_handed_out_early_unless_a_worker_died(
+    spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_pool, "start_process", Child)
+    parts = [part for shard in list_shards(spec) for part in list_parts(shard, spec)]
+    pool = worker_pool._PoolState(RunOptions(spec, tmp_path), parts, [HERE])
+    pool.start_workers()
+
+    def receive(event: WorkerEvent) -> list[Shard]:
+        """Return all tasks of the current worker after an event."""
+        pool.workers[0].child.events.append(event)  # type: ignore[attr-defined]
+        pool.receive(pool.workers[0])
+        return pool.workers[0].child.sent if pool.workers else []  # type: ignore[attr-defined]
+
+    assert receive(WorkerEvent(images=1)) == parts[:2] == receive(WorkerEvent(images=1))
+    assert receive(WorkerEvent(done=parts[0])) == parts[:3], "one is in progress and one waits"
+    assert receive(WorkerEvent(retry="it died")) == parts[1:2]
+    assert receive(WorkerEvent(images=1)) == parts[1:2], "the second attempt is alone"
+    assert receive(WorkerEvent(done=parts[1])) == parts[1:3]
+    assert receive(WorkerEvent(images=1)) == parts[1:4], "the one that waited had no attempt"
+    assert receive(WorkerEvent(done=parts[2], missing=(parts[0],))) == [*parts[1:4], parts[0]]
+    for part in (parts[3], parts[0], parts[4]):
+        receive(WorkerEvent(done=part))
+    assert pool.workers == []
