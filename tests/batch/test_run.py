@@ -141,8 +141,12 @@ def test_missing_packages_are_found_before_the_first_image(
 def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     put(undisturbed, tmp_path)
     (tmp_path / "index.parquet").unlink()
-    report = drawn(small_spec, tmp_path)
+    verified: list[tuple[int, int]] = []
+    report = drawn(
+        small_spec, tmp_path, on_progress=lambda now: verified.append((now.verified, now.to_verify))
+    )
     assert (report.images, report.shards, report.skipped) == (0, 0, SHARDS)
+    assert verified == [(1, SHARDS), (2, SHARDS), (3, SHARDS)], "by workers"
     assert contents(tmp_path) == undisturbed
 
 
