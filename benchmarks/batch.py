@@ -47,7 +47,6 @@ _FROM, _TO = 0.25, 0.9  # measured part of the images, without start and end of 
 _STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
-_SHARDS = 10  # shards per worker, because progress is reported by complete shards
 MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
 """Numbers of images after which the memory of a worker is read."""
 
@@ -68,10 +67,10 @@ class Plan:
     out: Path | None = None
 
 
-def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> Spec:
+def spec_for(plan: Plan, images: int, *, moving: bool = False) -> Spec:
     """Return the spec of the example with random people, or of one person moving in one light."""
     tables: JsonObject = tomllib.loads(example_toml())
-    tables |= {"count": images, "size": list(plan.size), "shard_size": max(1, images // shards)}
+    tables |= {"count": images, "size": list(plan.size)}
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
     tables["render"] = {**tables["render"], "atlas": plan.atlas, "shadow_size": plan.atlas}
     if moving:
@@ -129,16 +128,16 @@ def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count:
 def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
     """Measure a run with the given number of local workers."""
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
-    spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
+    spec = spec_for(plan, plan.images * count, moving=moving)
     found = measured_run(plan, ProcessPool(slots), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in slots}), **found}
 
 
 def dask(plan: Plan, count: int) -> JsonObject:
-    """Measure the same run with local processes and with dask workers, timed by complete shards."""
+    """Measure the same run with local processes and with dask workers, timed by complete parts."""
     distributed = import_extra("distributed", "the comparison with dask")
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
-    spec = spec_for(plan, plan.images * count, _SHARDS * count)
+    spec = spec_for(plan, plan.images * count)
     threads = {"LP_NUM_THREADS": str(slots[0].threads)} if slots[0].threads else {}
     plain = measured_run(plan, ProcessPool(slots), spec, encoders)
     quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md recommends
@@ -160,7 +159,7 @@ def dask(plan: Plan, count: int) -> JsonObject:
 
 def steps(plan: Plan) -> JsonObject:
     """Return the median time of each step of an image in one process [ms]."""
-    spec = spec_for(plan, min(_MOST_STEPS, plan.images), 1)
+    spec = spec_for(plan, min(_MOST_STEPS, plan.images))
     maker, renderer = SceneBuilder(spec), Renderer(plan.adapter, cache_ttl=16)
 
     def observe(scene: Any, settings: Any) -> Any:

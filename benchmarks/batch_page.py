@@ -145,6 +145,10 @@ Rates are measured between a quarter and nine tenths of a run, when all processe
 one after the other in one process, in which the device and Python wait for each other. In a run they
 overlap, so the rate can exceed the limit "by the workers' own time". On a machine with other load,
 only ratios are meaningful.
+
+The unit of work is a part of 16 to 32 images, so all workers are busy until fewer parts are left than
+workers, and 500 images keep 16 workers busy. Workers verify existing shards after they have rendered the
+missing images.
 """
 
 if __name__ == "__main__":

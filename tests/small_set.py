@@ -12,9 +12,10 @@ from dermis.apps.batch.spec import Spec, load_spec
 from dermis.apps.batch.worker import RunOptions, WorkerSlot
 from dermis.apps.batch.worker_pool import ProcessPool
 
-COUNT = 10
-SHARD_SIZE = 2
-SHARDS = COUNT // SHARD_SIZE
+COUNT, SHARD_SIZE = 50, 20
+SHARDS = 3
+PARTS = (0, 16), (16, 20), (20, 32), (32, 40), (40, 48), (48, 50)
+"""First image of each part, and the one after its last."""
 HERE = WorkerSlot("cpu", 1)
 _TEXT = f"""
 count = {COUNT}

@@ -15,7 +15,7 @@ from typing import Any
 import child_process
 import held_worker
 import pytest
-from small_set import SHARDS, contents
+from small_set import COUNT, PARTS, SHARDS, contents
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are listed by /proc")
 _TIMEOUT_S = 200.0
@@ -27,7 +27,7 @@ def started(
 ) -> subprocess.Popen[bytes]:
     """Start the command in its own session, by which its workers are found.
 
-    gate : file until which workers wait once a shard is complete
+    gate : file until which workers wait once a part is complete
     """
     arguments = f"batch {spec} -o {out} --adapter cpu --workers 2 --encoders 1".split()
     script = (
@@ -52,11 +52,11 @@ def session_processes(number: int) -> list[int]:
     return found
 
 
-def wait_for_shards(out: Path, count: int, driver: subprocess.Popen[bytes]) -> None:
+def wait_for(out: Path, pattern: str, count: int, driver: subprocess.Popen[bytes]) -> None:
     end = time.monotonic() + _TIMEOUT_S
-    while len(list(out.glob("shard-*.tar"))) < count:
-        assert driver.poll() is None, "the driver ended before its shards were written"
-        assert time.monotonic() < end, "no shards were written"
+    while len(list(out.glob(pattern))) < count:
+        assert driver.poll() is None, "the driver ended before its files were written"
+        assert time.monotonic() < end, "no files were written"
         time.sleep(0.01)
 
 
@@ -78,7 +78,7 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     rng, skipped = random.Random(5), 0
     for shards in (0, 2):
         driver = started(small_folder / "spec.toml", tmp_path)
-        wait_for_shards(tmp_path, shards, driver)
+        wait_for(tmp_path, "shard-*.tar", shards, driver)
         time.sleep(rng.uniform(0.0, 1.0))
         driver.kill()
         driver.communicate()
@@ -92,24 +92,32 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_one_that_is_asked_to_end_keeps_what_is_whole(
+def test_one_that_is_asked_to_end_keeps_its_parts(
     small_folder: Path, undisturbed: Files, tmp_path: Path, number: signal.Signals
 ) -> None:
     driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "never")
-    wait_for_shards(tmp_path / "out", 1, driver)
+    wait_for(tmp_path / "out", "part-*.tar", 1, driver)
     # Ctrl-C reaches all that the terminal has started, not the driver alone.
     os.killpg(driver.pid, number) if number == signal.SIGINT else driver.send_signal(number)
     output, notes = driver.communicate()
     assert (driver.returncode, output, besides_progress(notes)) == (128 + number, b"", [])
     wait_until_ended(driver.pid)
-    assert set(contents(tmp_path / "out")) < set(undisturbed)
+    kept = {path.name for path in (tmp_path / "out").glob("part-*.tar")}
+    assert kept and set(contents(tmp_path / "out")) - kept <= set(undisturbed)
+    resumed = started(small_folder / "spec.toml", tmp_path / "out")
+    output, _ = resumed.communicate()
+    images = int(output.split(b" images in ")[0].split()[-1])
+    assert resumed.returncode == 0 and images <= COUNT - sum(
+        stop - first for first, stop in PARTS if f"part-{first:09d}.tar" in kept
+    )
+    assert contents(tmp_path / "out") == undisturbed
 
 
 def test_under_nohup_a_hangup_ends_nothing(small_folder: Path, undisturbed: Files, tmp_path: Path) -> None:
     """Like Ctrl-C, which background jobs of a shell ignore; both signals reach the workers too."""
     with child_process.ignored_signals():
         driver = started(small_folder / "spec.toml", tmp_path / "out", tmp_path / "gate", subprocess.Popen)
-    wait_for_shards(tmp_path / "out", 1, driver)
+    wait_for(tmp_path / "out", "part-*.tar", 1, driver)
     for number in (signal.SIGHUP, signal.SIGINT):
         os.killpg(driver.pid, number)
     (tmp_path / "gate").touch()

@@ -15,7 +15,7 @@ from dermis.cli import main
 
 REOPENED, LOST_TWICE = "it is opened again", "it was lost twice"
 ATTEMPTS = 2
-SHARD = "shard-00003"  # the only one that is drawn, as the others exist
+SHARD = "shard-00002"  # the only one that is drawn, as the others exist
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_another_worker_renders_the_shard_of_a_lost_device(
         report = drawn(small_spec, out)
     notes = [note for note in (str(one.message) for one in caught) if "has no colour" not in note]
     assert [REOPENED in note for note in notes] == [True, False], notes
-    assert LOST_TWICE in notes[1] and notes[1].endswith("its shard is rendered again")
+    assert LOST_TWICE in notes[1] and notes[1].endswith("its part is rendered again")
     assert (report.shards, report.skipped, report.is_complete) == (1, SHARDS - 1, True)
     assert len(list(lost.iterdir())) == 1 and contents(out) == undisturbed
 
@@ -66,9 +66,10 @@ def test_the_exit_status_is_2_if_all_workers_fail(
     with pytest.raises(SystemExit) as ended:
         main()
     errors = capsys.readouterr().err
-    assert ended.value.code == 2 and REOPENED in errors and "its shard is rendered again" in errors
+    assert ended.value.code == 2 and REOPENED in errors and "its part is rendered again" in errors
     assert re.search(
-        rf"shard 3: .* but {ATTEMPTS} failed; .*{LOST_TWICE}.*\. Complete shards are kept", errors
+        rf"images 40 to 47 of shard 2: .* but {ATTEMPTS} failed; .*{LOST_TWICE}.*\. Complete parts are kept",
+        errors,
     )
     assert ".." not in errors and ".;" not in errors
     assert len(list(lost.iterdir())) == ATTEMPTS and contents(out) == before

@@ -53,7 +53,9 @@ def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
 
 
 def test_the_contact_sheet_shows_the_first_images_small() -> None:
-    rows, sheet = dry_run(parse_spec(tomllib.loads(SPEC)), ADAPTER)
+    rows, sheet, estimate = dry_run(parse_spec(tomllib.loads(SPEC)), ADAPTER)
+    assert (estimate["images"], estimate["measured"]) == (3, 3)
+    assert 1e4 < estimate["bytes"] < 1e6 and 0 < estimate["hours"] < 1
     assert rows and sheet.dtype == np.uint8 and sheet.shape == (96, 3 * 192 + 2 * 4, 3)
     pictures: list[Any] = [sheet[:, k * 196 : k * 196 + 192] for k in range(3)]
     for picture in pictures:

@@ -151,7 +151,7 @@ def test_temporary_files_of_killed_runs_are_removed_and_those_of_others_kept(
     write_shard(tmp_path, list_shards(spec)[2], spec)
     left = {path.name for path in tmp_path.iterdir()}
     assert len(left) == 5 and not [name for name in left if "part" in name or "tmp" in name]
-    remove_unfinished(tmp_path, [first])
+    remove_unfinished(tmp_path, [shard_path(tmp_path, first, spec).name])
     assert sum(path.name.startswith(".shard-00001") for path in tmp_path.iterdir()) == 1
     assert len(list(tmp_path.iterdir())) == 3
     remove_unfinished(tmp_path)

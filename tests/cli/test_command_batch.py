@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small_set import COUNT, SHARD_SIZE, write_spec
+from small_set import SHARDS, write_spec
 
+from dermis.apps.batch.run import Progress
 from dermis.cli.batch import ImageRate, ProgressLog
 
 Run = Callable[..., Any]
@@ -27,21 +28,21 @@ def test_a_set_is_drawn_and_reported(run: Run, spec: Path) -> None:
     ended = run("batch", "spec.toml", "-o", "out", *words.split(), "--json")
     assert ended.code == 0 and "Traceback" not in ended.stderr
     told = json.loads(ended.stdout)
-    assert (told["images"], told["shards"], told["skipped"], told["failed"]) == (3, 2, 0, [])
+    assert (told["images"], told["shards"], told["skipped"], told["failed"]) == (3, 1, 0, [])
     assert told["whole"] and told["images_per_s"] > 0 and told["folder"] == "out"
     pictures = sorted(Path("out").glob("shard-*/*.png"))
     assert pictures and pictures[0].name.startswith("000000000.")
     again = run("batch", "spec.toml", "-o", "out", *words.split())
-    assert again.code == 0 and "0 images in 0 shards (2 reused)" in again.stdout
+    assert again.code == 0 and "0 images in 0 shards (1 reused)" in again.stdout
 
 
 def test_a_part_says_that_others_are_missing(run: Run, spec: Path) -> None:
-    last = COUNT // SHARD_SIZE - 1
+    last = SHARDS - 1
     ended = run(
         "batch", spec, "-o", "out", "--shard", f"{last}/{last + 1}", "--adapter", "cpu", "--workers", 1
     )
     assert (
-        ended.code == 0 and "1 shards" in ended.stdout and "shards of other parts are missing" in ended.stdout
+        ended.code == 0 and "1 shards" in ended.stdout and "images of other jobs are missing" in ended.stdout
     )
     assert [path.name for path in Path("out").glob("shard-*")] == [f"shard-{last:05d}.tar"]
 
@@ -53,6 +54,7 @@ def test_a_dry_run_writes_a_sheet_alone(run: Run, spec: Path) -> None:
     assert {path.name for path in set(spec.parent.iterdir()) - before} == {"sheet.png"}
     rows = json.loads(run("batch", spec, "--dry-run", "--adapter", "cpu", "--count", 2, "--json").stdout)
     assert [row for row in rows["parameters"] if row["parameter"] == "camera.yaw_deg"]
+    assert rows["estimate"]["bytes"] > 0 and "2 images: about " in ended.stdout
     assert run("batch", spec, "--dry-run", "-o", "folder").code == 2
 
 
@@ -73,6 +75,7 @@ def test_the_example_is_a_spec(run: Run, tmp_path: Path) -> None:
         ("spec.toml", "--output: expected the folder"),
         ("spec.toml -o out --shard 2/2", "--shard: expected I/N"),
         ("spec.toml -o out --shard 1", "--shard: expected I/N"),
+        ("spec.toml -o out --part 3/3", "--part: expected I/N"),
         ("spec.toml -o out --size 3", "--size: expected WIDTHxHEIGHT"),
         ("spec.toml -o out --count 0", "count: expected "),
         ("spec.toml -o out --workers 0", "--workers: expected 1 to "),
@@ -106,5 +109,8 @@ def test_logs_get_a_line_now_and_then() -> None:
     lines = ProgressLog(written.append, lambda: now[0])
     for done in range(1, 101):
         now[0] = done * 1.0
-        lines.report(done, 220)
+        lines.report(Progress(done, 220))
     assert len(written) == 3 and written[0] == "30 of 220 images, 1 images/s, 3 min left"
+    now[0] = 200.0
+    lines.report(Progress(220, 220, verified=7, to_verify=1000))
+    assert written[3:] == ["7 of 1,000 shards verified"]

@@ -26,7 +26,7 @@ from dermis.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from dermis.apps.batch.run import RunReport, WorkerPool
+    from dermis.apps.batch.run import Progress, RunReport, WorkerPool
     from dermis.apps.batch.spec import Spec
 
 _MAX_PROCESSES = 1024
@@ -42,6 +42,7 @@ def batch(
     seed: IntegerOption = None,
     format: Literal["webdataset", "folder"] | None = None,
     shard: str = "0/1",
+    part: str = "0/1",
     adapter: AdapterOption = "auto",
     adapters: str | None = None,
     workers: IntegerOption = None,
@@ -56,8 +57,9 @@ def batch(
 ) -> int:
     """Render a data set with ground truth: people, expressions, lights and cameras drawn from distributions.
 
-    An interrupted command can be repeated to continue it: complete shards are kept. The same spec gives the
-    same bytes on the same kind of adapter, independent of the number and location of the workers.
+    An interrupted command can be repeated to continue it: complete parts of 16 to 31 images are kept. With a
+    larger --count it adds images to the data set. The same spec gives the same bytes on the same kind of
+    adapter, independent of the number and location of the workers.
 
     Examples:
 
@@ -78,7 +80,7 @@ def batch(
     output:
         Folder of the data set, created if necessary; with --dry-run the contact sheet (.png).
     count:
-        Number of images. [default: from the spec]
+        Number of images; more than an existing data set has add to it. [default: from the spec]
     size:
         Width and height of the images, WIDTHxHEIGHT [pixel]. [default: from the spec]
     seed:
@@ -87,6 +89,9 @@ def batch(
         Format of the shards: WebDataset tar files, or folders. [default: from the spec]
     shard:
         I/N: render every N-th shard, beginning with shard I (from 0), for job arrays with a shared disk.
+    part:
+        I/N: render every N-th part, beginning with part I (from 0), of the shards that --shard selects; for
+        job arrays with more jobs than shards.
     adapters:
         Numbers of several adapters, such as 0,1; see `dermis doctor`. [default: all GPUs of the best kind]
     workers:
@@ -104,8 +109,8 @@ def batch(
     keep_going:
         Skip images that cannot be rendered, and list them.
     dry_run:
-        Print the parameters of the data set and render its first 16 images as a contact sheet, without
-        writing it.
+        Print the parameters of the data set and an estimate of its size and duration, and render its first 16
+        images as a contact sheet, without writing it.
     example:
         Print a complete example spec with comments.
     as_json:
@@ -116,7 +121,7 @@ def batch(
     if example:
         print_lines(example_toml().rstrip("\n"))
         return 0
-    part = _parse_part(shard)
+    shards, parts = _parse_fraction("--shard", shard), _parse_fraction("--part", part)
     if spec is None:
         refuse("SPEC", "a file", "it is missing", "Print an example spec with --example")
     overrides = drop_none(count=count, size=size and parse_size(size), seed=seed, format=format)
@@ -137,16 +142,16 @@ def batch(
         pool, encoder_count = _local_processes(adapter, adapters, workers, workers_per_gpu, encoders)
     work = RunOptions(loaded_spec, output, encoder_count or 0, keep_going)
     with image_progress() as report_progress:
-        report = run(work, pool, part, lambda state: report_progress(state.images, state.total))
+        report = run(work, pool, shards, parts, report_progress)
     _print_report(report, output, as_json)
     return 0
 
 
-def _parse_part(text: str) -> tuple[int, int]:
-    """Return the integers I and N of the value "I/N" of the option --shard."""
+def _parse_fraction(option: str, text: str) -> tuple[int, int]:
+    """Return the integers I and N of the value "I/N" of an option."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
     if not match or int(match[1]) >= int(match[2]):
-        refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
+        refuse(option, "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
     return int(match[1]), int(match[2])
 
 
@@ -208,22 +213,22 @@ def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
     lines = [f"{folder}  {counts}  {report.seconds:.1f} s{speed}"]
     lines += [f"skipped: image {failure.number}: {failure.reason}" for failure in report.failed]
     if not report.is_complete:
-        lines.append("shards of other parts are missing: the last one writes index and data sheet")
+        lines.append("images of other jobs are missing: the last job writes index and data sheet")
     print_lines(*lines)
 
 
 def _dry_run(spec: Spec, adapter: str, contact_sheet: Path, as_json: bool) -> int:
-    from dermis.apps.batch.preview import dry_run, table_lines
+    from dermis.apps.batch.preview import dry_run, estimate_line, table_lines
     from dermis.images.io import check_output, write_png
 
     check_output(contact_sheet)
     if contact_sheet.suffix.lower() != ".png":
         refuse(contact_sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or omit -o")
     with spinner("rendering a contact sheet"):
-        rows, picture = dry_run(spec, adapter)
+        rows, picture, estimate = dry_run(spec, adapter)
     write_png(contact_sheet, picture)
-    report = {"sheet": str(contact_sheet), "parameters": rows}
-    print_report(as_json, report, lambda: [*table_lines(rows), str(contact_sheet)])
+    report = {"sheet": str(contact_sheet), "parameters": rows, "estimate": estimate}
+    print_report(as_json, report, lambda: [*table_lines(rows), estimate_line(estimate), str(contact_sheet)])
     return 0
 
 
@@ -232,30 +237,36 @@ _RATE_WINDOW_S = 60.0  # over which the rate is averaged
 
 
 @contextmanager
-def image_progress() -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that shows progress, whose arguments are the finished and the total number of images.
+def image_progress() -> Iterator[Callable[[Progress], None]]:
+    """Yield a function that shows the progress of a run: its images, and then the verification of shards.
 
     It updates a progress bar in a terminal, and otherwise logs lines.
     """
     if not sys.stderr.isatty():
         yield ProgressLog(note).report
         return
+    from rich import progress as rich
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("rendering images"),
+        TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=_RATE_WINDOW_S) as bar:
-        task = bar.add_task("", rate="", total=None)
+    with rich.Progress(*columns, console=Console(stderr=True), speed_estimate_period=_RATE_WINDOW_S) as bar:
+        task = bar.add_task("rendering images", rate="", total=None)
         image_rate = ImageRate()
 
-        def report(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total, rate=f"{image_rate.update(done):.3g} images/s")
+        def report(state: Progress) -> None:
+            if state.images < state.total or not state.to_verify:
+                what, done, total = "rendering images", state.images, state.total
+                rate = f"{image_rate.update(done):.3g} images/s"
+            else:
+                what, done, total, rate = "verifying shards", state.verified, state.to_verify, ""
+            bar.update(task, description=what, completed=done, total=total, rate=rate)
 
         yield report
 
@@ -291,11 +302,15 @@ class ProgressLog:
         self._write, self._clock = write, clock
         self._rate, self._last = ImageRate(clock), clock()
 
-    def report(self, done: int, total: int) -> None:
+    def report(self, state: Progress) -> None:
         """Log the number of finished images and the remaining time, unless the last message is too recent."""
+        done, total = state.images, state.total
         rate, now = self._rate.update(done), self._clock()
         if now - self._last < _LOG_INTERVAL_S:
             return
         self._last = now
+        if done >= total and state.to_verify:
+            self._write(f"{state.verified:,} of {state.to_verify:,} shards verified")
+            return
         remaining = f"{(total - done) / rate / 60:.0f} min left" if rate else "time left unknown"
         self._write(f"{done:,} of {total:,} images, {rate:.3g} images/s, {remaining}")

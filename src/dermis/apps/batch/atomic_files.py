@@ -48,16 +48,24 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
         return
 
 
-def move_into_place(temporary: Path, target: Path) -> None:
+def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, replacing a file or folder there.
+
+    replaces_folder : False keeps a folder that is there
 
     Raises OSError if this fails.
     """
-    if target.is_dir() and not target.is_symlink():
+    if replaces_folder and target.is_dir() and not target.is_symlink():
         replaced = temporary_path(target)
         target.rename(replaced)
-        temporary.rename(target)
-        remove_path(replaced)
+        try:
+            temporary.rename(target)
+        except OSError:
+            with contextlib.suppress(OSError):  # another process has moved a folder there
+                replaced.rename(target)
+            raise
+        finally:
+            remove_path(replaced)
     else:
         temporary.replace(target)
     flush_to_disk(target.parent)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import secrets
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -17,13 +19,14 @@ from dermis.base.extras import import_extra
 if TYPE_CHECKING:
     from distributed import Client
 
-_RETRIES = 2  # per shard, when a worker reports a loss; dask itself counts workers that die
+_RETRIES = 2  # per part, when a worker reports a loss; dask itself counts workers that die
+_TASKS_IN_FLIGHT = 1000  # submitted to the scheduler; far more than there are workers
 _TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
 
 @dataclass(frozen=True)
 class DaskCluster:
-    """Pool of dask workers, each of which renders one shard at a time.
+    """Pool of dask workers, each of which renders one part at a time.
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
@@ -34,22 +37,22 @@ class DaskCluster:
     file: Path | None
     adapter: str = "auto"
 
-    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render the shards, each as a dask task, and yield an event per completed shard.
+    def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Process the tasks, each as a dask task, and yield an event per completed task.
 
         Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
         that another attempt cannot solve.
         """
         import_extra("distributed", "--scheduler and --cluster")
-        from dermis.apps.batch.dask_worker import ShardPlugin
+        from dermis.apps.batch.dask_worker import PartPlugin
 
         name = f"dermis-{secrets.token_hex(6)}"
         with self._client() as client:
-            client.register_plugin(ShardPlugin.for_run(options, self.adapter), name=name)
+            client.register_plugin(PartPlugin.for_run(options, self.adapter), name=name)
             try:
                 with _shared_marker(options.out) as marker:
                     _check_shared_disk(client, marker)
-                yield from _submit_shards(client, name, shards)
+                yield from _submit_tasks(client, name, tasks)
             finally:
                 with suppress(OSError, TimeoutError):  # the scheduler is gone
                     client.unregister_worker_plugin(name)
@@ -98,30 +101,39 @@ def _check_shared_disk(client: Client, marker: Path) -> None:
         refuse(marker.parent, "a folder on a disk that all workers share", actual, "Choose another one")
 
 
-def _submit_shards(client: Client, name: str, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """Submit the shards as dask tasks, and yield the completion event of each one.
+def _submit_tasks(client: Client, name: str, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    """Submit parts to render and shards to verify as dask tasks, and yield the completion event of each one.
 
-    name : name of the `ShardPlugin` that renders them
+    name : name of the `PartPlugin` that processes them
     """
-    from distributed import as_completed
+    from distributed import Future, as_completed
 
-    from dermis.apps.batch.dask_worker import render_shard
+    from dermis.apps.batch.dask_worker import process_task
 
-    tasks = {
-        client.submit(render_shard, name, shard, key=f"{name}-{shard.index}", retries=_RETRIES): shard
-        for shard in shards
-    }
+    queue, submitted = deque(tasks), dict[Future, Shard]()
+    keys, completed = itertools.count(), as_completed(loop=client.loop)
+
+    def submit() -> None:
+        while queue and len(submitted) < _TASKS_IN_FLIGHT:
+            task = queue.popleft()
+            future = client.submit(process_task, name, task, key=f"{name}-{next(keys)}", retries=_RETRIES)
+            submitted[future] = task
+            completed.add(future)
+
     try:
-        for done in as_completed(list(tasks), loop=client.loop):
-            shard = tasks.pop(done)
+        submit()
+        for done in completed:
+            task = submitted.pop(done)
             if done.status != "finished":
                 raise DermisError(
-                    f"shard {shard.index}: expected a dask worker to render it, but they failed: "
-                    f"{done.exception()}. Complete shards are kept; run the command again to continue."
+                    f"{task}: expected a dask worker to render it, but they failed: "
+                    f"{done.exception()}. Complete parts are kept; run the command again to continue."
                 )
             event: WorkerEvent = done.result()
             if event.refusal:
                 raise DermisError(event.refusal)
+            queue.extendleft(reversed(event.missing))
+            submit()
             yield event
     finally:
-        client.cancel(list(tasks))
+        client.cancel(list(submitted))

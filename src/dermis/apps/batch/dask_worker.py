@@ -1,4 +1,4 @@
-"""Rendering of shards inside a worker of dask.distributed."""
+"""Rendering of parts of shards inside a worker of dask.distributed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import tomllib
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -30,9 +30,9 @@ _TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 @dataclass
 class _PluginState:
-    """State of a `ShardPlugin` in its dask worker.
+    """State of a `PartPlugin` in its dask worker.
 
-    child : worker process, started for the first shard
+    child : worker process, started for the first task
     cleanup : context managers and callbacks that are released together with the process
     stopped : event that is set when the run has ended and rendering must stop
     """
@@ -48,8 +48,8 @@ class _PluginState:
 
 
 @dataclass
-class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
-    """Plugin that runs a rendering process beside a dask worker, from its first shard to the end of the run.
+class PartPlugin(WorkerPlugin):  # type: ignore[misc]
+    """Plugin that runs a rendering process beside a dask worker, from its first task to the end of the run.
 
     The process renders as it does without dask; the dask worker only waits for it.
 
@@ -84,15 +84,15 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.close()
             self._state.lock.release()
 
-    def render(self, shard: Shard) -> WorkerEvent:
-        """Render a shard in the process and return its completion or refusal event.
+    def process(self, task: Shard) -> WorkerEvent:
+        """Process a task, see `Worker.process`, and return its completion or refusal event.
 
         Raises LostProcessError if the process or its device was lost, after which dask retries the task.
         """
         state = self._state
         with state.lock:
             try:
-                return self._render_in_process(state.child or self._start(), shard)
+                return self._process_in_child(state.child or self._start(), task)
             except LostProcessError:
                 state.close()
                 raise
@@ -102,9 +102,9 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
                 if state.stopped.is_set():
                     state.close()
 
-    def _render_in_process(self, child: ChildProcess, shard: Shard) -> WorkerEvent:
+    def _process_in_child(self, child: ChildProcess, task: Shard) -> WorkerEvent:
         try:
-            child.pipe.send(shard)
+            child.pipe.send(task)
             while not self._state.stopped.is_set():
                 event: WorkerEvent = child.pipe.recv()
                 if event.retry:
@@ -114,8 +114,8 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
                 if event.refusal:
                     self._state.close()
                     return event
-                if event.shard is not None:
-                    return WorkerEvent(shard.stop - shard.first, shard, event.failed)
+                if event.done is not None:
+                    return replace(event, images=event.rendered)
         except (EOFError, OSError) as fault:
             raise LostProcessError(f"a worker: {child.exit_reason()}") from fault
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
@@ -133,9 +133,9 @@ class ShardPlugin(WorkerPlugin):  # type: ignore[misc]
         return child
 
 
-def render_shard(name: str, shard: Shard) -> WorkerEvent:
-    """Render a shard with the plugin of the given name; this is the dask task."""
-    event: WorkerEvent = get_worker().plugins[name].render(shard)
+def process_task(name: str, task: Shard) -> WorkerEvent:
+    """Process a task with the plugin of the given name; this is the dask task."""
+    event: WorkerEvent = get_worker().plugins[name].process(task)
     return event
 
 

@@ -1,9 +1,13 @@
-"""Preview of a data set before it is rendered: a table of sampled parameters, and a contact sheet."""
+"""Preview of a data set: a table of sampled parameters, a contact sheet, and an estimate of size and time."""
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NotRequired, TypedDict
 
 import numpy as np
@@ -12,7 +16,9 @@ from numpy.typing import NDArray
 from dermis.apps.batch.distributions import Constant
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
+from dermis.apps.batch.shards import Part
 from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.worker import RunOptions, Worker
 from dermis.frame.renderer import Renderer
 from dermis.scene.toml_text import value_text
 
@@ -23,6 +29,7 @@ MAX_COUNTED = 20_000
 _COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
 _MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
 _MAX_COLUMN_WIDTH = 60  # characters
+_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # of an estimate
 _PERSON_IDS = "person.number", "person.seed"
 _MAX_VALUES = 12  # listed values of a text parameter
 
@@ -47,12 +54,48 @@ class ParameterRow(TypedDict):
     counts: NotRequired[dict[str, int]]
 
 
-def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDArray[np.uint8]]:
-    """Return the parameter table of a data set, and an sRGB contact sheet (h, w, 3) of its first 16 images.
+class Estimate(TypedDict):
+    """Estimated size and duration of a data set, from its first images at full size.
+
+    measured : number of rendered images
+    hours : duration with one worker
+    """
+
+    images: int
+    measured: int
+    bytes: int
+    hours: float
+
+
+def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDArray[np.uint8], Estimate]:
+    """Return the parameter table of a data set, an sRGB contact sheet (h, w, 3), and an estimate.
 
     Raises DermisError as `SceneBuilder.build` and `Renderer.draw` do.
     """
-    return parameter_rows(spec), contact_sheet(spec, adapter)
+    return parameter_rows(spec), contact_sheet(spec, adapter), estimate(spec, adapter)
+
+
+def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
+    """Return the size and the duration of a data set, by rendering its first images as a worker does.
+
+    The first two images, which fill caches, are not timed.
+    """
+    count = min(spec.count, spec.shard_size, _MEASURED_IMAGES)
+    times = [time.monotonic()]
+    with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(spec, Path(name)))) as worker:
+        send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
+        worker.process([Part(0, 0, count)], send)
+        size = sum(path.stat().st_size for path in Path(name).rglob("*") if path.is_file())
+    untimed = _UNTIMED_IMAGES if count > _UNTIMED_IMAGES else 0
+    seconds = (times[-1] - times[untimed]) / (count - untimed)
+    hours = spec.count * seconds / 3600
+    return {"images": spec.count, "measured": count, "bytes": spec.count * size // count, "hours": hours}
+
+
+def estimate_line(estimate: Estimate) -> str:
+    """Return an estimate as a line of text."""
+    size, hours = f"{estimate['bytes'] / 1e9:.3g} GB", f"{estimate['hours']:.3g} hours with one worker"
+    return f"{estimate['images']:,} images: about {size} and {hours}, from {estimate['measured']} images"
 
 
 def parameter_rows(spec: Spec) -> list[ParameterRow]:

@@ -1,22 +1,33 @@
-"""Run of a data set: render the missing shards, then write the index and the datasheet."""
+"""Run of a data set: render the missing parts, then write the index and the datasheet."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from dermis.apps.batch.atomic_files import atomic_write
+from dermis.apps.batch.atomic_files import atomic_write, remove_path
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
-from dermis.apps.batch.shards import Shard, is_intact, list_shards, remove_unfinished, shard_exists
-from dermis.apps.batch.spec import GENERATOR, Spec
+from dermis.apps.batch.shards import (
+    Part,
+    Shard,
+    list_parts,
+    list_shards,
+    part_files,
+    remove_unfinished,
+    shard_at,
+    shard_exists,
+    shard_path,
+)
+from dermis.apps.batch.spec import COUNT_LINE, GENERATOR, GENERATOR_LINE, Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
-from dermis.base.reading import read_text, read_toml
+from dermis.base.extras import import_extra
+from dermis.base.reading import read_text
 
 SPEC_FILE = "spec.toml"
 """Name of the spec in the folder of its data set: another one is refused there."""
@@ -25,8 +36,8 @@ SPEC_FILE = "spec.toml"
 class WorkerPool(Protocol):
     """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
-    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render the shards, each completely or not at all, and yield events as they happen."""
+    def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Process the tasks, see `Worker.process`, and those that become necessary; yield events."""
         ...
 
 
@@ -34,21 +45,25 @@ class WorkerPool(Protocol):
 class Progress:
     """Progress of a run, reported to `on_progress`.
 
-    images : number of images rendered so far
-    total : number of images in the shards that were missing at the start
+    images : number of images of the missing parts that are rendered, or were found on the disk
+    total : number of images in the missing parts
+    verified : number of complete shards that were read and compared with their hash
+    to_verify : number of shards that were complete at the start
     """
 
     images: int = 0
     total: int = 0
+    verified: int = 0
+    to_verify: int = 0
 
 
 @dataclass(frozen=True)
 class RunReport:
     """Result of a run.
 
-    images : number of images in the written shards, without those that could not be rendered
+    images : number of images that were rendered
     seconds : duration of the run [s]
-    shards : number of written shards
+    shards : number of shards that became complete during the run
     skipped : number of shards that were complete before the run
     failed : images that could not be rendered, with the reasons
     is_complete : whether all shards of the data set, its index and its datasheet exist
@@ -65,78 +80,125 @@ class RunReport:
 def run(
     options: RunOptions,
     pool: WorkerPool,
-    part: tuple[int, int] = (0, 1),
+    shards: tuple[int, int] = (0, 1),
+    parts: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
-    """Render the missing shards of a data set, or of a part of it; then write index and datasheet.
+    """Render the missing parts of a data set, or some of them; then write index and datasheet.
 
-    pool : workers that render the shards
-    part : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
-    on_progress : function called whenever images were rendered
+    pool : workers that render the parts
+    shards : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
+    parts : (i, n) selects every n-th part of these shards
+    on_progress : function called whenever images were rendered or a shard was verified
 
-    Raises DermisError for errors of the spec, the disk or the machine; complete shards are kept.
+    Raises DermisError for errors of the spec, the disk or the machine; complete parts are kept.
     """
     start = time.monotonic()
-    claim_folder(options.out, options.spec)
-    all_shards = list_shards(options.spec)
-    selected = all_shards[part[0] :: part[1]]
-    missing = [shard for shard in selected if not is_intact(options.out, shard, options.spec)]
-    remove_unfinished(options.out, selected)
+    out, spec = options.out, options.spec
+    for package in ("pyarrow.parquet", "isal.isal_zlib"):
+        import_extra(package, "a data set")
+    claim_folder(out, spec)
+    all_shards = list_shards(spec)
+    selected = all_shards[shards[0] :: shards[1]]
+    existing = {shard for shard in selected if shard_exists(out, shard, spec)}
+    share = [part for shard in selected for part in list_parts(shard, spec)][parts[0] :: parts[1]]
+    missing = [part for part in share if shard_at(part.index, spec) not in existing]
+    verified = [shard for shard in selected if shard in existing][parts[0] :: parts[1]]
+    own = {shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))}
+    remove_unfinished(out, own)
+    _remove_joined_parts(out, spec, existing)
     try:
-        images, failed = _render_missing(pool, options, missing, on_progress)
+        images, damaged, failed = _process(pool, options, [*missing, *verified], on_progress)
     finally:
-        remove_unfinished(options.out, selected)
-    complete = all(shard_exists(options.out, shard, options.spec) for shard in all_shards)
+        remove_unfinished(out, own)
+    complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
+    complete = len(complete_shards) == len(all_shards)
     if complete:  # concurrent runs that reach this point write the same bytes
-        write_index(options.out, options.spec)
-        write_datasheet(options.out, options.spec)
-    seconds = time.monotonic() - start
-    return RunReport(images, seconds, len(missing), len(selected) - len(missing), failed, complete)
+        remove_unfinished(out)
+        write_index(out, spec)
+        write_datasheet(out, spec)
+    kept = existing - damaged
+    written = len(complete_shards.intersection(selected) - kept)
+    return RunReport(images, time.monotonic() - start, written, len(kept), failed, complete)
 
 
 def claim_folder(out: Path, spec: Spec) -> None:
     """Create the folder of a data set, or check that an existing folder holds the data set of this spec.
 
+    The data set may have fewer images; the spec in the folder is then replaced.
+
     Raises DermisError if the folder belongs to another data set or cannot be written.
     """
-    path = out / SPEC_FILE
+    path, text = out / SPEC_FILE, spec.to_toml()
     try:
         out.mkdir(parents=True, exist_ok=True)
         exists = path.exists()
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(out, fault)
-    if not exists:
-        atomic_write(path, lambda temporary: temporary.write_text(spec.to_toml(), encoding="utf-8"))
-    elif read_text(path, "the spec of a data set") != spec.to_toml():
-        number = _generator_number(path)
-        if number != GENERATOR:
-            expected = f"a data set whose people are drawn by generator {GENERATOR}"
-            advice = "Choose another folder, or continue it with the version that began it"
-            refuse(out, expected, f"those of its {SPEC_FILE} are by generator {number}", advice)
-        advice = "Choose another folder, or use the spec that the folder was created with"
+    if exists and not _must_grow(read_text(path, "the spec of a data set"), spec, out):
+        return
+    atomic_write(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _must_grow(known: str, spec: Spec, out: Path) -> bool:
+    """Return whether the data set of a known spec is that of this spec, but with fewer images.
+
+    known : text of the spec in the folder of the data set
+
+    Raises DermisError if there is any other difference.
+    """
+    if known == spec.to_toml():
+        return False
+    other_folder, count = "Choose another folder", COUNT_LINE.search(known)
+    generator = GENERATOR_LINE.search(known)
+    number = int(generator[1]) if generator else 1  # earlier versions wrote none
+    if number != GENERATOR:
+        actual = f"it was made with number {number}, by another version of dermis"
+        refuse(out, f"a data set of generator number {GENERATOR}", actual, f"{other_folder}, or that version")
+    if not count or COUNT_LINE.sub("", known, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
+        advice = f"{other_folder}, or use the spec that the folder was created with"
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
+    if int(count[1]) > spec.count:
+        expected, actual = f"a count of at least the {count[1]} images that it has", f"got {spec.count}"
+        refuse(out, expected, actual, f"Use --count {count[1]}, or choose another folder")
+    return True
 
 
-def _generator_number(path: Path) -> object:
-    """Return the generator number of a written spec; those without one are of the first."""
-    return read_toml(path, "the spec of a data set").get("generator", 1)
+def _remove_joined_parts(out: Path, spec: Spec, complete: Iterable[Shard]) -> None:
+    """Remove the parts that an interrupted run has joined to their shard, but not removed."""
+    if files := part_files(out):
+        complete = set(complete)
+        for number, path in files.items():
+            if shard_at(number // spec.shard_size, spec) in complete:
+                remove_path(path)
 
 
-def _render_missing(
-    pool: WorkerPool, options: RunOptions, missing: Sequence[Shard], on_progress: Callable[[Progress], None]
-) -> tuple[int, tuple[Failure, ...]]:
-    """Render the missing shards; return the number of images in them, and the images that failed."""
-    progress = Progress(0, sum(shard.stop - shard.first for shard in missing))
-    failed: list[Failure] = []
-    notes = set[str]()
-    for event in pool.render(options, missing) if missing else ():
+def _process(
+    pool: WorkerPool,
+    options: RunOptions,
+    tasks: Sequence[Shard],
+    on_progress: Callable[[Progress], None],
+) -> tuple[int, set[Shard], tuple[Failure, ...]]:
+    """Process the tasks; return the number of rendered images, the damaged shards, and the failed images."""
+    to_render = [task for task in tasks if isinstance(task, Part)]
+    progress = Progress(total=sum(map(len, to_render)), to_verify=len(tasks) - len(to_render))
+    rendered, damaged, failed, notes = 0, set[Shard](), list[Failure](), set[str]()
+    for event in pool.render(options, tasks) if tasks else ():
         if event.note and event.note not in notes:
             notes.add(event.note)
             notify(event.note)
         if event.retry:
-            notify(f"{event.retry}; its shard is rendered again")
-        failed += event.failed
-        if event.images:
-            progress.images += event.images
+            notify(f"{event.retry}; its part is rendered again")
+        progress.images += event.images
+        progress.total += sum(map(len, event.missing))
+        if isinstance(event.done, Part):
+            rendered += event.rendered
+            failed += event.failed
+            progress.images += len(event.done) - event.rendered
+        elif event.done is not None:
+            progress.verified += 1
+            damaged |= {event.done} if event.missing else set()
+        progress.images = min(progress.images, progress.total)  # images of lost workers are rendered twice
+        if event.images or event.done is not None:
             on_progress(progress)
-    return progress.total - len(failed), tuple(sorted(failed))
+    return rendered, damaged, tuple(sorted(failed))

@@ -1,11 +1,11 @@
-"""Shards: the files or folders of consecutive images in which a data set is rendered."""
+"""Shards: the files or folders of consecutive images of a data set; and parts, in which they are rendered."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -19,10 +19,13 @@ from dermis.base.reading import open_regular_file, parsing, read_file
 
 SHARD_DESCRIPTION = "a shard of a data set"
 _SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
+_PART_NAME = re.compile(r"part-(\d{9})(\.tar)?")
+_VALUE_SEPARATOR = " + "  # of adapters and versions that rendered parts of a shard
 _MAX_REASON_LENGTH = 200  # characters
+_MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True, order=True, slots=True)
 class Shard:
     """Number of a shard, and its range of image numbers, from `first` up to but excluding `stop`."""
 
@@ -30,16 +33,52 @@ class Shard:
     first: int
     stop: int
 
+    def __str__(self) -> str:
+        """Return the name of the shard in messages."""
+        return f"shard {self.index}"
+
+    def __len__(self) -> int:
+        """Return the number of images."""
+        return self.stop - self.first
+
+
+class Part(Shard):
+    """Part of a shard, the unit of work: the number of its shard, and its own range of image numbers."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        """Return the name of the part in messages."""
+        return f"images {self.first} to {self.stop - 1} of shard {self.index}"
+
 
 def list_shards(spec: Spec) -> list[Shard]:
     """Return all shards of a data set in order; the last one may have fewer images."""
-    starts = range(0, spec.count, spec.shard_size)
-    return [Shard(k, first, min(first + spec.shard_size, spec.count)) for k, first in enumerate(starts)]
+    return [shard_at(index, spec) for index in range(-(-spec.count // spec.shard_size))]
+
+
+def shard_at(index: int, spec: Spec) -> Shard:
+    """Return the shard with a given number."""
+    first = index * spec.shard_size
+    return Shard(index, first, min(first + spec.shard_size, spec.count))
+
+
+def list_parts(shard: Shard, spec: Spec) -> list[Part]:
+    """Return the parts of a shard in order: 16 images each, or up to 31 so that no person is split.
+
+    They begin at multiples of their size in the data set, at which persons begin too. Persons of more than 32
+    images are split; the first and the last part of a shard may be smaller.
+    """
+    person = spec.images_per_person
+    size = -(-_MIN_PART_IMAGES // person) * person if person <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
+    starts = [shard.first, *range((shard.first // size + 1) * size, shard.stop, size)]
+    return [Part(shard.index, *ends) for ends in zip(starts, [*starts[1:], shard.stop], strict=True)]
 
 
 def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
-    """Return the path of a shard's tar file or folder."""
-    return out / f"shard-{shard.index:05d}{'.tar' if spec.format == 'webdataset' else ''}"
+    """Return the path of the tar file or folder of a shard, or of a part."""
+    name = f"part-{image_key(shard.first)}" if isinstance(shard, Part) else f"shard-{shard.index:05d}"
+    return out / f"{name}{'.tar' if spec.format == 'webdataset' else ''}"
 
 
 def shard_index(path: Path) -> int | None:
@@ -54,21 +93,23 @@ def image_key(number: int) -> str:
 
 
 class ShardWriter:
-    """Context manager that writes a shard, which is renamed to its final path on a normal exit.
+    """Context manager that writes a shard or a part, which is renamed to its final path on a normal exit.
 
-    adapter : name of the adapter that renders the shard, for its manifest
+    adapter : name of the adapter that renders the images, for the manifest; none if all images are copied
 
     Raises DermisError if the shard cannot be written; nothing of it is then left on the disk.
     """
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
         self._target, self._shard, self._spec = shard_path(out, shard, spec), shard, spec
-        self._temporary, self._adapter = temporary_path(self._target), adapter
+        self._temporary = temporary_path(self._target)
+        self._made_with = formats.software_versions(adapter) if adapter else {}
         self._next_number = shard.first
         self._written, self._left_out = 0, dict[int, str]()
 
     def __enter__(self) -> Self:
         """Create the temporary file or folder to which the shard is written."""
+        self._replaces_folder = isinstance(self._shard, Part) or self._target.exists()
         writer = TarWriter if self._spec.format == "webdataset" else FolderWriter
         try:
             self._files: TarWriter | FolderWriter = writer(self._temporary)
@@ -91,12 +132,19 @@ class ShardWriter:
         """Record in the manifest that an image could not be rendered."""
         self._left_out[number] = shorten(reason, _MAX_REASON_LENGTH)
 
+    def add_versions(self, made_with: Mapping[str, str]) -> None:
+        """Record in the manifest the adapter and the versions with which copied images were rendered."""
+        for name, value in made_with.items():
+            known = self._made_with.get(name, value).split(_VALUE_SEPARATOR)
+            merged = sorted({*known, *value.split(_VALUE_SEPARATOR)})
+            self._made_with = {**self._made_with, name: _VALUE_SEPARATOR.join(merged)}
+
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Write the manifest and rename the shard to its final path, or remove it after an error."""
         try:
             if kind is None:
                 self._files.finish(self._manifest_bytes())
-                move_into_place(self._temporary, self._target)
+                move_into_place(self._temporary, self._target, self._replaces_folder)
         except OSError as fault:
             refuse_output(self._target, fault)
         finally:
@@ -109,9 +157,8 @@ class ShardWriter:
         if self._written + len(self._left_out) != shard.stop - shard.first:
             raise ValueError(f"{self._written} images and {len(self._left_out)} left out do not fill {shard}")
         left_out = tuple(sorted(self._left_out.items()))
-        sha256, versions = self._files.sha256(), formats.software_versions(self._adapter)
-        images = shard.index, shard.first, shard.stop
-        data = ShardManifest(spec.digest(), *images, left_out, sha256, versions).to_bytes()
+        sha256, images = self._files.sha256(), (shard.index, shard.first, shard.stop)
+        data = ShardManifest(spec.digest(), *images, left_out, sha256, self._made_with).to_bytes()
         if len(data) > formats.MAX_MANIFEST_BYTES:
             actual = f"{len(left_out)} failed, for example: {left_out[0][1]}"
             advice = "Correct the spec"
@@ -132,47 +179,54 @@ def read_manifest(path: Path) -> ShardManifest:
 
 
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a complete shard exists at its final path.
+    """Return whether a complete shard or part exists at its final path.
 
-    Raises DermisError for a shard of another data set.
+    One that the data set had before it grew, with fewer images, is not complete. Raises DermisError for a
+    shard of another data set.
     """
     path = shard_path(out, shard, spec)
     try:
         manifest = read_manifest(path)
     except DermisError:
         return False
-    if (manifest.spec, manifest.index, manifest.first, manifest.stop) != (spec.digest(), *astuple(shard)):
+    same_place = (manifest.index, manifest.first) == (shard.index, shard.first)
+    if manifest.spec != spec.digest() or not same_place or manifest.stop > shard.stop:
         advice = "Choose another folder, or use the spec that the folder was created with"
         refuse(path, "a shard of this data set", "it belongs to another spec", advice)
-    return True
+    return manifest.stop == shard.stop
 
 
 def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard exists and matches its SHA-256, by reading all of it.
+    """Return whether a shard or part exists and matches its SHA-256, by reading all of it.
 
     Raises DermisError for a shard of another data set.
     """
     if not shard_exists(out, shard, spec):
         return False
     path = shard_path(out, shard, spec)
-    with suppress(DermisError):
-        return _shard_sha256(path) == read_manifest(path).sha256
+    with suppress(DermisError, OSError):
+        return shard_sha256(path) == read_manifest(path).sha256
     return False
 
 
-def remove_unfinished(out: Path, shards: Collection[Shard] | None = None) -> None:
+def part_files(out: Path) -> dict[int, Path]:
+    """Return the files or folders of the complete parts in a data set, by the number of their first image."""
+    found = {path: _PART_NAME.fullmatch(path.name) for path in out.iterdir()}
+    return {int(match[1]): path for path, match in found.items() if match}
+
+
+def remove_unfinished(out: Path, own: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
-    shards : shards that no other run is writing; all if None
+    own : names of the shards and parts that no other run is writing; all if None
     """
-    own = None if shards is None else {shard.index for shard in shards}
     for path, name in unfinished_files(out).items():
-        index = shard_index(Path(name))
-        if own is None or index is None or index in own:
+        is_images = _SHARD_NAME.fullmatch(name) or _PART_NAME.fullmatch(name)
+        if own is None or name in own or not is_images:
             remove_path(path)
 
 
-def _shard_sha256(path: Path) -> str:
+def shard_sha256(path: Path) -> str:
     """Return the SHA-256 of a shard without its manifest."""
     if path.is_dir():
         names = {one.name for one in path.iterdir()} - {formats.MANIFEST_NAME}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -33,6 +34,10 @@ GENERATOR = 2
 
 1 has the people of version 0.1, 2 the skin of measured people.
 """
+COUNT_LINE = re.compile(r"(?m)^count = (\d+)\n")
+"""Line of a canonical spec with the number of images, by which data sets may grow."""
+GENERATOR_LINE = re.compile(r"(?m)^generator = (\d+)\n")
+"""Line of a canonical spec with the generator number; earlier versions wrote none."""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
 _BACKGROUND_TABLE = "[background]"
@@ -59,9 +64,9 @@ class Spec(FrozenModel):
     seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
     """Seed of all random numbers."""
     generator: Annotated[
-        int, Field(ge=GENERATOR, le=GENERATOR), Reason("this version draws people by no other rules")
+        int, Field(ge=GENERATOR, le=GENERATOR), Reason("this version makes other images from a spec")
     ] = GENERATOR
-    """Number of the rules by which seeds become people; data sets of another number cannot be continued."""
+    """Number of the rules by which seeds become pictures; data sets of another number are not continued."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
@@ -106,6 +111,7 @@ class Spec(FrozenModel):
     """Folder of the files that the spec names; not part of its TOML."""
 
     _sampler: Sampler = PrivateAttr()
+    _digest: str = PrivateAttr("")
 
     def model_post_init(self, context: object) -> None:
         """Check the distributions across tables and create the sampler."""
@@ -158,8 +164,12 @@ class Spec(FrozenModel):
         return "\n".join([_TOML_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """Return the SHA-256 of the canonical TOML, which identifies the data set."""
-        return hashlib.sha256(self.to_toml().encode()).hexdigest()
+        """Return the SHA-256 of the canonical TOML without `count`, which identifies the data set."""
+        if not self._digest:
+            text = COUNT_LINE.sub("", self.to_toml(), count=1)
+            digest = hashlib.sha256(text.encode()).hexdigest()
+            BaseModel.__setattr__(self, "_digest", digest)
+        return self._digest
 
 
 def _table_distributions(name: str, value: object) -> dict[str, Distribution]:
@@ -200,6 +210,10 @@ def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """
     if "folder" in data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
+    if data.get("generator", GENERATOR) != GENERATOR:
+        actual = f"got {format_value(data['generator'])}"
+        advice = "Remove it to start another data set, or use the version of dermis that wrote it"
+        refuse("generator", f"{GENERATOR}, the generator number of this version", actual, advice)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in data.items()}
     fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):

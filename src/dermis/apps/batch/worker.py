@@ -1,4 +1,4 @@
-"""Worker that renders shards with a renderer, a scene builder and encoder processes."""
+"""Worker that renders parts of shards with a renderer, a scene builder and encoder processes."""
 
 from __future__ import annotations
 
@@ -10,17 +10,28 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
+from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
-from dermis.apps.batch.shards import Shard, ShardWriter, is_intact
+from dermis.apps.batch.shards import (
+    Part,
+    Shard,
+    ShardWriter,
+    is_intact,
+    list_parts,
+    shard_at,
+    shard_exists,
+    shard_path,
+)
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.frame.observation import Observation
@@ -71,19 +82,23 @@ class WorkerSlot:
 
 @dataclass(frozen=True)
 class WorkerEvent:
-    """Progress event sent by a worker; only one of the fields is set, and `failed` comes with `shard`.
+    """Progress event sent by a worker; only one of the first two and the last three fields is set.
 
     images : number of images rendered since the last event
-    shard : shard that was completed
-    failed : images of that shard that could not be rendered
+    done : part that is complete, or shard that was verified
+    rendered : number of images of that part that were rendered, and not found on the disk
+    failed : images of that part that could not be rendered
+    missing : damaged parts that must be rendered again; all parts of a damaged shard
     note : warning for the user
-    retry : reason for which the worker exits and another one must render its shard
+    retry : reason for which the worker exits and another one must continue its tasks
     refusal : reason for which the run ends
     """
 
     images: int = 0
-    shard: Shard | None = None
+    done: Shard | None = None
+    rendered: int = 0
     failed: tuple[Failure, ...] = ()
+    missing: tuple[Part, ...] = ()
     note: str = ""
     retry: str = ""
     refusal: str = ""
@@ -103,53 +118,98 @@ class _PlannedImage(NamedTuple):
 
 
 class Worker:
-    """Renderer of shards on one device; each image depends on the spec and its number only.
+    """Renderer of parts on one device; each image depends on the spec and its number only.
+
+    The device is opened when the first image is rendered.
 
     adapter : name or number of the adapter, as for `Renderer`
     """
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
-        self._options = options
-        self._renderer = Renderer(adapter, cache_ttl=_CACHED_FRAMES)
+        self._options, self._adapter = options, adapter
         self._builder = SceneBuilder(options.spec)
         self._encoders = EncoderPool(options.encoders, partial(_encode, options.spec))
+
+    @cached_property
+    def _renderer(self) -> Renderer:
+        renderer = Renderer(self._adapter, cache_ttl=_CACHED_FRAMES)
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
+        return renderer
 
-    def render_shard(self, shard: Shard, on_image: Callable[[], None] = lambda: None) -> tuple[Failure, ...]:
-        """Render and write a shard unless it is intact, and return the images that failed.
+    def process(self, tasks: Iterable[Shard], send: Callable[[WorkerEvent], None]) -> None:
+        """Render the parts among the tasks, join those of complete shards, and verify the shards.
 
-        Without the option `keep_going`, a failed image raises DermisError.
+        The next task is requested while frames of the previous one are in flight. Without the option
+        `keep_going`, a failed image raises DermisError.
 
-        on_image : function called after each image
+        send : function called with each event
 
         Raises DermisError for errors of the spec or the disk, DeviceError if the device was lost twice, and
         LostProcessError if an encoder process died.
         """
-        options = self._options
-        if is_intact(options.out, shard, options.spec):
-            return ()
-        failed: list[Failure] = []
-        adapter = self._renderer.device.adapter.name
-        with ShardWriter(options.out, shard, options.spec, adapter) as writer:
-            for number, files in self._encoders.encode_all(self._encoder_jobs(shard, failed)):
-                writer.add(number, files)
-                on_image()
-            for failure in sorted(failed):
-                writer.leave_out(*failure)
-        return tuple(sorted(failed))
+        planned, failed = deque[tuple[Part, KeptImages]](), list[Failure]()
+        numbers = self._image_numbers(tasks, planned, send)
+        images = self._encoders.encode_all(self._encoder_jobs(numbers, failed))
+        image = next(images, None)
+        while planned:
+            part, kept = planned.popleft()
+            adapter = self._renderer.device.adapter.name if kept.stop < part.stop else ""
+            rendered = 0
+            with ShardWriter(self._options.out, part, self._options.spec, adapter) as writer:
+                if kept.path:
+                    copy_images(writer, kept.path, part.first, kept.stop)
+                while image is not None and part.first <= image[0] < part.stop:
+                    writer.add(*image)
+                    rendered += 1
+                    send(WorkerEvent(images=1))
+                    image = next(images, None)  # all failures before it are known then
+                own = tuple(sorted(one for one in failed if part.first <= one.number < part.stop))
+                for failure in own:
+                    writer.leave_out(*failure)
+            send(WorkerEvent(done=part, rendered=rendered, failed=own, missing=self._join(part)))
 
     def close(self) -> None:
         """Kill the encoder processes."""
         self._encoders.close()
 
+    def _image_numbers(
+        self,
+        tasks: Iterable[Shard],
+        planned: deque[tuple[Part, KeptImages]],
+        send: Callable[[WorkerEvent], None],
+    ) -> Iterator[int]:
+        """Yield the numbers of the images to render; process the tasks in which there are none.
+
+        planned : queue to which each part to write is appended, with the images that are copied
+        """
+        out, spec = self._options.out, self._options.spec
+        for task in tasks:
+            if not isinstance(task, Part):
+                intact = is_intact(out, task, spec)
+                if not intact:
+                    remove_path(shard_path(out, task, spec))
+                send(WorkerEvent(done=task, missing=() if intact else tuple(list_parts(task, spec))))
+            elif is_intact(out, task, spec) or shard_exists(out, shard_at(task.index, spec), spec):
+                send(WorkerEvent(done=task, missing=self._join(task)))
+            else:
+                kept = kept_images(out, task, spec)
+                planned.append((task, kept))
+                yield from range(kept.stop, task.stop)
+
+    def _join(self, part: Part) -> tuple[Part, ...]:
+        """Join the shard of a part if all of its parts exist; return the damaged ones."""
+        spec = self._options.spec
+        return join_parts(self._options.out, shard_at(part.index, spec), spec)
+
     def _encoder_jobs(
-        self, shard: Shard, failed: list[Failure]
+        self, numbers: Iterator[int], failed: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
         """Yield number, observation, parameters and tone of each image that can be rendered, in order.
 
+        numbers : numbers of the images to render
         failed : list to which images that cannot be rendered are appended
         """
-        groups = deque([deque(range(shard.first, shard.stop))])
+        groups = deque([numbers])
         while groups:
             numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
@@ -165,19 +225,18 @@ class Worker:
                     failed.append(Failure(in_flight[0].number, str(fault)))
                     single = []
                 else:  # it is unknown which one failed: render them again one by one
-                    single = [deque([plan.number]) for plan in in_flight]
+                    single = [iter([plan.number]) for plan in in_flight]
                 groups.extendleft(reversed([*single, numbers]))
 
     def _plan_images(
-        self, numbers: deque[int], in_flight: deque[_PlannedImage], failed: list[Failure]
+        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failed: list[Failure]
     ) -> Iterator[_PlannedImage]:
         """Yield the next image that can be rendered, and append it to `in_flight`.
 
-        numbers : numbers of the images still to plan, which are removed
+        numbers : numbers of the images still to plan
         failed : list to which images that cannot be rendered are appended
         """
-        while numbers:
-            number = numbers.popleft()
+        for number in numbers:
             parameters = self._options.spec.parameters(number)
             try:
                 scene, settings = self._builder.build(parameters)
@@ -220,7 +279,7 @@ class Worker:
 
 
 def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
-    """Render the shards that arrive through a pipe and send events back; this runs in a worker process."""
+    """Process the tasks that arrive through a pipe and send events back; this runs in a worker process."""
     if slot.threads:
         os.environ["LP_NUM_THREADS"] = str(slot.threads)  # read when the driver is loaded
     with warnings.catch_warnings():
@@ -228,13 +287,18 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
         try:
             with closing(Worker(slot.adapter, options)) as worker:
                 while True:
-                    shard = pipe.recv()
-                    failed = worker.render_shard(shard, lambda: pipe.send(WorkerEvent(images=1)))
-                    pipe.send(WorkerEvent(shard=shard, failed=failed))
+                    worker.process(available_tasks(pipe), pipe.send)
         except (DeviceError, LostProcessError) as fault:
             pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # the pool appends text
         except DermisError as fault:
             pipe.send(WorkerEvent(refusal=str(fault)))
+
+
+def available_tasks(pipe: Connection) -> Iterator[Shard]:
+    """Yield the next task of a worker, and those that have arrived when the ones before are in flight."""
+    yield pipe.recv()
+    while pipe.poll():
+        yield pipe.recv()
 
 
 def _forward_notes(forward: Callable[[str], None]) -> None:

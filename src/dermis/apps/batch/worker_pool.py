@@ -1,4 +1,4 @@
-"""Worker processes on this machine: each renders one shard at a time and is replaced if it dies."""
+"""Worker processes on this machine: each renders one part at a time and is replaced if it dies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, similar_adapters
 
 MAX_ATTEMPTS = 3
-"""Attempts to render a shard before the run fails."""
+"""Attempts to render a part before the run fails."""
 _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 
 
@@ -77,15 +77,14 @@ class ProcessPool:
 
     slots: Sequence[WorkerSlot]
 
-    def render(self, options: RunOptions, shards: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render the shards on all slots and yield events as they happen.
+    def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
+        """Process the tasks on all slots and yield events as they happen.
 
         Raises DermisError for errors that another attempt cannot solve, after all workers have been stopped.
         """
-        pool = _PoolState(options, shards)
+        pool = _PoolState(options, tasks, list(self.slots))
         try:
-            for slot in self.slots:
-                pool.start_worker(slot)
+            pool.start_workers()
             while pool.workers:
                 by_pipe = {worker.child.pipe: worker for worker in pool.workers}
                 for pipe in connection.wait(list(by_pipe)):
@@ -97,32 +96,33 @@ class ProcessPool:
 
 @dataclass
 class _WorkerProcess:
-    """Worker process with its slot and the shard that it is rendering."""
+    """Worker process with its slot, and its tasks: the one in progress, and at most one to continue with."""
 
     slot: WorkerSlot
     child: ChildProcess
-    shard: Shard
+    tasks: list[Shard]
 
 
 class _PoolState:
-    """State of a run on this machine: its worker processes, and the queue of shards still to render."""
+    """State of a run on this machine: its worker processes, and the queue of tasks that have no worker."""
 
-    def __init__(self, options: RunOptions, shards: Sequence[Shard]) -> None:
-        self._options, self._queue, self._attempts = options, deque(shards), Counter[int]()
+    def __init__(self, options: RunOptions, tasks: Sequence[Shard], slots: list[WorkerSlot]) -> None:
+        self._options, self._queue, self._attempts = options, deque(tasks), Counter[Shard]()
+        self._free_slots = slots
         self.workers: list[_WorkerProcess] = []
 
-    def start_worker(self, slot: WorkerSlot) -> None:
-        """Start a worker on a slot if the queue still has a shard."""
-        if self._queue:
-            child = start_process(run_worker, slot, self._options)
-            worker = _WorkerProcess(slot, child, self._queue.popleft())
+    def start_workers(self) -> None:
+        """Start a worker on each free slot while the queue has tasks."""
+        while self._queue and self._free_slots:
+            slot = self._free_slots.pop(0)
+            worker = _WorkerProcess(slot, start_process(run_worker, slot, self._options), [])
             self.workers.append(worker)
-            self._send_shard(worker)
+            self._send_task(worker)
 
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
-        """Return the next event of a worker; send the worker its next shard, replace it or stop it.
+        """Return the next event of a worker; send the worker its next task, replace it or stop it.
 
-        Raises DermisError for a refusal, and for a shard that failed `MAX_ATTEMPTS` times.
+        Raises DermisError for a refusal, and for a part that failed `MAX_ATTEMPTS` times.
         """
         try:
             event: WorkerEvent = worker.child.pipe.recv()
@@ -130,28 +130,49 @@ class _PoolState:
             event = WorkerEvent(retry=f"a worker: {worker.child.exit_reason()}")
         if event.refusal:
             raise DermisError(event.refusal)
+        if event.done is not None:
+            worker.tasks.remove(event.done)
+            self._queue.extendleft(reversed(event.missing))
         if event.retry:
+            self._return_tasks(worker, event.retry)
             self._stop_worker(worker)
-            if self._attempts[worker.shard.index] >= MAX_ATTEMPTS:
-                raise DermisError(
-                    f"shard {worker.shard.index}: expected a worker to render it, but {MAX_ATTEMPTS} failed; "
-                    f"the last one reported: {event.retry}. "
-                    "Complete shards are kept; run the command again to continue."
-                )
-            self._queue.appendleft(worker.shard)
-            self.start_worker(worker.slot)
-        elif event.shard is not None and self._queue:
-            worker.shard = self._queue.popleft()
-            self._send_shard(worker)
-        elif event.shard is not None:
+        elif self._may_continue(worker):
+            self._send_task(worker)
+        elif not worker.tasks:
             self._stop_worker(worker)
+        self.start_workers()
         return event
 
-    def _send_shard(self, worker: _WorkerProcess) -> None:
-        self._attempts[worker.shard.index] += 1
-        with suppress(OSError):  # the process died, which the next read of the pipe reports
-            worker.child.pipe.send(worker.shard)
+    def _may_continue(self, worker: _WorkerProcess) -> bool:
+        """Return whether a worker gets a task: if it has none, or one that is in progress for the first time.
+
+        The second one lets it keep frames in flight; there is none when tasks become fewer than workers.
+        """
+        if not worker.tasks:
+            return bool(self._queue)
+        is_first_attempt = self._attempts[worker.tasks[0]] == 1
+        return len(worker.tasks) == 1 and is_first_attempt and len(self._queue) >= len(self.workers)
 
     def _stop_worker(self, worker: _WorkerProcess) -> None:
         self.workers.remove(worker)
         worker.child.kill()
+        self._free_slots.append(worker.slot)
+
+    def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
+        """Return the tasks of a worker that exits to the queue."""
+        current, *unstarted = worker.tasks
+        if self._attempts[current] >= MAX_ATTEMPTS:
+            raise DermisError(
+                f"{current}: expected a worker to render it, but {MAX_ATTEMPTS} failed; "
+                f"the last one reported: {reason}. "
+                "Complete parts are kept; run the command again to continue."
+            )
+        self._attempts.subtract(unstarted)
+        self._queue.extendleft(reversed(worker.tasks))
+
+    def _send_task(self, worker: _WorkerProcess) -> None:
+        task = self._queue.popleft()
+        worker.tasks.append(task)
+        self._attempts[task] += 1
+        with suppress(OSError):  # the process died, which the next read of the pipe reports
+            worker.child.pipe.send(task)

@@ -1,0 +1,106 @@
+"""Joining of complete parts to their shard, and images kept from a data set that had fewer images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+from dermis.apps.batch.atomic_files import remove_path
+from dermis.apps.batch.reader import shard_files
+from dermis.apps.batch.shards import (
+    Part,
+    Shard,
+    ShardWriter,
+    is_intact,
+    list_parts,
+    read_manifest,
+    shard_at,
+    shard_exists,
+    shard_path,
+    shard_sha256,
+)
+from dermis.apps.batch.spec import Spec
+from dermis.base.errors import DermisError
+
+_MAX_ATTEMPTS = 3
+
+
+class KeptImages(NamedTuple):
+    """Images at the beginning of a part that need not be rendered again, from `part.first` to before `stop`.
+
+    path : shard or part with fewer images that contains them; None if there are none
+    """
+
+    path: Path | None
+    stop: int
+
+
+def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
+    """Return the images of a part that the data set had before it grew."""
+    for piece in (part, shard_at(part.index, spec)):
+        path = shard_path(out, piece, spec)
+        with suppress(DermisError):
+            manifest = read_manifest(path)
+            is_shorter = manifest.first <= part.first < manifest.stop < piece.stop
+            if is_shorter and manifest.spec == spec.digest() and _matches_sha256(path, manifest.sha256):
+                return KeptImages(path, min(manifest.stop, part.stop))
+    return KeptImages(None, part.first)
+
+
+@lru_cache(maxsize=2)  # one shard is read for many parts
+def _matches_sha256(path: Path, sha256: str) -> bool:
+    return shard_sha256(path) == sha256
+
+
+def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
+    """Copy a range of images from a shard or part, with the reasons for those that were left out.
+
+    Raises DermisError if it cannot be read.
+    """
+    manifest = read_manifest(path)
+    writer.add_versions(manifest.made_with)
+    for number, reason in manifest.left_out:
+        if first <= number < stop:
+            writer.leave_out(number, reason)
+    with shard_files(path) as images:
+        for key, files in images.items():
+            if first <= int(key) < stop:
+                writer.add(int(key), {suffix: read() for suffix, read in files.items()})
+
+
+def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
+    """Join the parts of a shard if all of them exist, and remove them; return the damaged ones.
+
+    Damaged parts are removed, and must be rendered again. Several processes may join the same parts at once:
+    they write equal bytes, and parts are only removed when the shard exists.
+
+    Raises DermisError if the shard cannot be written.
+    """
+    parts = {part: shard_path(out, part, spec) for part in list_parts(shard, spec)}
+    for attempts_left in reversed(range(_MAX_ATTEMPTS)):  # another process may remove files in between
+        if not all(path.exists() for path in reversed(parts.values())):  # the last one is usually missing
+            return ()
+        damaged = tuple(part for part in parts if not is_intact(out, part, spec))
+        if not shard_exists(out, shard, spec):
+            if damaged:
+                _remove(parts[part] for part in damaged)
+                return damaged
+            try:
+                with ShardWriter(out, shard, spec) as writer:
+                    for part, path in parts.items():
+                        copy_images(writer, path, part.first, part.stop)
+            except (DermisError, OSError):
+                if not attempts_left:
+                    raise
+                continue
+        _remove(parts.values())
+        break
+    return ()
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        remove_path(path)
