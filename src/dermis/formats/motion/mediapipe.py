@@ -149,7 +149,11 @@ def _plain_fields(record: object) -> dict[str, object]:
 
 
 def _frame_list(document: object) -> list[object]:
-    """Return the frames of a document: a list, the longest list in an object, or the document itself."""
+    """Return the list of frames in a JSON document.
+
+    A document that is itself a frame is the only one. Otherwise a list contains the frames; of an object, the
+    longest list among its values does.
+    """
     if isinstance(document, list):
         is_frame = bool(document) and isinstance(document[0], dict) and bool(document[0].keys() & _SCORE_KEYS)
         return [document] if is_frame else document
@@ -293,7 +297,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and the names of rotations without a bone."""
+    """Return angles (k, 3) by bone name [degrees], and the rotations for which the head has no bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()
