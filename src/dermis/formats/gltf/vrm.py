@@ -48,7 +48,7 @@ _MAX_WEIGHT = 100.0
 
 @dataclass(frozen=True)
 class Avatar:
-    """Properties that a VRM file adds to glTF; the defaults are for other glTF files.
+    """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
     expressions : for each mesh (by `id`) and expression (by name), the weights by morph target index
     """
